@@ -115,8 +115,9 @@ COVERED = 93.0, 97.0  # per cent, of all together; of 95 % chance alone makes +-
 MOST_PASSED_BEYOND = 5.0  # per cent of PASS
 NORMAL_95 = 1.959964
 FEW_IMAGES = 60
-MORE_TRIALS = 100  # of all together
+MORE_TRIALS = 100
 FEWER_TRIALS = 40
+LEAST_TRIALS = 60  # of 300 images, which take seconds each
 
 
 class StationCase(NamedTuple):
@@ -129,7 +130,10 @@ class StationCase(NamedTuple):
     @property
     def n_trials(self) -> int:
         """Number of stations drawn."""
-        return MORE_TRIALS if self.name == TOGETHER else FEWER_TRIALS
+        if self.n_images > FEW_IMAGES:
+            return LEAST_TRIALS
+        is_usual = self.name == TOGETHER and self.n_cameras == 1
+        return MORE_TRIALS if is_usual else FEWER_TRIALS
 
     @property
     def drawn(self) -> list[tuple["StationCase", int]]:

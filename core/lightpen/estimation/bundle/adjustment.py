@@ -5,9 +5,6 @@ a bad file. Where the images do not show the file to be off, its values are bett
 an estimate from one swing. So the estimate is taken with the assumed prior shrunk to
 the deviation that the images show (empirical Bayes); its uncertainty is that of the
 unshrunk prior, and the shift of the estimate by shrinkage is a separate contribution.
-
-Likewise mechanics of usual size have their prior in the uncertainty; the estimate
-follows them where the images make them likelier than perfect mechanics.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +22,6 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_pen_contradictions,
 )
 from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
-from lightpen.estimation.bundle.effects import Effect, gain_of, prior_of
 from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.noise_correlation import (
@@ -51,13 +47,13 @@ class Adjustment:
     Attributes
     ----------
     bundle : Bundle
-        The estimate, with assumed camera priors shrunk, and without unlikely mechanics.
+        The estimate, with assumed camera priors shrunk.
     unshrunk : Bundle
         The fit with these priors as assumed; its covariance is the uncertainty.
     priors : Priors
         Priors of ``unshrunk`` with contradicted numbers released.
     effects : tuple of SearchedEffect
-        Beside a fit without them; candidates are unknowns of ``unshrunk``.
+        Beside a fit without them; candidates are unknowns of ``bundle``.
     """
 
     bundle: Bundle
@@ -130,23 +126,20 @@ def adjust(
         # Correlated noise contradicts a file by chance more often.
         inflation = fitted.correlation.factor
         fitted = consistent_fit(inflation)
+    shrunk = shrunk_priors(fitted.bundle, fitted.priors)
     bundle = unshrunk = fitted.bundle
-    correlation, same = fitted.correlation, bundle.unknowns
-    again = partial(fit, inflation=inflation, noise=same.noise)
-    candidates = tuple(each.effect for each in fitted.effects if each.is_candidate)
-    if candidates != same.effects:
-        unshrunk = again(fitted.priors, effects=candidates)
-        correlation = measure_correlation(unshrunk, pixels)
-    shrunk = shrunk_priors(bundle, fitted.priors)
     if shrunk is not fitted.priors:
-        bundle = again(shrunk, effects=same.effects)
-    components = correlation.components
+        same = bundle.unknowns
+        bundle = fit(
+            shrunk, inflation=inflation, effects=same.effects, noise=same.noise
+        )
+    components = fitted.correlation.components
     if components is not None:
         bundle = replace(bundle, budget_components=components)
         unshrunk = replace(unshrunk, budget_components=components)
     return Adjustment(
         *(bundle, unshrunk, fitted.priors, fitted.contradictions),
-        *(correlation, fitted.effects),
+        *(fitted.correlation, fitted.effects),
     )
 
 
@@ -166,15 +159,9 @@ def _fit_consistent(
         fit = partial(fit, noise=of_centers)
         bundle = fit(priors)
     effects = search_effects(bundle, pixels, priors.compliance)
-    supported = tuple(
-        each.effect if each.is_supported else each.effect.at_zero
-        for each in effects
-        if each.is_candidate
-    )
-    bundle = fit(priors, effects=supported)
-    likely = likely_effects(bundle)
-    fit = partial(fit, effects=likely)
-    if likely != supported:
+    candidates = tuple(each.effect for each in effects if each.is_candidate)
+    if candidates:
+        fit = partial(fit, effects=candidates)
         bundle = fit(priors)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
@@ -215,30 +202,6 @@ def _with_led_noise(
         weights, fit = noise, partial(fit, noise=known * noise)
         bundle = fit(priors)
     return fit, bundle
-
-
-def likely_effects(bundle: Bundle) -> tuple[Effect, ...]:
-    """Return the effects of a fit, mechanics held at 0 if the images deny them.
-
-    One that they support by itself stays.
-    """
-    effects, places = bundle.unknowns.effects, bundle.layout.effects
-    of_mechanics = [
-        (effect, place)
-        for effect, place, found in zip(
-            effects, places, bundle.components.effects, strict=True
-        )
-        if effect.is_mechanical and not (effect.is_exact or found.is_supported)
-    ]
-    if not of_mechanics:
-        return effects
-    chosen, slices = zip(*of_mechanics, strict=True)
-    at = np.concatenate([np.arange(place.start, place.stop) for place in slices])
-    known = inverse(bundle.covariance[np.ix_(at, at)])
-    S = known - bundle.prior_information[np.ix_(at, at)]
-    if gain_of(S, known @ bundle.values[at], prior_of(chosen)) > 0:
-        return effects
-    return tuple(effect.at_zero if effect in chosen else effect for effect in effects)
 
 
 def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:

@@ -70,10 +70,10 @@ def _found_once(
 
 
 def _likely_effect(effect: Effect, found: EffectComponent) -> EffectComponent:
-    """Return a component that the images support beyond what is stated; else that."""
-    if found.is_supported and found.sigma > effect.stated:
+    """Return the component of an effect that the images support, else none."""
+    if found.is_supported:
         return found
-    return found._replace(sigma=effect.stated, covariance=effect.prior)
+    return found._replace(sigma=0.0, covariance=np.zeros_like(found.covariance))
 
 
 def _found_seat(

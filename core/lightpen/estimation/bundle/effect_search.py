@@ -2,8 +2,8 @@
 
 The information about the unknowns of all effects takes one pass about the fit, with all
 other unknowns marginalised. An effect whose likelihood gains is a candidate: it
-is fitted, and so are mechanics. The others are held at 0, and what they may be all the
-same moves tip and cone by its own covariance.
+is fitted. The others are held at 0, and what they may be all the same moves tip and
+cone by its own covariance.
 """
 
 from dataclasses import dataclass
@@ -16,18 +16,19 @@ from lightpen.estimation.bundle.components import NO_COMPONENTS
 from lightpen.estimation.bundle.effects import (
     Effect,
     EffectComponent,
+    EffectName,
+    cone_moves,
     effects_of,
-    gain_of,
-    prior_of,
     size_of,
 )
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     CameraView,
+    NormalEquations,
     eliminate,
     views_at,
 )
-from lightpen.model.information import inverse, known_by
+from lightpen.model.information import inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,19 +37,22 @@ class SearchedEffect:
 
     Attributes
     ----------
-    covariance : (6, 6) array
-        Of (tip, cone) by what the effect may be where it is held at 0, mm^2.
-    is_supported : bool
-        Whether the images support it: by itself, or among all mechanics.
+    by_unknowns : (6, k) array
+        Error of (tip, cone) by its unknowns where they are held at 0.
     is_candidate : bool
-        Whether it is fitted: the images support it, or it is one of mechanics.
+        Whether the images support it.
     """
 
     effect: Effect
     component: EffectComponent
-    covariance: FloatArray
-    is_supported: bool
+    by_unknowns: FloatArray
     is_candidate: bool
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of (tip, cone) by what the effect may be, (6, 6), mm^2."""
+        G = self.by_unknowns
+        return np.asarray(G @ self.component.expected @ G.T)
 
 
 def search_effects(
@@ -93,63 +97,49 @@ def search_effects(
         change = covariance @ at_best - start
         S = own - with_others.T @ covariance @ with_others
         models.append((0.5 * (S + S.T), right - with_others.T @ change))
+    found, first = [], 0
     by_all = -bundle.covariance[:6] @ with_others
-    ends = np.cumsum([effect.number for effect in effects])
-    places = [
-        np.arange(end - x.number, end) for end, x in zip(ends, effects, strict=True)
-    ]
-    mechanical = [i for i, effect in enumerate(effects) if effect.is_mechanical]
-    of_all = np.concatenate([places[i] for i in mechanical])
-    S, b = models[0]
-    gain, shares = _of_mechanics(
-        [effects[i] for i in mechanical],
-        S[np.ix_(of_all, of_all)],
-        b[of_all],
-        by_all[:, of_all],
-    )
-    found = []
-    for i, (effect, at) in enumerate(zip(effects, places, strict=True)):
-        sizes = [size_of(effect, S[np.ix_(at, at)], b[at]) for S, b in models]
-        share = by_all[:, at] @ sizes[0].expected @ by_all[:, at].T
-        is_supported = any(size.is_supported for size in sizes)
-        if i in mechanical:
-            share = shares[mechanical.index(i)]
-            is_supported |= gain > 0
-        is_candidate = is_supported or i in mechanical
-        found.append(
-            SearchedEffect(effect, sizes[0], share, is_supported, is_candidate)
-        )
+    for effect in effects:
+        at = slice(first, first + effect.number)
+        first = at.stop
+        sizes = [size_of(effect, S[at, at], b[at]) for S, b in models]
+        is_candidate = any(size.is_supported for size in sizes)
+        found.append(SearchedEffect(effect, sizes[0], by_all[:, at], is_candidate))
     return tuple(found)
 
 
-def _of_mechanics(
-    effects: list[Effect], S: FloatArray, right: FloatArray, by_all: FloatArray
-) -> tuple[float, list[FloatArray]]:
-    """Return the gain by mechanics, and their shares in the covariance of (tip, cone).
+def search_compliance(
+    bundle: Bundle, each: NormalEquations, compliance: float
+) -> SearchedEffect:
+    """Search a fit for compliance alone, by its normal equations.
 
-    Held at 0 together, they err together: half of what two have in common counts to
-    each.
+    Other effects need the LEDs one by one.
 
     Parameters
     ----------
-    S, right : (k, k), (k,) array
-        Information about their unknowns and its right side.
-    by_all : (6, k) array
-        Error of (tip, cone) by these where they are held at 0.
+    each : NormalEquations
+        About the start of the fit, with jitter where it has one.
+    compliance : float
+        Standard deviation that is assumed, mm.
     """
-    prior = prior_of(effects)
-    covariance = inverse(S + known_by(prior))
-    gain = gain_of(S, right, prior)
-    if gain <= 0:  # an estimate does not follow them
-        mean = covariance @ right
-        covariance = covariance + np.outer(mean, mean)
-    ends = np.cumsum([effect.number for effect in effects]).tolist()
-    places = [
-        slice(end - effect.number, end)
-        for effect, end in zip(effects, ends, strict=True)
-    ]
-    halves = [by_all[:, at] @ covariance[at] @ by_all.T for at in places]
-    return gain, [0.5 * (half + half.T) for half in halves]
+    move = cone_moves(bundle.state.rotations).compliance
+    unknowns, own = bundle.unknowns, each.cone_rows[..., :N_CONE]
+    step, shifts = unknowns.step(bundle.values)
+    left = each.cone_right - each.cone_rows @ step
+    left -= np.einsum("nij,nj->ni", own, shifts)
+    moved = own @ move
+    common = np.tensordot(each.cone_rows, move[..., 0], ([0, 1], [0, 1]))
+    by_form = (unknowns.forms.T @ moved[..., 0]).ravel()
+    with_others = np.concatenate([unknowns.mixing.T @ common, by_form])[:, None]
+    rows = move.reshape(-1, 1)
+    S = rows.T @ moved.reshape(-1, 1)
+    S -= with_others.T @ bundle.covariance @ with_others
+    effect = Effect(
+        EffectName.COMPLIANCE, 0, np.zeros((1, 1)), (np.eye(1),), compliance
+    )
+    size = size_of(effect, S, rows.T @ left.ravel())
+    by_unknowns = -bundle.covariance[:6] @ with_others
+    return SearchedEffect(effect, size, by_unknowns, is_candidate=False)
 
 
 def _information(

@@ -48,7 +48,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.effect_search import SearchedEffect
-from lightpen.estimation.bundle.effects import MECHANICS, EffectName
+from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, axes_of_cone
@@ -106,7 +106,6 @@ SHARES_OF_EFFECTS = {
     EffectName.SHUTTER: ContributionName.TIMING,
     EffectName.STROBE: ContributionName.TIMING,
 }
-ASSUMED_EFFECTS = {SHARES_OF_EFFECTS[name] for name in MECHANICS}
 IMAGES_SHRINK = (
     ContributionName.NOISE,
     ContributionName.CENTERS,
@@ -237,7 +236,6 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
             noise=raised * correlation.noise,
             shrinkage_shift=adjustment.shrinkage_shift,
             effects=adjustment.effects,
-            estimate=adjustment.bundle,
         ),
         independent_noise=bundle.independent_noise,
         blocks=blocks,
@@ -254,7 +252,6 @@ def contributions_of(
     noise: FloatArray,
     shrinkage_shift: FloatArray,
     effects: Sequence[SearchedEffect] = (),
-    estimate: Bundle | None = None,
 ) -> tuple[UncertaintyContribution, ...]:
     """Return the contributions to the covariance of (tip, cone), equations (15)-(19).
 
@@ -270,24 +267,21 @@ def contributions_of(
         See `lightpen.estimation.bundle.adjustment.Adjustment`, mm.
     effects : sequence of SearchedEffect
         Beside the fit.
-    estimate : Bundle, optional
-        Adjustment with shrunk priors, moved by errors of the centres that repeat; the
-        other unless given.
     """
-    at, estimate = bundle.layout, estimate or bundle
+    at = bundle.layout
     jitter = bundle.propagated(bundle.jitter_information + bundle.insignificant_jitter)
     moved, by_form = _of_seat(bundle, priors.form_error)
     drift = bundle.component_contribution(at.drift)
     drift *= drift_variance(bundle) / _prior_variance(bundle, at.drift)
     # Equation (18): errors of the centres, independent from posture to posture.
-    biased = max(n_images / POSTURES, 1.0) * estimate.independent_noise
-    biased *= (priors.center_bias / estimate.sigma) ** 2
+    biased = max(n_images / POSTURES, 1.0) * bundle.independent_noise
+    biased *= (priors.center_bias / bundle.sigma) ** 2
     if priors.reading is not None:
-        along_normals = priors.reading.shift * _by_shift_along_normals(estimate)
+        along_normals = priors.reading.shift * _by_shift_along_normals(bundle)
         biased += np.outer(along_normals, along_normals)
-    of_turn = covariance_of_turn(estimate.unknowns.start.pen)
-    if of_turn is not None and estimate.state.rig.n_cameras == 1:
-        biased += effect_of_normals(estimate).covariance(of_turn)[:6, :6]
+    of_turn = covariance_of_turn(bundle.unknowns.start.pen)
+    if of_turn is not None and bundle.state.rig.n_cameras == 1:
+        biased += effect_of_normals(bundle).covariance(of_turn)[:6, :6]
     size = bundle.part(at.scale)
     warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
     shares = [
@@ -353,7 +347,7 @@ def _of_effects(
     for share in dict.fromkeys(SHARES_OF_EFFECTS.values()):
         own = (part for name, part in parts if SHARES_OF_EFFECTS[name] is share)
         covariance = sum(own, np.zeros((6, 6)))
-        assumed = share in ASSUMED_EFFECTS
+        assumed = share is ContributionName.COMPLIANCE
         shares.append(UncertaintyContribution(share, covariance, assumed))
     return shares
 

@@ -3,8 +3,8 @@
 During a swing tip and cone are fitted with the parameters of the files held. U is that
 of the whole budget all the same (`budget.contributions_of`), by one step of the bundle
 adjustment about the joint fit: its normal equations are kept, and a new image adds its
-own. What lens and mechanics may add is searched for when all images are linearised
-again, as it needs the LEDs one by one. Correlated noise is left
+own. What lens, sag, loose stylus and camera tilt may add is searched for when all
+images are linearised again, as it needs the LEDs one by one. Correlated noise is left
 to the calibration.
 """
 
@@ -21,7 +21,12 @@ from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS
-from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
+from lightpen.estimation.bundle.effect_search import (
+    SearchedEffect,
+    search_compliance,
+    search_effects,
+)
+from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -86,7 +91,7 @@ class UncertaintyPrediction:
     n_whole : int
         Images that were linearised together.
     effects : tuple of SearchedEffect
-        What these images leave open of the effects of a station.
+        What these images leave open of the effects of a station, but for compliance.
     """
 
     state: BundleState
@@ -110,8 +115,12 @@ class UncertaintyPrediction:
         shrinkage_shift = _shrinkage_shift_of(bundle, priors, equations)
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
+        jitter = bundle.components.jitter.covariance
+        beside = equations if jitter is None else _with_jitter(equations, jitter)
+        compliance = search_compliance(bundle, beside, priors.compliance)
+        effects = (compliance, *self.effects)
         now = contributions_of(
-            bundle, priors, n_images, noise, shrinkage_shift, self.effects
+            bundle, priors, n_images, noise, shrinkage_shift, effects
         )
         endless = _with_endless_images(bundle)
         nothing = np.zeros((6, 6))
@@ -133,8 +142,12 @@ class UncertaintyPrediction:
         found = search_effects(
             bundle, pixels, priors.compliance, residuals_at=np.zeros_like(bundle.values)
         )
-        held = tuple(replace(each, is_candidate=False) for each in found)
-        return replace(self, effects=held)
+        effects = tuple(
+            replace(each, is_candidate=False)
+            for each in found
+            if each.effect.name is not EffectName.COMPLIANCE
+        )
+        return replace(self, effects=effects)
 
     def _adjusted(
         self, joint: JointFit, sigma: float, assumed: Assumptions

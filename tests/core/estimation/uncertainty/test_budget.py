@@ -9,7 +9,6 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.adjustment import Adjustment, adjust
-from lightpen.estimation.bundle.effects import MECHANICS
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -89,13 +88,12 @@ def of_images(joint: JointFit, some: slice) -> JointFit:
     )
 
 
-MECHANICAL = {SHARES_OF_EFFECTS[name] for name in MECHANICS}
 DOUBTED = (
     *(ContributionName.CENTERS, ContributionName.SEAT, ContributionName.DRIFT),
-    *(ContributionName.SHRINKAGE, *SHARES_OF_EFFECTS.values()),
+    *SHARES_OF_EFFECTS.values(),
 )
 OF_STATION = {
-    *MECHANICAL,
+    ContributionName.COMPLIANCE,
     ContributionName.CENTERS,
     ContributionName.FORM,
     ContributionName.TEMPERATURE,
@@ -200,7 +198,7 @@ def test_halves_agree_with_two_fits_of_half_the_images() -> None:
 def test_the_shares_add_up_to_the_covariance() -> None:
     for correlation in (0.0, 0.9):
         result = calibrated(0.05 * noise(8, correlation, 40))
-        budget, bundle = result.budget, adjusted(result).unshrunk
+        budget, bundle = result.budget, result.bundle
         np.testing.assert_allclose(
             budget.covariance, sum(share.covariance for share in budget.shares)
         )
@@ -212,9 +210,8 @@ def test_the_shares_add_up_to_the_covariance() -> None:
             # But for what may be so besides, and is no part of it, and the seat, which
             # counts otherwise than it was fitted.
             of_seat = bundle.part(*bundle.layout.seat)
-            besides = {*DOUBTED, ContributionName.FORM} - MECHANICAL
             np.testing.assert_allclose(
-                np.diag(without(budget, *besides)),
+                np.diag(without(budget, *DOUBTED, ContributionName.FORM)),
                 np.diag(bundle.covariance[:6, :6] - of_seat),
                 rtol=1e-3,
             )
@@ -233,9 +230,9 @@ def test_what_holding_back_from_a_likely_error_changes_is_a_share() -> None:
 
 
 def fitted_variances(budget: Budget) -> FloatArray:
-    """Return the variances of tip and cone by what is fitted at every station."""
-    others = {ContributionName.SHRINKAGE, *SHARES_OF_EFFECTS.values()} - MECHANICAL
-    fitted = [s.covariance for s in budget.shares if s.name not in others]
+    """Return the variances of tip and cone without effects of the station."""
+    of_effects = set(SHARES_OF_EFFECTS.values())
+    fitted = [s.covariance for s in budget.shares if s.name not in of_effects]
     return np.asarray(np.diag(np.sum(fitted, axis=0)))
 
 

@@ -59,7 +59,6 @@ def test_what_holding_back_changed_is_part_of_the_instrument(
     solved: tuple[Adjustment, Budget],
 ) -> None:
     adjustment, budget = solved
-    adjustment = replace(adjustment, bundle=adjustment.unshrunk)  # nothing held
     state = adjustment.bundle.state
     moved = replace(state, tip_pen=state.tip_pen + np.array([0.01, 0, -0.02]))
     held = replace(adjustment, bundle=replace(adjustment.bundle, state=moved))
