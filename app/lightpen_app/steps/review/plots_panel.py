@@ -18,6 +18,7 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import PARTED
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import ArrowPlot, DotPlot, Histogram
@@ -277,7 +278,7 @@ class UncertaintyPanel(PlotsPanel):
         if budget.correlation_factor > 1:
             text = self.tr("Images are correlated: noise variance \u00d7 {0}")
             texts.append(text.format(f"{budget.correlation_factor:.2f}"))
-        self._remark.setText(" ".join(texts))
+        self._remark.setText(PARTED.join(texts))
 
 
 class MethodsPanel(PlotsPanel):

@@ -42,7 +42,7 @@ from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
 
 LEAST_ROWS = 7
-WIDTHS = (11, 16, 12, 11, 13, 20)  # of the columns but the last, in GRID
+WIDTHS = (11, 16, 12, 11, 15, 20)  # of the columns but the last, in GRID
 NUMBERS = (3, 4)  # columns of them
 LIST_HEIGHT = 47 * GRID  # px, at least: its lead may take two lines
 PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QSize, QThreadPool
+from PySide6.QtCore import QSize, Qt, QThreadPool
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
@@ -143,6 +144,14 @@ def test_a_view_that_is_left_out_takes_no_part(
     press(window, "Exclude view and recalibrate")
 
     qtbot.waitUntil(lambda: views_listed(window) == 6)
+
+
+def test_escape_closes_the_window(window: BoardWindow) -> None:
+    window.show()
+
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+
+    assert not window.isVisible()
 
 
 def test_a_board_that_is_none_is_refused(window: BoardWindow) -> None:
