@@ -10,7 +10,13 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
-from lightpen.verification.tasks.fixed_point import measure_fixed_point
+from lightpen.verification.tasks.fixed_point import (
+    FIXED_POINT,
+    NEW_POSTURE,
+    USUAL_TOUCHES,
+    FixedPointOptions,
+    measure_fixed_point,
+)
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import Conditions
 
@@ -189,3 +195,25 @@ def test_touches_alike_are_expected_to_scatter_by_their_noise(
     # What all of them share moves none against another.
     noise = np.sqrt(np.diag(touches[0].noise))
     np.testing.assert_allclose(found.expected_deviation, noise, rtol=1e-6)
+
+
+@pytest.mark.parametrize("n_touches", [USUAL_TOUCHES, 6, 8, 20])
+def test_the_simulated_operator_probes_in_postures_that_all_count(
+    n_touches: int,
+) -> None:
+    options = FixedPointOptions(n_touches=n_touches)
+    goals = [FIXED_POINT.hand(options, 0, step) for step in range(n_touches)]
+    axes = np.array(
+        [
+            [
+                np.sin(goal.tilt) * np.cos(goal.direction),
+                np.sin(goal.tilt) * np.sin(goal.direction),
+                np.cos(goal.tilt),
+            ]
+            for goal in goals
+        ]
+    )
+
+    between = np.arccos(np.clip(axes @ axes.T, -1.0, 1.0))
+    np.fill_diagonal(between, np.inf)
+    assert between.min() > NEW_POSTURE
