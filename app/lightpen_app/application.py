@@ -316,8 +316,8 @@ def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> in
         status = application.exec()
     finally:
         wizard.crash_hook.remove()
-    # The exit status by which shells know a signal; that of the event loop is lost
-    # where the last window closes while a question is open.
+    # Shells expect 128 plus the number of the signal. What `exit` is given does not
+    # reach `exec` where the last window closes while a question is open.
     return 128 + signals.number if signals.number else status
 
 

@@ -44,9 +44,10 @@ ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
 HALVED = 0.5  # the same, of views that no single camera fits
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
-OTHER_CENTER = 0.005  # of that side, and SIGMAS: no zoom moves the principal point so
-OTHER_ASPECT = 0.002  # of fx by fy, likewise
-OTHER_DISTORTION = 0.002  # of that side, by which the distortion moves the image
+# Larger differences than these, beyond SIGMAS, mean two cameras and not two settings:
+OTHER_CENTER = 0.005  # shift of the principal point, of that side
+OTHER_ASPECT = 0.002  # of fx/fy, relative
+OTHER_DISTORTION = 0.002  # of the distortion, rms over the image, of that side
 SIGMAS = 3.0
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one

@@ -9,9 +9,8 @@ restricted maximum likelihood [1]_, by the fixed point of [2]_. The cameras are
 estimated together with the effects, so what the views cannot separate from an effect is
 in their covariance. One set of views hardly determines amplitude and length of the
 fields: the estimate is the mean over a grid of both, weighted by the likelihood; the
-grid is even in the logarithm of the amplitude, the prior of a scale [3]_. Over 387
-simulated sets 95 % intervals cover 94.6 to 96.9 %; with all amplitudes as likely
-before, 95.3 to 98.7 %.
+grid is even in the logarithm of the amplitude, the prior of a scale [3]_. The section
+`cameras` of the benchmark states how often 95 % intervals cover the truth.
 
 References
 ----------

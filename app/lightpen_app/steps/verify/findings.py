@@ -18,7 +18,6 @@ from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import ResultTable
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.part_view import PartView, part_value
@@ -225,7 +224,7 @@ def figures_of(table: ResultTable) -> Figures:
         tuple(_words(row.name) for row in table.rows),
         tuple(
             (
-                *(_cell(x, row.decimals) for x in row.values),
+                *row.texts(),
                 *([_words(row.remark)] if len(row.values) < len(table.columns) else ()),
             )
             for row in table.rows
@@ -255,12 +254,6 @@ def live_posture(setup: SessionSetup, state: SessionState) -> Posture | None:
     if not touching.held or touching.n_lost:
         return None
     return posture_of(setup.instrument.pen, touching.held[-1].frame.rotation)
-
-
-def _cell(value: float | str | None, decimals: int) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    return number_text(value, decimals)
 
 
 def _words(name: Message | str) -> str:

@@ -23,7 +23,7 @@ from lightpen.model.quantiles import normal_quantile
 
 # Rendered even, domed and ringed LEDs, hot spots and halos are off by 0.02 at most, a
 # steep dome by 0.05, a blur of a fifth of the disc by 0.08.
-EDGE_ERROR = 0.05  # of its width, by which all edges may be displaced alike
+EDGE_ERROR = 0.05  # systematic displacement of all edges, of the edge width
 # Rendered domes stood 0.17 D (w - 1.35) / d^2 behind their discs, within a tenth, with
 # discs of 5 and 10 mm (D), 21 and 43 px (d), and edges (w) of 2.4 px to a fifth of the
 # disc; even faces, rings and hot spots a quarter of that at most.

@@ -67,13 +67,8 @@ def _table(table: ResultTable) -> list[str]:
         width = max(COLUMN, *(len(head) + 2 for head in heads))
         lines.append(" " * NAME + "".join(f"{head:>{width}}" for head in heads))
         for row in table.rows:
-            cells = (
-                f"{x or '':>{width}}"
-                if x is None or isinstance(x, str)
-                else f"{x:{width}.{row.decimals}f}"
-                for x in row.values[own]
-            )
-            words = f"{str(row.name)[:NAME]:<{NAME}}" + "".join(cells)
+            cells = "".join(f"{text:>{width}}" for text in row.texts()[own])
+            words = f"{str(row.name)[:NAME]:<{NAME}}{cells}"
             lines.append(f"{words}  {row.remark}" if row.remark else words)
     return [line.rstrip() for line in (*lines, *map(str, table.notes))]
 

@@ -191,6 +191,15 @@ class ResultRow:
     decimals: int = 4
     remark: Message | str = ""
 
+    def texts(self) -> tuple[str, ...]:
+        """Return the values as texts, without a sign before zero."""
+        return tuple(
+            x or ""
+            if x is None or isinstance(x, str)
+            else f"{round(x, self.decimals) + 0.0:.{self.decimals}f}"
+            for x in self.values
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class ResultTable:
