@@ -5,6 +5,9 @@ a bad file. Where the images do not show the file to be off, its values are bett
 an estimate from one swing. So the estimate is taken with the assumed prior shrunk to
 the deviation that the images show (empirical Bayes); its uncertainty is that of the
 unshrunk prior, and the shift of the estimate by shrinkage is a separate contribution.
+
+Likewise mechanics of usual size have their prior in the uncertainty; the estimate
+follows them where chance alone seldom makes them so much likelier than perfect ones.
 """
 
 from dataclasses import dataclass, replace
@@ -22,14 +25,21 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_pen_contradictions,
 )
 from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
+from lightpen.estimation.bundle.effects import (
+    Effect,
+    gain_of,
+    is_supported,
+    mechanics_of,
+    prior_of,
+)
 from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
-from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.linearised import BundleState, views_at
 from lightpen.estimation.bundle.noise_correlation import (
     Correlation,
     measure_correlation,
 )
 from lightpen.estimation.bundle.priors import Prior, Priors
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
+from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
 from lightpen.estimation.statistics.variance_components import ALLOWED, find_component
 from lightpen.model.information import inverse
 
@@ -47,40 +57,46 @@ class Adjustment:
     Attributes
     ----------
     bundle : Bundle
-        The estimate, with assumed camera priors shrunk.
+        The estimate, with assumed camera priors shrunk, and without unlikely mechanics.
     unshrunk : Bundle
-        The fit with these priors as assumed; its covariance is the uncertainty.
+        The same with these priors as assumed.
+    whole : Bundle
+        The same with all mechanics, too; its covariance is the uncertainty.
     priors : Priors
         Priors of ``unshrunk`` with contradicted numbers released.
     effects : tuple of SearchedEffect
-        Beside a fit without them; candidates are unknowns of ``bundle``.
+        Of lens and timing; candidates are unknowns of all three.
     """
 
     bundle: Bundle
     unshrunk: Bundle
+    whole: Bundle
     priors: Priors
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
     effects: tuple[SearchedEffect, ...]
 
-    @property
-    def shrinkage_shift(self) -> FloatArray:
-        """Change of (tip_pen, cone_rig) by shrinkage, (6,), mm."""
-        one, other = self.bundle.state, self.unshrunk.state
+    def shift_from(self, other: Bundle) -> FloatArray:
+        """Return (tip_pen, cone_rig) of the estimate less another fit's, (6,), mm."""
+        one, there = self.bundle.state, other.state
         return np.concatenate(
-            [one.tip_pen - other.tip_pen, one.cone_rig - other.cone_rig]
+            [one.tip_pen - there.tip_pen, one.cone_rig - there.cone_rig]
         )
 
 
 @dataclass(frozen=True, eq=False)
 class _ConsistentFit:
-    """A fit with contradicted numbers released from their priors."""
+    """A fit with contradicted numbers released from their priors.
+
+    Of the candidates, unlikely mechanics are held at 0.
+    """
 
     bundle: Bundle
     correlation: Correlation
     priors: Priors
     contradictions: tuple[Contradiction, ...]
     effects: tuple[SearchedEffect, ...]
+    candidates: tuple[Effect, ...]
 
 
 def adjust(
@@ -126,20 +142,23 @@ def adjust(
         # Correlated noise contradicts a file by chance more often.
         inflation = fitted.correlation.factor
         fitted = consistent_fit(inflation)
-    shrunk = shrunk_priors(fitted.bundle, fitted.priors)
-    bundle = unshrunk = fitted.bundle
+    bundle = unshrunk = whole = fitted.bundle
+    correlation, same = fitted.correlation, bundle.unknowns
+    again = partial(fit, inflation=inflation, noise=same.noise)
+    if fitted.candidates != same.effects:
+        whole = again(fitted.priors, effects=fitted.candidates)
+        correlation = measure_correlation(whole, pixels)
+    shrunk = shrunk_priors(bundle, fitted.priors)
     if shrunk is not fitted.priors:
-        same = bundle.unknowns
-        bundle = fit(
-            shrunk, inflation=inflation, effects=same.effects, noise=same.noise
-        )
-    components = fitted.correlation.components
+        bundle = again(shrunk, effects=same.effects)
+    components = correlation.components
     if components is not None:
         bundle = replace(bundle, budget_components=components)
         unshrunk = replace(unshrunk, budget_components=components)
+        whole = replace(whole, budget_components=components)
     return Adjustment(
-        *(bundle, unshrunk, fitted.priors, fitted.contradictions),
-        *(fitted.correlation, fitted.effects),
+        *(bundle, unshrunk, whole, fitted.priors, fitted.contradictions),
+        *(correlation, fitted.effects),
     )
 
 
@@ -151,17 +170,29 @@ def _fit_consistent(
     sigmas: FloatArray | None,
 ) -> _ConsistentFit:
     """Fit again and again, with contradicted numbers released, until none is left."""
-    rig, bundle = state.rig, fit(priors)
+    rig, rotations = state.rig, state.rotations
+    candidates = mechanics_of(
+        views_at(state, pixels),
+        rotations,
+        axes_of_cone(rotations),
+        state.pen.leds,
+        priors.compliance,
+    )
+    bundle = fit(priors, effects=candidates)
     of_centers = None
     if sigmas is not None:
         of_centers = find_center_noise(bundle.residuals, bundle.used, sigmas)
     if of_centers is not None:
         fit = partial(fit, noise=of_centers)
-        bundle = fit(priors)
-    effects = search_effects(bundle, pixels, priors.compliance)
-    candidates = tuple(each.effect for each in effects if each.is_candidate)
-    if candidates:
-        fit = partial(fit, effects=candidates)
+        bundle = fit(priors, effects=candidates)
+    effects = search_effects(bundle, pixels)
+    found = tuple(each.effect for each in effects if each.is_candidate)
+    if found:
+        candidates += found
+        bundle = fit(priors, effects=candidates)
+    likely = likely_effects(bundle)
+    fit = partial(fit, effects=likely)
+    if likely != candidates:
         bundle = fit(priors)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
@@ -172,14 +203,16 @@ def _fit_consistent(
             break
         inputs, bundle = now, fit(now.priors)
         correlation = measure_correlation(bundle, pixels)
-    found = contradictions_of(rig, bundle, priors, correlation.excess, inputs)
+    of_files = contradictions_of(rig, bundle, priors, correlation.excess, inputs)
     of_pen, released = find_pen_contradictions(
         state.pen, bundle, inputs.priors, correlation.excess
     )
     if of_pen:
         bundle = fit(released)
         correlation = measure_correlation(bundle, pixels)
-    return _ConsistentFit(bundle, correlation, released, found + of_pen, effects)
+    return _ConsistentFit(
+        *(bundle, correlation, released, of_files + of_pen, effects, candidates)
+    )
 
 
 def _with_led_noise(
@@ -202,6 +235,30 @@ def _with_led_noise(
         weights, fit = noise, partial(fit, noise=known * noise)
         bundle = fit(priors)
     return fit, bundle
+
+
+def likely_effects(bundle: Bundle) -> tuple[Effect, ...]:
+    """Return the effects of a fit, mechanics held at 0 if the images deny them.
+
+    One that they support by itself stays.
+    """
+    effects, places = bundle.unknowns.effects, bundle.layout.effects
+    of_mechanics = [
+        (effect, place)
+        for effect, place, found in zip(
+            effects, places, bundle.components.effects, strict=True
+        )
+        if effect.is_mechanical and not (effect.is_exact or found.is_supported)
+    ]
+    if not of_mechanics:
+        return effects
+    chosen, slices = zip(*of_mechanics, strict=True)
+    at = np.concatenate([np.arange(place.start, place.stop) for place in slices])
+    known = inverse(bundle.covariance[np.ix_(at, at)])
+    S = known - bundle.prior_information[np.ix_(at, at)]
+    if is_supported(gain_of(S, known @ bundle.values[at], prior_of(chosen))):
+        return effects
+    return tuple(effect.at_zero if effect in chosen else effect for effect in effects)
 
 
 def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:

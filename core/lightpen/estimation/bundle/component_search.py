@@ -70,10 +70,10 @@ def _found_once(
 
 
 def _likely_effect(effect: Effect, found: EffectComponent) -> EffectComponent:
-    """Return the component of an effect that the images support, else none."""
-    if found.is_supported:
+    """Return a component that the images support beyond what is stated; else that."""
+    if found.is_supported and found.sigma > effect.stated:
         return found
-    return found._replace(sigma=0.0, covariance=np.zeros_like(found.covariance))
+    return found._replace(sigma=effect.stated, covariance=effect.prior)
 
 
 def _found_seat(

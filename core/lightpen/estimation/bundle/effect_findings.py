@@ -46,10 +46,11 @@ class FoundEffect:
     camera : str
         Of a rig, whose images it shifts; empty of a single camera, and of the pen.
     size : float
-        Its value where it has one unknown, else the root mean square of its values:
-        mm, of lens and camera tilt px, of time image intervals.
+        Its value where it has one unknown, else the length of the vector of its
+        values, of a lens the root mean square shift: mm, of lens and camera tilt px, of
+        time image intervals.
     sigma : float or None
-        Standard uncertainty of the one value.
+        Standard uncertainty of the size; None of a lens.
     gain : float
         Twice the logarithm of the likelihood ratio of this effect to no effect.
     interval_ms : float or None
@@ -95,7 +96,7 @@ def found_effects(
         bundle.components.effects,
         strict=True,
     ):
-        if component.sigma == 0 or not np.isfinite(component.gain):
+        if not (component.is_supported and np.isfinite(component.gain)):
             continue
         values, sigma = bundle.values[place], None
         if effect.name is EffectName.LENS:
@@ -107,6 +108,8 @@ def found_effects(
             sigma = float(np.sqrt(bundle.covariance[place, place][0, 0]))
         else:
             size = float(np.linalg.norm(values))
+            along = values / max(size, np.finfo(float).tiny)
+            sigma = float(np.sqrt(along @ bundle.covariance[place, place] @ along))
         of_camera = effect.name in OF_ONE_CAMERA and names
         found.append(
             FoundEffect(

@@ -1,4 +1,4 @@
-"""Search for effects of a station that improve a fit without them.
+"""Search for effects of lens and timing that improve a fit without them.
 
 The information about the unknowns of all effects takes one pass about the fit, with all
 other unknowns marginalised. An effect whose likelihood gains is a candidate: it
@@ -10,24 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.components import NO_COMPONENTS
 from lightpen.estimation.bundle.effects import (
     Effect,
     EffectComponent,
-    EffectName,
-    cone_moves,
-    effects_of,
+    lens_and_timing,
     size_of,
 )
-from lightpen.estimation.bundle.linearised import (
-    N_CONE,
-    CameraView,
-    NormalEquations,
-    eliminate,
-    views_at,
-)
+from lightpen.estimation.bundle.linearised import N_CONE, CameraView, eliminate
 from lightpen.model.information import inverse
 
 
@@ -56,41 +48,27 @@ class SearchedEffect:
 
 
 def search_effects(
-    bundle: Bundle,
-    pixels: FloatArray,
-    compliance: float,
-    residuals_at: FloatArray | None = None,
+    bundle: Bundle, pixels: FloatArray, residuals_at: FloatArray | None = None
 ) -> tuple[SearchedEffect, ...]:
-    """Search a fit without effects for them.
+    """Search a fit without effects of lens and timing for them.
 
     Parameters
     ----------
     pixels : (N, C, L, 2) array
         LED centres, px.
-    compliance : float
-        Standard deviation that is assumed, mm.
     residuals_at : (p,) array or None
         Values of the unknowns to which the residuals belong; None are those of the fit.
     """
-    state, used, sigma = bundle.state, bundle.used, bundle.weight_sigma
-    views = views_at(state, pixels)
-    effects = effects_of(
-        views,
-        pixels,
-        used,
-        state.rotations,
-        state.pen.leds,
-        state.rig.cameras,
-        compliance,
-    )
+    state, used, unknowns = bundle.state, bundle.used, bundle.unknowns
+    effects = lens_and_timing(pixels, used, state.rig.cameras)
     columns = np.concatenate([each.columns for each in effects], axis=-1)
-    noise = bundle.unknowns.noise
-    views = tuple(view.in_units_of(noise[:, c]) for c, view in enumerate(views))
-    columns = columns / noise[..., None, None]
-    own, with_others, right = _information(bundle, views, columns, used, sigma)
+    columns /= unknowns.noise[..., None, None]
+    views = unknowns.views_at(state, pixels)
+    own, with_others, right = _information(bundle, views, columns)
     at_best = inverse(bundle.covariance) @ bundle.values
     start = bundle.values if residuals_at is None else residuals_at
-    prior = bundle.unknowns.prior_information(NO_COMPONENTS)
+    nothing = NO_COMPONENTS.with_no_effects(unknowns.effects)
+    prior = unknowns.prior_information(nothing)
     plain = inverse(bundle.information + bundle.measured_information + prior)
     models = []
     for covariance in (bundle.covariance, plain):
@@ -108,51 +86,14 @@ def search_effects(
     return tuple(found)
 
 
-def search_compliance(
-    bundle: Bundle, each: NormalEquations, compliance: float
-) -> SearchedEffect:
-    """Search a fit for compliance alone, by its normal equations.
-
-    Other effects need the LEDs one by one.
-
-    Parameters
-    ----------
-    each : NormalEquations
-        About the start of the fit, with jitter where it has one.
-    compliance : float
-        Standard deviation that is assumed, mm.
-    """
-    move = cone_moves(bundle.state.rotations).compliance
-    unknowns, own = bundle.unknowns, each.cone_rows[..., :N_CONE]
-    step, shifts = unknowns.step(bundle.values)
-    left = each.cone_right - each.cone_rows @ step
-    left -= np.einsum("nij,nj->ni", own, shifts)
-    moved = own @ move
-    common = np.tensordot(each.cone_rows, move[..., 0], ([0, 1], [0, 1]))
-    by_form = (unknowns.forms.T @ moved[..., 0]).ravel()
-    with_others = np.concatenate([unknowns.mixing.T @ common, by_form])[:, None]
-    rows = move.reshape(-1, 1)
-    S = rows.T @ moved.reshape(-1, 1)
-    S -= with_others.T @ bundle.covariance @ with_others
-    effect = Effect(
-        EffectName.COMPLIANCE, 0, np.zeros((1, 1)), (np.eye(1),), compliance
-    )
-    size = size_of(effect, S, rows.T @ left.ravel())
-    by_unknowns = -bundle.covariance[:6] @ with_others
-    return SearchedEffect(effect, size, by_unknowns, is_candidate=False)
-
-
 def _information(
-    bundle: Bundle,
-    views: tuple[CameraView, ...],
-    columns: FloatArray,
-    used: BoolArray,
-    sigma: float,
+    bundle: Bundle, views: tuple[CameraView, ...], columns: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return information of effects (E, E), with the unknowns (p, E), and right (E,).
 
     The unknowns of each image are eliminated.
     """
+    used, sigma = bundle.used, bundle.weight_sigma
     eliminated = eliminate(views, used, sigma, bundle.components.jitter.covariance)
     n_images, _, n_leds = used.shape
     unknowns, q = bundle.unknowns, eliminated.nuisance_covariance.shape[-1]
@@ -179,6 +120,8 @@ def _information(
     with_columns = np.tensordot(eliminated.turn_by_step, to_inner, ([0, 1], [0, 1]))
     by_cone = crossed[:, N_CONE : 2 * N_CONE]
     with_columns[:N_CONE] += by_cone.sum(axis=0)
+    at_diameter = K - 3 * n_leds - 1
+    at_effects = slice(at_diameter - views[0].effects.shape[-1], at_diameter)
     row = N_CONE
     for c, view in enumerate(views):
         k = view.own.shape[-1]
@@ -187,8 +130,10 @@ def _information(
         rows = np.where(seen[..., None], view.own, 0.0).reshape(-1, k) / sigma
         with_columns[row : row + k] += rows.T @ of_view
         row += k
+        rows = np.where(seen[..., None], view.effects, 0.0).reshape(len(of_view), -1)
+        with_columns[at_effects] += (rows / sigma).T @ of_view
         rows = np.where(seen, view.diameter, 0.0).reshape(-1) / sigma
-        with_columns[K - 3 * n_leds - 1] += rows @ of_view
+        with_columns[at_diameter] += rows @ of_view
         led = np.where(seen[..., None], view.led, 0.0) / sigma
         led = np.swapaxes(led, 0, 1).reshape(n_leds, -1, 3)
         of_led = np.swapaxes(A[:, c], 0, 1).reshape(n_leds, -1, E)

@@ -9,20 +9,24 @@ lens           smooth field over the image of one camera, px: polynomials over t
                of the image that the swing covers, with the covariance of a Gaussian
                process (`lightpen.model.lens_field`) of one of several lengths, or as
                the camera file states it
-compliance     stylus, seat or stand give way by c h: h is the part of the pen's axis
-               across the axis of the cone, its length the sine of the lean
-loose stylus   jump of the tip with the side of the lean: along h, or along one of two
-               axes of the pen, with the sign of the lean to that side
+compliance     stylus gives way across the pen, seat or stand across the cone, each by
+               the sine of the lean: the pen turns with the one and not with the other
+loose stylus   jump of the tip across the pen with the side of the lean: to that side,
+               or along one of two axes of the pen, with the sign of the lean to it
 sag            the pen bends under its weight, as the square of the height of the LED
-camera tilt    the image of one camera shifts with h, px
+camera tilt    the image of one camera shifts with the lean, px
 late camera    a further camera takes its images later, in image intervals
 rolling        the rows of an image are read one after the other; interval from the
 shutter        first row to the last
 LEDs in turn   the LEDs light one after the other; interval from one to the next
 ============== =========================================================================
+
+Mechanics (compliance to camera tilt) are seldom perfect, and a swing decides little of
+their sizes. They are unknowns of every fit, with a prior of their usual size.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -30,7 +34,6 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle.linearised import CameraView
-from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.statistics.variance_components import P_NONE
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import correlation
@@ -47,9 +50,6 @@ UNEVEN = 0.5  # of a step from image to image, by which the next differs: no mot
 MOVING = 1.0  # px, least median step: pens at rest tell no time
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
-# Mechanics are seldom perfect: of stylus, pen and foot of the camera the images decide
-# less, and what is assumed of their sizes decides whether U holds.
-P_NO_MECHANICS, SMALLEST_MECHANICS = 0.3, 0.03
 ROUNDING = 1e-9  # of the largest eigenvalue
 
 
@@ -66,7 +66,9 @@ class EffectName(StrEnum):
     STROBE = "leds in turn"
 
 
-MECHANICS = EffectName.LOOSE, EffectName.SAG, EffectName.TILT
+# Usual sizes of mechanics, rms, mm or px; that of compliance is an assumption.
+USUAL = {EffectName.LOOSE: 0.005, EffectName.SAG: 0.012, EffectName.TILT: 0.01}
+MECHANICS = EffectName.COMPLIANCE, *USUAL
 TIMING = EffectName.DELAY, EffectName.SHUTTER, EffectName.STROBE
 # Largest standard deviations, mm, px or image intervals; a larger one is another fault.
 LARGEST = {
@@ -94,7 +96,7 @@ class Effect:
     shapes : tuple of (k, k) array
         Covariances that it may have, for a standard deviation of 1.
     stated : float
-        Standard deviation that is stated or assumed, mm or px; 0 if none is.
+        Standard deviation that is stated, assumed or usual, mm or px; 0 if none is.
     is_exact : bool
         Whether the covariance is ``shapes[0]`` times the stated variance.
     """
@@ -111,6 +113,21 @@ class Effect:
         """Number of unknowns."""
         return int(self.columns.shape[-1])
 
+    @property
+    def is_mechanical(self) -> bool:
+        """Whether it is an unknown of every fit, with a prior of its usual size."""
+        return self.name in MECHANICS
+
+    @property
+    def at_zero(self) -> "Effect":
+        """The same effect held at 0."""
+        return replace(self, stated=0.0, is_exact=True)
+
+    @property
+    def prior(self) -> FloatArray:
+        """Covariance of the unknowns by the stated standard deviation, (k, k)."""
+        return np.asarray(self.stated**2 * np.mean(self.shapes, axis=0))
+
 
 class EffectComponent(NamedTuple):
     """Size of an effect by likelihood.
@@ -125,7 +142,7 @@ class EffectComponent(NamedTuple):
         Of the unknowns with that.
     expected : (k, k) array
         Of the unknowns, averaged over what their size may be; of timing their mean
-        square given the images.
+        square given the images; of mechanics their prior.
     """
 
     sigma: float
@@ -136,16 +153,18 @@ class EffectComponent(NamedTuple):
     @property
     def is_supported(self) -> bool:
         """Whether the images support the effect, so that it is fitted."""
-        return self.gain > chi_square_quantile(1, CHANCE)
+        return is_supported(self.gain)
+
+
+def is_supported(gain: float) -> bool:
+    """Return whether chance alone makes such a gain less than once in a hundred."""
+    return gain > chi_square_quantile(1, CHANCE)
 
 
 def held(effect: Effect) -> EffectComponent:
     """Return the component of an effect that is held at 0, or at what is stated."""
-    nothing = np.zeros((effect.number, effect.number))
-    if effect.is_exact:
-        stated = effect.stated**2 * effect.shapes[0]
-        return EffectComponent(effect.stated, np.inf, stated, stated)
-    return EffectComponent(0.0, 0.0, nothing, nothing)
+    gain = np.inf if effect.is_exact else 0.0
+    return EffectComponent(effect.stated, gain, effect.prior, effect.prior)
 
 
 def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent:
@@ -160,20 +179,16 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
     """
     if effect.is_exact:
         return held(effect)
-    p_none, smallest = P_NONE, SMALLEST
-    if effect.name in MECHANICS:
-        p_none, smallest = P_NO_MECHANICS, SMALLEST_MECHANICS
-    largest = LARGEST[effect.name]
-    sigmas = np.geomspace(smallest * largest, largest, N_SCALES)
+    sigmas = LARGEST[effect.name] * np.geomspace(SMALLEST, 1.0, N_SCALES)
     spectra = [_Spectrum.of(S, right, shape) for shape in effect.shapes]
     all_costs = np.array([each.costs(sigmas) for each in spectra])
     s, i = np.unravel_index(int(np.argmin(all_costs)), all_costs.shape)
     gain = -float(all_costs[s, i])
-    if effect.stated > 0:
-        expected = spectra[0].second_moment(np.array([effect.stated]), np.ones(1))
+    if effect.is_mechanical:
+        expected = effect.prior
     else:
-        weights = np.exp(-0.5 * (all_costs + gain)) * (1 - p_none) / all_costs.size
-        weights /= weights.sum() + p_none * np.exp(-0.5 * gain)
+        weights = np.exp(-0.5 * (all_costs + gain)) * (1 - P_NONE) / all_costs.size
+        weights /= weights.sum() + P_NONE * np.exp(-0.5 * gain)
         if effect.name in TIMING:  # well seen, so the values are known as well
             moments = zip(spectra, weights, strict=True)
             expected = np.sum([x.second_moment(sigmas, w) for x, w in moments], axis=0)
@@ -182,6 +197,32 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
             expected = np.einsum("s,sij->ij", variances, np.array(effect.shapes))
     sigma = float(sigmas[i])
     return EffectComponent(sigma, gain, sigma**2 * effect.shapes[s], expected)
+
+
+def prior_of(effects: Sequence[Effect]) -> FloatArray:
+    """Return the covariance of the unknowns of several effects by their priors."""
+    number = sum(effect.number for effect in effects)
+    prior, first = np.zeros((number, number)), 0
+    for effect in effects:
+        at = slice(first, first + effect.number)
+        prior[at, at], first = effect.prior, at.stop
+    return prior
+
+
+def gain_of(S: FloatArray, right: FloatArray, prior: FloatArray) -> float:
+    """Return twice the log likelihood ratio of k unknowns with a prior to none.
+
+    Parameters
+    ----------
+    S : (k, k) array
+        Information about them, all others marginalised.
+    right : (k,) array
+        Right side that belongs to it.
+    prior : (k, k) array
+        Their covariance.
+    """
+    spectrum = _Spectrum.of(S, right, prior)
+    return -float(spectrum.costs(np.ones(1))[0])
 
 
 class _Spectrum(NamedTuple):
@@ -230,8 +271,8 @@ class ConeMoves(NamedTuple):
     ----------
     lean : (N, 2) array
         The pen's axis across the axis of the cone, right and away.
-    compliance : (N, 3, 1) array
-        By 1 mm of compliance.
+    compliance : (N, 3, 2) array
+        By 1 mm of compliance of the stylus, and of seat or stand.
     loose : (N, 3, 3) array
         By the three unknowns of a loose stylus.
     """
@@ -241,41 +282,44 @@ class ConeMoves(NamedTuple):
     loose: FloatArray
 
 
-def cone_moves(rotations: FloatArray) -> ConeMoves:
-    """Return the moves of the tip in images of rotations rig_from_pen (N, 3, 3)."""
-    axes = axes_of_cone(rotations)
-    lean = rotations[:, :, 1] @ axes[:2].T
-    across = lean @ axes[:2]
-    side = across / np.maximum(np.hypot(*lean.T), LEAST_LEAN)[:, None]
+def cone_moves(rotations: FloatArray, axes: FloatArray) -> ConeMoves:
+    """Return the moves of the tip in images of rotations rig_from_pen (N, 3, 3).
+
+    ``axes`` (3, 3) are those of the cone, see `axes_of_cone`.
+    """
+    along = rotations[:, :, 1]
+    lean = along @ axes[:2].T
+    sine = np.maximum(np.hypot(*lean.T), LEAST_LEAN)[:, None]
+    # The axis of the cone less its part along the pen.
+    of_stylus = axes[2] - (along @ axes[2])[:, None] * along
     smooth = np.tanh(lean / LEAST_LEAN)
     loose = [
-        side,
+        of_stylus / sine,
         smooth[:, :1] * rotations[:, :, 0],
         smooth[:, 1:] * rotations[:, :, 2],
     ]
-    return ConeMoves(lean, across[..., None], np.stack(loose, axis=2))
+    return ConeMoves(
+        lean, np.stack([of_stylus, lean @ axes[:2]], axis=2), np.stack(loose, axis=2)
+    )
 
 
-def effects_of(
+def mechanics_of(
     views: tuple[CameraView, ...],
-    pixels: FloatArray,
-    used: BoolArray,
     rotations: FloatArray,
+    axes: FloatArray,
     leds: FloatArray,
-    cameras: tuple[Camera, ...],
     compliance: float,
 ) -> tuple[Effect, ...]:
-    """Return all effects that a swing may show.
+    """Return the effects of pen, stylus, stand and foot of the camera.
 
     Parameters
     ----------
     views : tuple of CameraView
         About a solution.
-    pixels : (N, C, L, 2) array
-        LED centres, px.
-    used : (N, C, L) array of bool
     rotations : (N, 3, 3) array
         Of rig_from_pen.
+    axes : (3, 3) array
+        Of the cone, see `axes_of_cone`.
     leds : (L, 3) array
         Of the pen, mm.
     compliance : float
@@ -283,42 +327,54 @@ def effects_of(
     """
     by_cone = np.stack([view.cone for view in views], axis=1)
     by_led = np.stack([view.led for view in views], axis=1)
-    moves = cone_moves(rotations)
-    lean, across = moves.lean, moves.compliance[..., 0]
+    moves = cone_moves(rotations, axes)
     found = [
         Effect(
             EffectName.COMPLIANCE,
             0,
             np.einsum("nclik,nkm->nclim", by_cone, moves.compliance),
-            (np.eye(1),),
-            stated=compliance,
+            (0.5 * np.eye(2),),
+            compliance,
         ),
         Effect(
             EffectName.LOOSE,
             0,
             np.einsum("nclik,nkm->nclim", by_cone, moves.loose),
             tuple(np.diag(one) for one in np.eye(3)),
+            USUAL[EffectName.LOOSE],
         ),
     ]
     heights = leds[:, 1] - leds[:, 1].min()
     if heights.max() > 0:
         weight = (heights / heights.max()) ** 2
-        down = np.einsum("nji,nj->ni", rotations, across)  # in the pen's frame
+        # In the pen's frame.
+        down = np.einsum("nji,nj->ni", rotations, -moves.compliance[..., 0])
         down[:, 1] = 0.0
+        columns = np.einsum("nclik,nk,l->ncli", by_led, down, weight)[..., None]
         found.append(
-            Effect(
-                EffectName.SAG,
-                0,
-                np.einsum("nclik,nk,l->ncli", by_led, down, weight)[..., None],
-                (np.eye(1),),
-            )
+            Effect(EffectName.SAG, 0, columns, (np.eye(1),), USUAL[EffectName.SAG])
         )
-    for c, camera in enumerate(cameras):
-        tilt = np.zeros((*pixels.shape, 4))
-        tilt[:, c, :, 0, :2] = tilt[:, c, :, 1, 2:] = lean[:, None]
-        found.append(Effect(EffectName.TILT, c, tilt, (np.eye(4),)))
-        found.append(_lens(camera, c, pixels, used))
-    return (*found, *_timing(pixels, used, cameras))
+    for c in range(len(views)):
+        tilt = np.zeros((*by_cone.shape[:4], 4))
+        tilt[:, c, :, 0, :2] = tilt[:, c, :, 1, 2:] = moves.lean[:, None]
+        usual = USUAL[EffectName.TILT]
+        found.append(Effect(EffectName.TILT, c, tilt, (np.eye(4),), usual))
+    return tuple(found)
+
+
+def lens_and_timing(
+    pixels: FloatArray, used: BoolArray, cameras: tuple[Camera, ...]
+) -> tuple[Effect, ...]:
+    """Return the effects of lenses, and of the times at which LEDs are imaged.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        LED centres, px.
+    used : (N, C, L) array of bool
+    """
+    lenses = [_lens(camera, c, pixels, used) for c, camera in enumerate(cameras)]
+    return (*lenses, *_timing(pixels, used, cameras))
 
 
 def _timing(

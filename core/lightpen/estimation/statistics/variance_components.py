@@ -5,8 +5,8 @@ deviation, the maximum of the restricted likelihood [1]_, equation (5) of method
 errors themselves and all other unknowns are integrated out.
 
 An effect that is not significant may be there all the same. Its expected variance is
-the posterior mean over a prior that is 0 as a rule, else even in the logarithm:
-equation (6).
+the posterior mean over a prior that is 0 as a rule, else even in the logarithm up to
+some 20 um and falling beyond: equation (6).
 
 References
 ----------
@@ -27,6 +27,7 @@ FITTED = 0.01  # fitted
 ALLOWED = 0.1  # allowed to a camera beyond its file
 P_NONE = 0.7  # prior probability that there are no errors of a kind
 SCALES = np.geomspace(1e-5, 1.0, 200)  # mm, standard deviations tried
+SELDOM = 0.02  # mm; few images cannot exclude larger ones, which are the less likely
 OBSERVABLE = 1e-9  # of the largest eigenvalue; less is rounding
 MAX_PASSES = 12
 NO_JITTER = 1e-5  # mm, along an axis; a covariance is to be inverted
@@ -117,7 +118,8 @@ def find_beside(
 def _expected_sigma(sigmas: FloatArray, costs: FloatArray) -> float:
     """Return the root of the expected variance, equation (6), mm; the first is 0."""
     weights = np.exp(-0.5 * (costs - costs.min()))
-    weights[1:] *= (1 - P_NONE) / (P_NONE * (len(sigmas) - 1))
+    likely = (1 + (sigmas[1:] / SELDOM) ** 2) ** -2
+    weights[1:] *= (1 - P_NONE) / (P_NONE * (len(sigmas) - 1)) * likely
     return float(np.sqrt(weights @ sigmas**2 / weights.sum()))
 
 

@@ -48,7 +48,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.effect_search import SearchedEffect
-from lightpen.estimation.bundle.effects import EffectName
+from lightpen.estimation.bundle.effects import MECHANICS, EffectName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, axes_of_cone
@@ -106,6 +106,7 @@ SHARES_OF_EFFECTS = {
     EffectName.SHUTTER: ContributionName.TIMING,
     EffectName.STROBE: ContributionName.TIMING,
 }
+ASSUMED_EFFECTS = {SHARES_OF_EFFECTS[name] for name in MECHANICS}
 IMAGES_SHRINK = (
     ContributionName.NOISE,
     ContributionName.CENTERS,
@@ -224,7 +225,7 @@ class SplitHalfCheck:
 
 def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
     """Make the budget of an adjustment; ``joint`` is the joint fit at its estimate."""
-    bundle, correlation = adjustment.unshrunk, adjustment.correlation
+    bundle, correlation = adjustment.whole, adjustment.correlation
     blocks, ratio, blocks_count = _block_scatter(joint, adjustment.bundle)
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     n_images = int(bundle.used.any(axis=(1, 2)).sum())
@@ -234,8 +235,9 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
             adjustment.priors,
             n_images,
             noise=raised * correlation.noise,
-            shrinkage_shift=adjustment.shrinkage_shift,
+            shift=adjustment.shift_from(bundle),
             effects=adjustment.effects,
+            estimate=adjustment.bundle,
         ),
         independent_noise=bundle.independent_noise,
         blocks=blocks,
@@ -250,38 +252,42 @@ def contributions_of(
     priors: Priors,
     n_images: float,
     noise: FloatArray,
-    shrinkage_shift: FloatArray,
+    shift: FloatArray,
     effects: Sequence[SearchedEffect] = (),
+    estimate: Bundle | None = None,
 ) -> tuple[UncertaintyContribution, ...]:
     """Return the contributions to the covariance of (tip, cone), equations (15)-(19).
 
     Parameters
     ----------
     bundle : Bundle
-        Adjustment with unshrunk priors.
+        Adjustment with unshrunk priors and all mechanics.
     n_images : float
         Images that take part.
     noise : (6, 6) array
         Covariance by image noise, mm^2.
-    shrinkage_shift : (6,) array
-        See `lightpen.estimation.bundle.adjustment.Adjustment`, mm.
+    shift : (6,) array
+        Of the estimate from that adjustment, mm.
     effects : sequence of SearchedEffect
         Beside the fit.
+    estimate : Bundle, optional
+        Adjustment with shrunk priors, moved by errors of the centres that repeat; the
+        other unless given.
     """
-    at = bundle.layout
+    at, estimate = bundle.layout, estimate or bundle
     jitter = bundle.propagated(bundle.jitter_information + bundle.insignificant_jitter)
     moved, by_form = _of_seat(bundle, priors.form_error)
     drift = bundle.component_contribution(at.drift)
     drift *= drift_variance(bundle) / _prior_variance(bundle, at.drift)
     # Equation (18): errors of the centres, independent from posture to posture.
-    biased = max(n_images / POSTURES, 1.0) * bundle.independent_noise
-    biased *= (priors.center_bias / bundle.sigma) ** 2
+    biased = max(n_images / POSTURES, 1.0) * estimate.independent_noise
+    biased *= (priors.center_bias / estimate.sigma) ** 2
     if priors.reading is not None:
-        along_normals = priors.reading.shift * _by_shift_along_normals(bundle)
+        along_normals = priors.reading.shift * _by_shift_along_normals(estimate)
         biased += np.outer(along_normals, along_normals)
-    of_turn = covariance_of_turn(bundle.unknowns.start.pen)
-    if of_turn is not None and bundle.state.rig.n_cameras == 1:
-        biased += effect_of_normals(bundle).covariance(of_turn)[:6, :6]
+    of_turn = covariance_of_turn(estimate.unknowns.start.pen)
+    if of_turn is not None and estimate.state.rig.n_cameras == 1:
+        biased += effect_of_normals(estimate).covariance(of_turn)[:6, :6]
     size = bundle.part(at.scale)
     warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
     shares = [
@@ -318,9 +324,7 @@ def contributions_of(
         )
     shares += _of_effects(bundle, effects)
     shares.append(
-        UncertaintyContribution(
-            ContributionName.SHRINKAGE, np.outer(shrinkage_shift, shrinkage_shift)
-        )
+        UncertaintyContribution(ContributionName.SHRINKAGE, np.outer(shift, shift))
     )
     return tuple(
         share for share in shares if share.standard_uncertainty.max() > NEGLIGIBLE
@@ -347,7 +351,7 @@ def _of_effects(
     for share in dict.fromkeys(SHARES_OF_EFFECTS.values()):
         own = (part for name, part in parts if SHARES_OF_EFFECTS[name] is share)
         covariance = sum(own, np.zeros((6, 6)))
-        assumed = share is ContributionName.COMPLIANCE
+        assumed = share in ASSUMED_EFFECTS
         shares.append(UncertaintyContribution(share, covariance, assumed))
     return shares
 

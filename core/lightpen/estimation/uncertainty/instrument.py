@@ -92,13 +92,17 @@ class Instrument:
 
 
 def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
-    """Return the instrument as adjusted by a swing."""
+    """Return the instrument as adjusted by a swing.
+
+    Its covariance is without mechanics that are held at 0: in a measurement they act
+    as they did in the swing.
+    """
     bundle, unshrunk = adjustment.bundle, adjustment.unshrunk
     state = bundle.state
-    spread = _with_budget_noise(unshrunk, budget)
-    shrinkage_shift = unshrunk.values - bundle.values
-    shrinkage_shift[:6] = adjustment.shrinkage_shift
-    spread = spread + np.outer(shrinkage_shift, shrinkage_shift)
+    spread = _with_budget_noise(adjustment, budget)
+    shift = unshrunk.values - bundle.values
+    shift[:6] = adjustment.shift_from(unshrunk)
+    spread = spread + np.outer(shift, shift)
     of_turn = covariance_of_turn(state.pen)
     if of_turn is not None and state.rig.n_cameras == 1:
         spread = spread + effect_of_normals(unshrunk).covariance(of_turn)
@@ -170,18 +174,24 @@ def _put_cameras(covariance: FloatArray, at: Parameters, priors: Priors) -> None
         covariance[at.extrinsics, at.extrinsics] = priors.extrinsics.covariance
 
 
-def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
+def _with_budget_noise(adjustment: Adjustment, budget: Budget) -> FloatArray:
     """Return the covariance (p, p) of all unknowns with the noise of the budget."""
+    bundle = adjustment.unshrunk
     noise = next(
         (each for each in budget.shares if each.name is ContributionName.NOISE), None
     )
-    covariance = bundle.covariance
     if noise is None:
-        return covariance
-    images = covariance @ (bundle.information - bundle.jitter_information)
-    images = images @ covariance
-    by_tip = float(np.trace(noise.covariance[:3, :3]) / np.trace(images[:3, :3]))
-    return np.asarray(covariance + (by_tip - 1) * images)
+        return bundle.covariance
+    independent = _by_images(adjustment.whole)[:3, :3]
+    factor = float(np.trace(noise.covariance[:3, :3]) / np.trace(independent))
+    return np.asarray(bundle.covariance + (factor - 1) * _by_images(bundle))
+
+
+def _by_images(bundle: Bundle) -> FloatArray:
+    """Return the covariance (p, p) by independent noise with which LEDs are weighed."""
+    covariance = bundle.covariance
+    information = bundle.information - bundle.jitter_information
+    return np.asarray(covariance @ information @ covariance)
 
 
 def instrument_mixing(bundle: Bundle) -> FloatArray:

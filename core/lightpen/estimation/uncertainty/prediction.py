@@ -3,9 +3,8 @@
 During a swing tip and cone are fitted with the parameters of the files held. U is that
 of the whole budget all the same (`budget.contributions_of`), by one step of the bundle
 adjustment about the joint fit: its normal equations are kept, and a new image adds its
-own. What lens, sag, loose stylus and camera tilt may add is searched for when all
-images are linearised again, as it needs the LEDs one by one. Correlated noise is left
-to the calibration.
+own. What lens and timing may add is searched for when all images are linearised
+again, as it needs the LEDs one by one. Correlated noise is left to the calibration.
 """
 
 from collections.abc import Sequence
@@ -17,16 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.adjustment import shrunk_priors
+from lightpen.estimation.bundle.adjustment import likely_effects, shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS
-from lightpen.estimation.bundle.effect_search import (
-    SearchedEffect,
-    search_compliance,
-    search_effects,
-)
-from lightpen.estimation.bundle.effects import EffectName
+from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
+from lightpen.estimation.bundle.effects import Effect, held, mechanics_of
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -35,7 +30,7 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import Priors, priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
+from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import (
@@ -90,13 +85,16 @@ class UncertaintyPrediction:
         For a noise of 1 px.
     n_whole : int
         Images that were linearised together.
+    mechanics : tuple of Effect
+        With their columns in these images.
     effects : tuple of SearchedEffect
-        What these images leave open of the effects of a station, but for compliance.
+        What these images leave open of lens and timing.
     """
 
     state: BundleState
     equations: NormalEquations
     n_whole: int
+    mechanics: tuple[Effect, ...]
     effects: tuple[SearchedEffect, ...] = ()
 
     def predicted(
@@ -112,16 +110,10 @@ class UncertaintyPrediction:
             Noise of one image coordinate, px.
         """
         priors, equations, bundle = self._adjusted(joint, sigma, assumed)
-        shrinkage_shift = _shrinkage_shift_of(bundle, priors, equations)
+        shift = _shift_from(bundle, priors, equations)
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
-        jitter = bundle.components.jitter.covariance
-        beside = equations if jitter is None else _with_jitter(equations, jitter)
-        compliance = search_compliance(bundle, beside, priors.compliance)
-        effects = (compliance, *self.effects)
-        now = contributions_of(
-            bundle, priors, n_images, noise, shrinkage_shift, effects
-        )
+        now = contributions_of(bundle, priors, n_images, noise, shift, self.effects)
         endless = _with_endless_images(bundle)
         nothing = np.zeros((6, 6))
         at_last = contributions_of(endless, priors, n_images, nothing, nothing[0])
@@ -138,23 +130,18 @@ class UncertaintyPrediction:
         self, pixels: FloatArray, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> "UncertaintyPrediction":
         """Search images, pixels (N, C, L, 2), for the effects of a station."""
-        priors, _, bundle = self._adjusted(joint, sigma, assumed)
-        found = search_effects(
-            bundle, pixels, priors.compliance, residuals_at=np.zeros_like(bundle.values)
-        )
-        effects = tuple(
-            replace(each, is_candidate=False)
-            for each in found
-            if each.effect.name is not EffectName.COMPLIANCE
-        )
-        return replace(self, effects=effects)
+        _, _, bundle = self._adjusted(joint, sigma, assumed)
+        found = search_effects(bundle, pixels, np.zeros_like(bundle.values))
+        held = tuple(replace(each, is_candidate=False) for each in found)
+        return replace(self, effects=held)
 
     def _adjusted(
         self, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> tuple[Priors, NormalEquations, Bundle]:
         state = self.state
         priors = priors_of(state.rig, state.pen, assumed)
-        unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations))
+        modes = seat_modes_of(state.rotations)
+        unknowns = Unknowns.of(state, priors, modes, self.mechanics)
         equations = _weighed(self.equations, sigma)
         return priors, equations, _linear_bundle(unknowns, equations, joint, sigma)
 
@@ -184,27 +171,40 @@ def predict_uncertainty(
     n_images = len(pixels)
     state = BundleState(rig, pen, joint.tip_pen, joint.cone_cam, joint.rotations)
     if before is None or n_images > GROWTH * before.n_whole:
-        whole = UncertaintyPrediction(
-            state, _equations_of(state, pixels, joint, 0), n_images
-        )
+        mechanics, equations = _linearised(state, pixels, joint, assumed, n_images, 0)
+        whole = UncertaintyPrediction(state, equations, n_images, mechanics)
         return whole._with_effects(pixels, joint, sigma, assumed)
-    n_before = len(before.state.rotations)
-    fresh = _equations_of(state, pixels, joint, n_before)
+    n_before, n_whole = len(before.state.rotations), before.n_whole
+    _, fresh = _linearised(state, pixels, joint, assumed, n_whole, n_before)
     return UncertaintyPrediction(
         replace(before.state, rotations=joint.rotations),
         _joined(before.equations, _moved(fresh, state, before.state)),
-        before.n_whole,
-        before.effects,
+        *(n_whole, before.mechanics, before.effects),
     )
 
 
-def _equations_of(
-    state: BundleState, pixels: FloatArray, joint: JointFit, first: int
-) -> NormalEquations:
+def _linearised(
+    state: BundleState,
+    pixels: FloatArray,
+    joint: JointFit,
+    assumed: Assumptions,
+    n_whole: int,
+    first: int,
+) -> tuple[tuple[Effect, ...], NormalEquations]:
+    """Return mechanics and equations of the images from the first on.
+
+    The cone stands as the pen did in the images that were linearised together.
+    """
+    axes = axes_of_cone(state.rotations[:n_whole])
     state = replace(state, rotations=state.rotations[first:])
-    n_cameras = state.rig.n_cameras
     views = views_at(state, pixels[first:])
-    return eliminate(views, _by_camera(joint.used[first:], n_cameras), 1.0)
+    mechanics = mechanics_of(
+        views, state.rotations, axes, state.pen.leds, assumed.compliance
+    )
+    columns = np.concatenate([each.columns for each in mechanics], axis=-1)
+    views = tuple(replace(v, effects=columns[:, c]) for c, v in enumerate(views))
+    used = _by_camera(joint.used[first:], state.rig.n_cameras)
+    return mechanics, eliminate(views, used, 1.0)
 
 
 def _by_camera(values: npt.NDArray[T], n_cameras: int) -> npt.NDArray[T]:
@@ -254,7 +254,7 @@ def _linear_bundle(
     seen = np.trace(equations.cone_rows[..., :N_CONE], axis1=1, axis2=2) > 0
     spread = unknowns.sensitivity(equations.cone_rows)
     alone = information, right = unknowns.system(equations)
-    components = NO_COMPONENTS
+    components = NO_COMPONENTS.with_no_effects(unknowns.effects)
     for _ in range(SEAT_ROUNDS):
         # The jitter first: without it, what other errors there are take it up.
         covariance = inverse(information + unknowns.prior_information(components))
@@ -316,16 +316,20 @@ def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
     )
 
 
-def _shrinkage_shift_of(
+def _shift_from(
     bundle: Bundle, priors: Priors, equations: NormalEquations
 ) -> FloatArray:
-    """Return the change of (tip, cone) by shrinkage of assumed priors, (6,), mm."""
-    held = shrunk_priors(bundle, priors)
-    if held is priors:
+    """Return (tip, cone) of the estimate less those of this fit, (6,), mm."""
+    shrunk, likely = shrunk_priors(bundle, priors), likely_effects(bundle)
+    if shrunk is priors and likely == bundle.unknowns.effects:
         return np.zeros(6)
-    unknowns = replace(bundle.unknowns, priors=held)
+    unknowns = replace(bundle.unknowns, priors=shrunk, effects=likely)
     information, right = unknowns.system(equations)
-    prior = unknowns.prior_information(bundle.components)
+    of_effects = zip(likely, bundle.components.effects, strict=True)
+    components = bundle.components._replace(
+        effects=tuple(held(one) if one.is_exact else own for one, own in of_effects)
+    )
+    prior = unknowns.prior_information(components)
     return np.asarray((inverse(information + prior) @ right - bundle.values)[:6])
 
 
@@ -333,11 +337,12 @@ def _with_endless_images(bundle: Bundle) -> Bundle:
     """Return the adjustment with endless images of the same kind."""
     information = ENDLESS * bundle.information
     nothing = np.zeros_like(information)
-    prior = bundle.unknowns.prior_information(NO_COMPONENTS)
+    components = NO_COMPONENTS.with_no_effects(bundle.unknowns.effects)
+    prior = bundle.unknowns.prior_information(components)
     return replace(
         bundle,
-        components=NO_COMPONENTS,
-        budget_components=NO_COMPONENTS,
+        components=components,
+        budget_components=components,
         information=information,
         prior_information=prior,
         jitter_information=nothing,

@@ -145,12 +145,12 @@ def second_cone(
     adjusted: Adjustment, budget: Budget, images: SecondImages
 ) -> SecondCone:
     """Return the effect of a second swing, whose images are the last adjusted."""
-    bundle, unshrunk = adjusted.bundle, adjusted.unshrunk
-    at = unshrunk.layout.between
-    measured = unshrunk.measured_information.copy()
+    bundle, whole = adjusted.bundle, adjusted.whole
+    at = whole.layout.between
+    measured = whole.measured_information.copy()
     measured[at, at] = 0.0
-    without = inverse(unshrunk.information + unshrunk.prior_information + measured)
-    grown = budget.covariance + (without - unshrunk.covariance)[:6, :6]
+    without = inverse(whole.information + whole.prior_information + measured)
+    grown = budget.covariance + (without - whole.covariance)[:6, :6]
     state, n = bundle.state, len(images.pixels)
     used, residuals = bundle.used[-n:, 0], bundle.residuals[-n:, 0]
     reasons = np.array(images.reasons, dtype=object)

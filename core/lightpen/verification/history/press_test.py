@@ -18,6 +18,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import UsageError
 from lightpen.estimation.bundle.effects import cone_moves
+from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
@@ -115,8 +116,9 @@ def _difference(
     fits = [fit_held(each, instrument.rig, instrument.pen) for each in (usual, firm)]
     before, after = (np.r_[fit.tip_pen, fit.cone_cam] for fit in fits)
     # What a move of the cone does to tip and cone, where the fit knows of none.
-    moves = cone_moves(fits[1].rotations).compliance
-    pulls = np.einsum("nij,njk->i", fits[1].information[..., CONE], moves)
+    rotations = fits[1].rotations
+    moves = cone_moves(rotations, axes_of_cone(rotations)).compliance[..., 1]
+    pulls = np.einsum("nij,nj->i", fits[1].information[..., CONE], moves)
     noise = _scatter(fits[0]) + _scatter(fits[1])
     return after - before, noise, fits[1].covariance @ pulls
 

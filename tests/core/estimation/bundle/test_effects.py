@@ -9,7 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.effect_findings import FoundEffect
-from lightpen.estimation.bundle.effects import Effect, EffectName, size_of
+from lightpen.estimation.bundle.effects import Effect, EffectName, gain_of, size_of
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.observation_files import Centers
@@ -58,6 +58,13 @@ def calibrated(
 
 def only(calibration: Calibration, name: EffectName) -> FoundEffect:
     return next(each for each in calibration.effects if each.name is name)
+
+
+def across_pens(R: FloatArray) -> FloatArray:
+    """Return the mean pen axis across each pen, (N, 3)."""
+    along, _ = lean_of(R)
+    axes = R[:, :, 1]
+    return along - (axes @ along)[:, None] * axes
 
 
 def lens(pixels: FloatArray, amplitude: float) -> FloatArray:
@@ -124,6 +131,22 @@ def test_compliance_is_an_unknown_along_the_pen() -> None:
     assert abs(error[1]) < found.budget.expanded_uncertainty[1]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_usual_mechanics_together_are_allowed_for(seed: int) -> None:
+    true, _ = swing(seed)
+    across = across_pens(true.rotations)
+    play = across / np.linalg.norm(across, axis=1, keepdims=True)
+    shift = 0.02 * true.rotations[:, :, 1][:, ::2]
+    moves = 0.006 * across + 0.006 * play
+    found, error = calibrated(moves=moves, shifts=shift[:, None], seed=seed)
+    good, _ = calibrated(seed=seed)
+    assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
+    # Mechanics that are perfect are not followed, and allowed for all the same.
+    tip = good.bundle.values[good.bundle.layout.effects[0]]
+    np.testing.assert_allclose(tip, 0.0, atol=1e-6)
+    assert ContributionName.SAG in {share.name for share in good.budget.shares}
+
+
 def test_a_stylus_that_jumps_with_the_side_of_the_lean_is_found() -> None:
     true, _ = swing()
     _, across = lean_of(true.rotations)
@@ -164,6 +187,18 @@ def test_the_size_of_an_effect_is_found_by_likelihood() -> None:
     found = size_of(effect, S, S @ moved)
     assert found.sigma == pytest.approx(float(np.sqrt(np.mean(moved**2))), rel=0.15)
     assert found.gain > 50
+
+
+def test_mechanics_gain_as_much_as_they_make_the_images_likelier() -> None:
+    rng = np.random.default_rng(7)
+    S, prior = np.diag([1e8, 1e6, 1e4]), np.diag([1e-8, 1e-6, 1e-6])
+    right = S @ rng.normal(0, 2e-3, 3)
+    # As if each unknown were seen by itself: its value has the variance of both.
+    seen, noise = right / np.diag(S), 1 / np.diag(S)
+    both = noise + np.diag(prior)
+    expected = np.sum(seen**2 / noise - seen**2 / both - np.log(both / noise))
+    assert gain_of(S, right, prior) == pytest.approx(float(expected))
+    assert gain_of(S, np.zeros(3), prior) < 0
 
 
 def test_the_likelier_of_two_shapes_is_taken() -> None:

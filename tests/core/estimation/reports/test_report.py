@@ -39,6 +39,7 @@ PEN = paper_pen()
 FILE = InputFile(Path("folder/file.csv"), 64 * "0")
 INPUTS = Inputs(FILE, FILE, (FILE,), PEN.nominal_tip)
 OF_THE_STATION = ["led centres", "ball and cone", "temperature"]  # no file states them
+MECHANICS = ["compliance", "loose stylus", "sag", "camera tilt"]  # of usual size
 LIMITS = SwingLimits(max_uncertainty=0.0987, min_images=41)
 
 
@@ -175,7 +176,7 @@ def test_the_record_holds_each_share_of_the_uncertainty() -> None:
         2 * np.sqrt(squares), record()["expanded_uncertainty_mm"]
     )
     assumed = [share["name"] for share in found["shares"] if share["assumed"]]
-    assert assumed == [*OF_THE_STATION, "compliance"]
+    assert assumed == [*OF_THE_STATION, *MECHANICS]
     assert np.shape(found["independent_noise_mm"]) == (3,)
     for share in found["shares"]:
         by_name = found[f"{share['name'].replace(' ', '_')}_mm"]
@@ -204,7 +205,7 @@ def test_what_is_assumed_is_marked_in_record_and_text() -> None:
 
     shares = json.loads(written)["uncertainty"]["shares"]
     assumed = [share["name"] for share in shares if share["assumed"]]
-    assert assumed == [*OF_THE_STATION, "camera", "compliance"]
+    assert assumed == [*OF_THE_STATION, "camera", *MECHANICS]
     assert "U from camera, assumed" in text
     assert text.count(", assumed") == len(assumed)
 

@@ -9,6 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.adjustment import Adjustment, adjust
+from lightpen.estimation.bundle.effects import MECHANICS
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -88,12 +89,13 @@ def of_images(joint: JointFit, some: slice) -> JointFit:
     )
 
 
+MECHANICAL = {SHARES_OF_EFFECTS[name] for name in MECHANICS}
 DOUBTED = (
     *(ContributionName.CENTERS, ContributionName.SEAT, ContributionName.DRIFT),
-    *SHARES_OF_EFFECTS.values(),
+    *(ContributionName.SHRINKAGE, *SHARES_OF_EFFECTS.values()),
 )
 OF_STATION = {
-    ContributionName.COMPLIANCE,
+    *MECHANICAL,
     ContributionName.CENTERS,
     ContributionName.FORM,
     ContributionName.TEMPERATURE,
@@ -198,7 +200,7 @@ def test_halves_agree_with_two_fits_of_half_the_images() -> None:
 def test_the_shares_add_up_to_the_covariance() -> None:
     for correlation in (0.0, 0.9):
         result = calibrated(0.05 * noise(8, correlation, 40))
-        budget, bundle = result.budget, result.bundle
+        budget, bundle = result.budget, adjusted(result).whole
         np.testing.assert_allclose(
             budget.covariance, sum(share.covariance for share in budget.shares)
         )
@@ -210,8 +212,9 @@ def test_the_shares_add_up_to_the_covariance() -> None:
             # But for what may be so besides, and is no part of it, and the seat, which
             # counts otherwise than it was fitted.
             of_seat = bundle.part(*bundle.layout.seat)
+            besides = {*DOUBTED, ContributionName.FORM} - MECHANICAL
             np.testing.assert_allclose(
-                np.diag(without(budget, *DOUBTED, ContributionName.FORM)),
+                np.diag(without(budget, *besides)),
                 np.diag(bundle.covariance[:6, :6] - of_seat),
                 rtol=1e-3,
             )
@@ -222,7 +225,7 @@ def test_what_holding_back_from_a_likely_error_changes_is_a_share() -> None:
     changed = np.array([0.01, -0.02, 0.03, 0.0, 0.0, 0.0])
 
     *_, last = contributions_of(
-        adjustment.unshrunk, adjustment.priors, 40, np.eye(6), shrinkage_shift=changed
+        adjustment.whole, adjustment.priors, 40, np.eye(6), shift=changed
     )
 
     assert last.name is ContributionName.SHRINKAGE
@@ -230,9 +233,9 @@ def test_what_holding_back_from_a_likely_error_changes_is_a_share() -> None:
 
 
 def fitted_variances(budget: Budget) -> FloatArray:
-    """Return the variances of tip and cone without effects of the station."""
-    of_effects = set(SHARES_OF_EFFECTS.values())
-    fitted = [s.covariance for s in budget.shares if s.name not in of_effects]
+    """Return the variances of tip and cone by what is fitted at every station."""
+    others = {ContributionName.SHRINKAGE, *SHARES_OF_EFFECTS.values()} - MECHANICAL
+    fitted = [s.covariance for s in budget.shares if s.name not in others]
     return np.asarray(np.diag(np.sum(fitted, axis=0)))
 
 
@@ -332,13 +335,13 @@ def test_errors_of_the_centres_shrink_with_up_to_thirty_images() -> None:
 
     def share(n_images: int) -> FloatArray:
         shares = contributions_of(
-            adjustment.unshrunk, adjustment.priors, n_images, np.eye(6), zero
+            adjustment.whole, adjustment.priors, n_images, np.eye(6), zero
         )
         (found,) = (s for s in shares if s.name is ContributionName.CENTERS)
         return found.covariance
 
-    usual, sigma = USUAL.center_bias, adjustment.unshrunk.sigma
-    once = (usual / sigma) ** 2 * adjustment.unshrunk.independent_noise
+    usual, sigma = USUAL.center_bias, adjustment.whole.sigma
+    once = (usual / sigma) ** 2 * adjustment.whole.independent_noise
     # Of fewer images each has a posture of its own; of more, postures repeat.
     for n_images, times in ((5, 1.0), (30, 1.0), (60, 2.0), (300, 10.0)):
         np.testing.assert_allclose(share(n_images), times * once)

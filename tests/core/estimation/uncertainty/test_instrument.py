@@ -52,7 +52,11 @@ def test_noise_that_counts_more_than_once_does_so_in_the_instrument(
 
     added = tip_variance(adjustment, more) - tip_variance(adjustment, budget)
 
-    assert added == pytest.approx(3 * np.trace(noise.covariance[:3, :3]))
+    # Beside mechanics, which are none of the instrument, noise makes the tip less sure.
+    noises = adjustment.unshrunk.independent_noise, adjustment.whole.independent_noise
+    own, beside_mechanics = (np.trace(each[:3, :3]) for each in noises)
+    expected = 3 * np.trace(noise.covariance[:3, :3]) * own / beside_mechanics
+    assert added == pytest.approx(expected)
 
 
 def test_what_holding_back_changed_is_part_of_the_instrument(

@@ -1,5 +1,6 @@
 """Progress: what is missing, and where to lean next."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -45,12 +46,12 @@ RIGID = replace(USUAL, compliance=1e-6)
 
 
 def state_of(
-    setup: SwingSetup, swing: Swing, assumed: Assumptions = USUAL
+    setup: SwingSetup, swing: Swing, assumed: Assumptions = USUAL, noise: int = 1
 ) -> SwingState:
     """Return a swing that has kept these postures."""
     pixels = simulate_centers(
         *(CAMERA, PEN, swing.rotations, swing.translations, 0.05),
-        np.random.default_rng(1),
+        np.random.default_rng(noise),
     )
     kept = kept_before(
         *(setup.rig, setup.pen, np.arange(len(swing)), pixels[:, None]),
@@ -71,29 +72,31 @@ def to_the_right(n: int) -> Swing:
 
 
 def test_the_estimate_of_images_to_come_holds() -> None:
-    limit = 0.012
-    setup = SwingSetup(CAMERA, EXACT_PEN, SwingLimits(max_uncertainty=limit))
-    early, late = (
-        state_of(setup, swing_poses(n, np.random.default_rng(0)), RIGID)
-        for n in (60, 120)
-    )
-    n_needed = 60 + measure_shortfall(setup, early).n_for_uncertainty
-    n_true = 120 * (late.kept.uncertainty / limit) ** 2
-    # The images also tell more of camera and lens, the more they are.
-    np.testing.assert_allclose(n_needed, n_true, rtol=0.3)
+    limit = 0.015
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=limit))
+
+    def median(value: Callable[[SwingState], float], n_images: int) -> float:
+        swings = (swing_poses(n_images, np.random.default_rng(i)) for i in range(7))
+        states = [state_of(setup, s, noise=i) for i, s in enumerate(swings)]
+        return float(np.median([value(state) for state in states]))
+
+    more = median(lambda s: measure_shortfall(setup, s).n_for_uncertainty, 60)
+    assert more > 100
+    reached = median(lambda s: s.kept.uncertainty, 60 + round(more))
+    assert reached == pytest.approx(limit, rel=0.1)
 
 
 def test_the_more_of_u_is_of_the_files_the_more_images_it_takes() -> None:
-    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.011))
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.012))
     state = state_of(setup, swing_poses(20, np.random.default_rng(0)))
     reached = PredictedUncertainty(uncertainty=0.02, floor=0.007)
     state = replace(state, kept=replace(state.kept, predicted=reached))
 
     n_needed = measure_shortfall(setup, state).n_for_uncertainty
 
-    # What is not of the files goes with the number of images to the power of -2/3.
-    of_images = (0.02**2 - 0.007**2) * (20 / (20 + n_needed)) ** (2 / 3)
-    assert np.hypot(np.sqrt(of_images), 0.007) == pytest.approx(0.011, rel=0.01)
+    # What is not of the files goes with the number of images to the power of -1/2.
+    of_images = (0.02**2 - 0.007**2) * (20 / (20 + n_needed)) ** 0.5
+    assert np.hypot(np.sqrt(of_images), 0.007) == pytest.approx(0.012, rel=0.01)
 
 
 def test_no_more_images_are_announced_than_the_limit_allows() -> None:
@@ -134,8 +137,8 @@ def test_what_no_image_can_mend_is_reported_with_its_file() -> None:
 def test_what_other_postures_still_lower_is_not_said_to_be_out_of_reach() -> None:
     """The floor of few postures is above that of all: it would be said too high."""
     setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.004))
-    early = state_of(setup, to_the_right(15))
-    whole = state_of(setup, swing_poses(60, np.random.default_rng(0)))
+    early = state_of(setup, to_the_right(15), RIGID)
+    whole = state_of(setup, swing_poses(60, np.random.default_rng(0)), RIGID)
     assert early.kept.predicted.floor > 0.004 > whole.kept.predicted.floor
 
     assert out_of_reach(setup.limits, early, measure_shortfall(setup, early)) is None
