@@ -7,15 +7,15 @@ in its own window:
 
 * the **grey centroid** in a Gaussian window 0.75 half-level radii wide, iterated until
   it stays in the middle of its window [1]_, for light with nothing beside it;
-* the **Gaussian fit**, the same in a window of 0.4 to 0.55 radii: the place of the
+* the **Gaussian fit**, the same in a window of 0.45 or 0.55 radii: the place of the
   Gaussian that correlates most with the light. It hardly sees what lies beside the LED;
-* the **edge**, the centroid of the soft-thresholded disc, between levels that lie the
-  higher the more foreign light there is; for saturated LEDs in the upper half, the only
-  light that is steep.
+* the **edge**, the centroid of the soft-thresholded disc, for LEDs wide enough to have
+  one and for saturated ones.
 
-How far the first two differ shows the foreign light of an image. Size, saturation and
-this difference decide which of them is taken: the one that errs least on rendered
-panels with and without foreign light (`benchmarks/small_leds.py`).
+How far the first two differ shows the foreign light of an image, and which of them
+errs least. The edge is taken at several heights. The more of the rim it uses, the less
+noise it has; the nearer to the foot, the more foreign light. The lowest one that agrees
+with all above it, within their noise, is taken [2]_.
 
 The part of the window that is odd under a point reflection about the centre holds all
 noise and none of a symmetric LED: it gives the standard deviation of the centre, and
@@ -25,6 +25,8 @@ References
 ----------
 .. [1] E. Bertin, S. Arnouts, "SExtractor: software for source extraction", Astronomy
    and Astrophysics Supplement 117 (1996) 393-404; its manual has windowed centroids.
+.. [2] O. V. Lepskii, "On a problem of adaptive estimation in Gaussian white noise",
+   Theory of Probability and its Applications 35 (1991) 454-466.
 """
 
 from dataclasses import dataclass
@@ -41,24 +43,19 @@ MORE_REACH = 1.0  # px, from the centre to the border of a window
 BACKGROUND_QUANTILE = 0.1
 FOOT, HEAD = 0.25, 0.75  # heights between which the half-level area is counted
 
-WIDE, MIDDLE, NARROW, TIGHT = (
-    0.75,
-    0.55,
-    0.45,
-    0.4,
-)  # half-level radii, standard deviation
+WIDE, MIDDLE, NARROW = 0.75, 0.55, 0.45  # half-level radii, standard deviation
 LEAST_WINDOW = 1.1  # px
 ROUNDS = 10
 FARTHEST = 0.5  # half-level radii, of a centre from its start
 
-LITTLE, MUCH = 0.012, 0.03  # px, median difference of two windows: foreign light
-LEAST_EDGE = 3.7  # px, half-level radius from which the edge is better than windows
-EDGES = ((0.1, 0.9), (0.2, 0.9), (0.3, 0.9))  # heights, by little or much foreign light
+LITTLE, MUCH = 0.012, 0.022  # px, median difference of two windows: foreign light
+LEAST_EDGE = 4.0  # px, half-level radius from which the edge is better than windows
+EDGES = ((0.5, 0.95), (0.4, 0.9), (0.3, 0.9), (0.2, 0.9), (0.1, 0.9))  # heights
+AGREEING = 5.0  # standard deviations of the higher of two edges
 MOST_BESIDE = 0.15  # radii, of an edge from the windowed centre
-SATURATED_EDGE = (0.5, 0.95)
 SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
 
-SHARE_OF_DIFFERENCE = 0.3  # of a difference by foreign light that the centre errs by
+SHARES = (0.1, 0.6)  # of that difference, by which edges, and windows, err
 SPREAD = 1.3  # half-level radii in a standard deviation of the light
 INTERPOLATED = 1.4  # noise of a pixel over that between pixels, by bilinear weights
 LONGEST = 4.0  # times as long as wide, of a spot
@@ -156,24 +153,21 @@ def measure_small(
     saturated = windows.peaks >= SATURATED_PEAK * full_scale
     narrow = _windowed(windows, np.zeros_like(centers), NARROW)
     wide = _windowed(windows, narrow, WIDE)
-    unclipped = ~saturated if (~saturated).any() else np.ones(len(centers), bool)
+    clear = ~saturated | (saturated.mean() > 0.5)
     gaps = np.linalg.norm(wide - narrow, axis=1)
-    foreign = float(np.median(gaps[unclipped]))
+    foreign = float(np.median(gaps[clear]))
     grade = 0 if foreign < LITTLE else 1 if foreign < MUCH else 2
-    width = (WIDE, MIDDLE, TIGHT)[grade]
+    width = (WIDE, MIDDLE, NARROW)[grade]
     found = _windowed(windows, narrow, width)
-    share = SHARE_OF_DIFFERENCE * (foreign if grade else 0.0)
     odd = _odd_parts(windows, narrow)
     sigmas = _window_sigmas(windows, odd, width)
-    edges = saturated | (windows.radii > LEAST_EDGE)
-    for i in np.flatnonzero(edges).tolist():
-        heights = SATURATED_EDGE if saturated[i] else EDGES[grade]
-        edge = _edge(windows, i, narrow[i], odd[i], heights)
-        if edge is None:
-            continue
-        if np.hypot(*(edge[0] - narrow[i])) < MOST_BESIDE * windows.radii[i]:
-            found[i], sigmas[i] = edge
-    sigmas = np.sqrt((sigmas**2 + np.median(sigmas) ** 2) / 2 + share**2)
+    edges, edge_sigmas = _lowest_edges(windows, narrow, odd)
+    beside = np.linalg.norm(edges - narrow, axis=1) / windows.radii
+    is_edge = (saturated | (windows.radii > LEAST_EDGE)) & (beside < MOST_BESIDE)
+    found[is_edge], sigmas[is_edge] = edges[is_edge], edge_sigmas[is_edge]
+    sigmas = np.sqrt((sigmas**2 + np.median(sigmas) ** 2) / 2)
+    if grade:
+        sigmas = np.hypot(sigmas, np.where(is_edge, *SHARES) * foreign)
     noises, lopsided = _asymmetry(windows, odd)
     return SmallSpots(
         centers=windows.middles + found,
@@ -247,21 +241,21 @@ def _windows(image: Image, centers: FloatArray, radii: FloatArray) -> _Windows:
     tops = np.maximum(peaks - background, 1.0)
     heights = light / tops[:, None, None]
     soft = np.clip((heights - FOOT) / (HEAD - FOOT), 0, 1)
-    areas = [_about_the_middle(each).sum() for each in soft]
-    radii = np.sqrt(np.array(areas) / np.pi)
+    radii = np.sqrt(_about_the_middles(soft).sum(axis=(1, 2)) / np.pi)
     # What is larger by far has a neighbour in its half-level area.
     radii = np.clip(radii, LEAST_WINDOW, LARGER * max(np.median(radii), LEAST_WINDOW))
     return _Windows(light, middles, radii, tops, peaks)
 
 
-def _about_the_middle(soft: FloatArray) -> FloatArray:
-    """Return a soft-thresholded window without the regions beside the middle one."""
-    _, regions = cv2.connectedComponents((soft > 0).astype(np.uint8))
-    half = len(soft) // 2
-    middle = regions[half, half]
-    if middle == 0:
-        return np.zeros_like(soft)
-    return np.asarray(np.where(regions == middle, soft, 0.0))
+def _about_the_middles(soft: FloatArray) -> FloatArray:
+    """Return soft-thresholded windows without the regions beside the middle ones."""
+    half = soft.shape[1] // 2
+    # A dark row between windows parts the regions of one from those of the next.
+    lit = np.pad(soft > 0, ((0, 0), (0, 1), (0, 0))).view(np.uint8)
+    _, labels = cv2.connectedComponents(lit.reshape(-1, soft.shape[2]))
+    regions = labels.reshape(lit.shape)[:, :-1]
+    middles = regions[:, half, half, None, None]
+    return np.asarray(np.where((regions == middles) & (middles > 0), soft, 0.0))
 
 
 def _weights(
@@ -344,28 +338,42 @@ def _window_sigmas(windows: _Windows, odd: FloatArray, width: float) -> FloatArr
     return np.asarray(np.sqrt(squares) / amounts * (1 + spread / variances))
 
 
-def _edge(
-    windows: _Windows,
-    i: int,
-    at: FloatArray,
-    odd: FloatArray,
-    heights: tuple[float, float],
-) -> tuple[FloatArray, float] | None:
-    """Return the centre by an edge, px from the middle, and its standard deviation."""
+def _lowest_edges(
+    windows: _Windows, at: FloatArray, odd: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return centres by the lowest edges that agree with all higher ones, and sigmas.
+
+    (N, 2), px from the middle, and (N,), px; NaN without an edge.
+    """
+    centers, sigmas = _edges(windows, at, odd, EDGES[0])
+    higher = [(centers, np.nanmedian(sigmas))]
+    agree = np.ones(len(at), dtype=bool)
+    for heights in EDGES[1:]:
+        lower, lower_sigmas = _edges(windows, at, odd, heights)
+        for other, sigma in higher:
+            agree &= np.linalg.norm(lower - other, axis=1) < AGREEING * sigma
+        centers = np.where(agree[:, None], lower, centers)
+        sigmas = np.where(agree, lower_sigmas, sigmas)
+        higher.append((lower, np.nanmedian(lower_sigmas)))
+    return centers, sigmas
+
+
+def _edges(
+    windows: _Windows, at: FloatArray, odd: FloatArray, heights: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the centres by an edge, px, and sigmas, as above."""
     low, high = heights
-    top = windows.tops[i]
-    soft = np.clip((windows.light[i] / top - low) / (high - low), 0, 1)
-    soft = _about_the_middle(soft)
-    area = soft.sum()
-    if area < 1:
-        return None
-    x = soft.sum(axis=0) @ windows.places / area
-    y = soft.sum(axis=1) @ windows.places / area
-    away = windows.places
-    lever = (away[:, None] - at[1]) ** 2 + (away - at[0]) ** 2
+    soft = windows.light / windows.tops[:, None, None]
+    soft = _about_the_middles(np.clip((soft - low) / (high - low), 0, 1))
+    areas = soft.sum(axis=(1, 2))
+    areas = np.where(areas < 1, np.nan, areas)
+    sums = np.stack([soft.sum(axis=1), soft.sum(axis=2)], axis=1)
+    squares = (windows.places - at[:, :, None]) ** 2
+    lever = squares[:, 1, :, None] + squares[:, 0, None, :]
     grey = (soft > 0) & (soft < 1)
-    squares = 0.5 * (lever * odd**2)[grey].sum()
-    return np.array([x, y]), float(np.sqrt(squares) / ((high - low) * top * area))
+    noise = np.sqrt(0.5 * np.sum(lever * odd**2, axis=(1, 2), where=grey))
+    sigmas = noise / ((high - low) * windows.tops * areas)
+    return sums @ windows.places / areas[:, None], sigmas
 
 
 def _asymmetry(windows: _Windows, odd: FloatArray) -> tuple[FloatArray, FloatArray]:

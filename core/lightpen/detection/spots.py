@@ -67,7 +67,8 @@ MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
 
 SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
 
-BELL_RADIUS = 4.5  # px; blur leaves less no even inside
+BELL_RADIUS = 6.0  # px; blur leaves less no even inside
+LIT = 0.25  # of the spots with foreign light
 RAISED = 0.35  # height of the outline above which the foot of a disc is not its own
 MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
 SATURATED_LEVEL = 0.99  # of the full scale
@@ -538,12 +539,16 @@ def _with_small(
     These are the ones that blur leaves without an even inside, or foreign light without
     a foot.
     """
-    raised = [not disc.is_whole or disc.cut_height > RAISED for disc in discs]
-    radii = np.sqrt(spots.areas / np.pi)
-    small = np.flatnonzero(spots.are_small | (raised & (radii < LARGEST_RADIUS)))
+    raised = np.array([not disc.is_whole or disc.cut_height > RAISED for disc in discs])
+    fits = np.sqrt(spots.areas / np.pi) < LARGEST_RADIUS
+    # Foreign light at a quarter of the LEDs is, less of it, at the others too.
+    raised &= fits
+    are_lit = raised.sum() > LIT * fits.sum()
+    small = np.flatnonzero(spots.are_small | (fits if are_lit else raised))
     if not len(small):
         return spots
-    found = measure_small(image, spots.centers[small], radii[small], full_scale)
+    radii = np.sqrt(spots.areas[small] / np.pi)
+    found = measure_small(image, spots.centers[small], radii, full_scale)
     unwhole = SpotFlaw.CUT | SpotFlaw.MERGED
     kept = spots.flaws[small] & (SpotFlaw.BLURRED | unwhole)
     # What was parted at high levels and is whole in its own window is not cut.
