@@ -43,7 +43,7 @@ MIN_RAYS, MAX_RAYS = 32, 128
 SHARPNESS = 4
 ROUNDS = 3 * [[0, 1, 2, 3, 4]] + 2 * [[0, 1, 2, 3, 4, 5]] + 2 * [[0, 1, 2, 3, 5]]
 # From the image before, whose shape and blur a disc still has nearly.
-KNOWN_ROUNDS = ROUNDS[3:]
+KNOWN_ROUNDS = ROUNDS[4:6]
 RIDGE = 1e-12  # of the normal matrix, which no disc of many may spoil
 LONGEST_STEP = 1.5  # px, of the rim in one round
 CONVERGED = 0.05  # px
@@ -226,14 +226,14 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
         moves = np.einsum("dnk,dk->dn", rays.moves, steps)
         longest = np.abs(moves).max(axis=1)
         alive = edges.are_lit & (shorter > MIN_SEMI_AXIS) & np.isfinite(longest)
+        shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
+        ellipses = _moved(ellipses, steps * shares[:, None])
         if n == len(rounds):
             are_even = _are_even(edges.places - moves, shorter) & ~edges.are_dark
             are_whole = are_even & (longest < CONVERGED)
             for d in np.flatnonzero(alive & (sigmas < MAX_SIGMA * shorter)).tolist():
                 found[left[d]] = _rim(ellipses, sigmas, d, bool(are_whole[d]))
             break
-        shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
-        ellipses = _moved(ellipses, steps * shares[:, None])
         sigmas = sigmas + edges.blurs
         if not alive.all():
             left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
