@@ -367,6 +367,20 @@ class Stage:
         shown = QDeadlineTimer(REFRESH_MS)
         self._wait_until(shown.hasExpired)
 
+    def show_otherwise(self, step: str) -> None:
+        """Show another moment of a probing step: all results, or the first points."""
+        is_verified = step == "verify"
+        probing = (
+            self._workbench.verification if is_verified else self._workbench.measuring
+        )
+        status = probing.status
+        assert status.setup is not None
+        probed = _verified if is_verified else _measuring
+        state = probed(status.setup, self._scene)
+        probing.on_verification(replace(status, state=state), ())
+        shown = QDeadlineTimer(REFRESH_MS)
+        self._wait_until(shown.hasExpired)
+
     def _fill_history(self) -> None:
         logbook = self._workbench.run.logbook.opened()
         for n in range(N_EARLIER):
@@ -502,20 +516,36 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
     return state
 
 
-def _touched(setup: SessionSetup, scene: Scene) -> SessionState:
-    """Return a verification in the middle of its ring."""
+def _touched(
+    setup: SessionSetup, scene: Scene, n_on_ring: int = N_ON_RING, n_ends: int = 0
+) -> SessionState:
+    """Return a verification in the middle of its ring, or after more points."""
     n_touches = setup.choices.options_of(FIXED_POINT).n_touches
     goals = [
         HandGoal(np.zeros(3), 0.2 + 0.2 * (i % 2), 2 * np.pi * i / n_touches)
         for i in range(n_touches)
     ]
     ring = setup.choices.options_of(CIRCLE)
-    goals += [CIRCLE.hand(ring, 0, i) for i in range(N_ON_RING)]
+    goals += [CIRCLE.hand(ring, 0, i) for i in range(n_on_ring)]
+    length = setup.choices.options_of(LENGTH)
+    goals += [LENGTH.hand(length, 0, i) for i in range(n_ends)]
     return _probed(setup, scene, goals)
 
 
-def _measured(setup: SessionSetup, scene: Scene) -> SessionState:
-    """Return a part with all its features."""
+def _verified(setup: SessionSetup, scene: Scene) -> SessionState:
+    """Return a verification with the results of all its tasks."""
+    return _touched(setup, scene, n_on_ring=10, n_ends=2)
+
+
+def _measuring(setup: SessionSetup, scene: Scene) -> SessionState:
+    """Return a part in the middle of its second feature."""
+    return _measured(setup, scene, n_points=9)
+
+
+def _measured(
+    setup: SessionSetup, scene: Scene, n_points: int | None = None
+) -> SessionState:
+    """Return a part with all its features, or after the first points."""
     options = setup.choices.options_of(PART)
     assert options.plan is not None
     return _probed(
@@ -525,7 +555,7 @@ def _measured(setup: SessionSetup, scene: Scene) -> SessionState:
             PART.hand(options, run, i)
             for run, feature in enumerate(options.plan.features)
             for i in range(feature.n_touches)
-        ],
+        ][:n_points],
     )
 
 

@@ -121,6 +121,14 @@ def message(code: str, /, **values: Value) -> Message:
     return Message(code, values)
 
 
+class Number(float):
+    """A number that is written without a sign before zero."""
+
+    def __format__(self, spec: str) -> str:
+        text = super().__format__(spec)
+        return text if any(map(text.__contains__, "123456789in")) else text.lstrip("-")
+
+
 COMMA = message("list.comma")  # between the messages or words of one value
 
 
@@ -129,4 +137,4 @@ def _worded(value: Value, translate: Translate) -> str | int | float:
         return value.text(translate)
     if isinstance(value, tuple):
         return COMMA.text(translate).join(each.text(translate) for each in value)
-    return value
+    return Number(value) if isinstance(value, float) else value

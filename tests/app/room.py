@@ -29,12 +29,15 @@ class SizeClass:
         By how much the page is smaller than its layout can be made.
     clipped, sideways : tuple of str
         Words that are not seen whole; what is scrolled to the sides.
+    downwards : tuple of str
+        Parts of the page that are scrolled, tables left out.
     """
 
     size: QSize
     lack: QSize
     clipped: tuple[str, ...]
     sideways: tuple[str, ...]
+    downwards: tuple[str, ...]
 
 
 def missing_input_of(widget: QWidget) -> str:
@@ -93,6 +96,14 @@ def scrolled_sideways(root: QWidget) -> tuple[str, ...]:
     )
 
 
+def scrolled_downwards(root: QWidget) -> tuple[str, ...]:
+    return tuple(
+        type(area.parentWidget()).__name__
+        for area in root.findChildren(QScrollArea)
+        if area.isVisible() and area.verticalScrollBar().maximum() > 0
+    )
+
+
 def room_of(window: MainWindow) -> SizeClass:
     page = window.page()
     layout = page.layout()
@@ -102,5 +113,9 @@ def room_of(window: MainWindow) -> SizeClass:
         max(least.width() - page.width(), 0), max(least.height() - page.height(), 0)
     )
     return SizeClass(
-        window.size(), lack, clipped_words(window), scrolled_sideways(page)
+        window.size(),
+        lack,
+        clipped_words(window),
+        scrolled_sideways(page),
+        scrolled_downwards(page),
     )

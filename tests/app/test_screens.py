@@ -42,9 +42,11 @@ NAMES = [
 ]
 LEAST = QSize(940, 500)
 SIZES = (LEAST, QSize(960, 540), QSize(1280, 800))
+PROBING = "verify", "measure"  # seen also with all results, or after a few points
+OTHERWISE = " otherwise"
 KEYS = [
     (step, str(language), size.width())
-    for step in SCREENS.STEPS
+    for step in (*SCREENS.STEPS, *(step + OTHERWISE for step in PROBING))
     for language in languages()
     for size in SIZES
 ]
@@ -88,6 +90,13 @@ def seen(dressed: QApplication) -> Iterator[Seen]:
         for step in SCREENS.walk(stage, SCREENS.published_looks):
             seen.pictures.update(SCREENS.draw(stage, step, SCREENS.published_looks))
             seen.rooms.update(rooms_of(stage, step))
+            if step in PROBING:
+                stage.show_otherwise(step)
+                others = {
+                    (step + OTHERWISE, *key): rooms
+                    for (_, *key), rooms in rooms_of(stage, step)
+                }
+                seen.rooms.update(others)
         yield seen
         stage.close()
 
@@ -191,6 +200,17 @@ def test_a_step_has_room_in_a_small_window(seen: Seen, key: Key) -> None:
 def test_no_words_of_a_step_are_clipped(seen: Seen, key: Key) -> None:
     for room in seen.rooms[key]:
         assert room.clipped == ()
+
+
+@pytest.mark.parametrize("language", languages())
+def test_all_of_a_verification_is_seen_at_once_but_the_list_of_its_points(
+    seen: Seen, language: str
+) -> None:
+    (probing,) = seen.rooms["verify", language, 1280]
+    (verified,) = seen.rooms["verify" + OTHERWISE, language, 1280]
+
+    assert probing.downwards == ()
+    assert verified.downwards == ("TaskFinding",)
 
 
 def test_the_tabs_of_the_review_are_all_looked_at(seen: Seen) -> None:

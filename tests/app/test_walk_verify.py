@@ -67,7 +67,7 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert walker.tells("Length")
     for _ in range(2):
         walker.press(Qt.Key.Key_Down)
-    walker.click("Probe both ends")
+    walker.click("Include: Probe both ends")
     walker.until_says("NOT READY")
     assert walker.tells("The length is not specified. Enter the certified one.")
     walker.click_into("Certified length", f"{SIMULATED_LENGTH:g}")

@@ -253,3 +253,12 @@ def test_a_template_that_names_an_option_is_noticed() -> None:
 
 def test_what_to_type_answers_a_message_of_the_catalogue() -> None:
     assert set(ADVICE) <= set(CATALOGUE)
+
+
+def test_a_number_that_rounds_to_zero_has_no_sign() -> None:
+    values = {"error": -0.00001, "uncertainty": 0.001, "limit": 0.01}
+
+    assert "Radius error 0.0000 mm" in str(message("circle.good", **values))
+    assert "Radius error -0.0001 mm" in str(
+        message("circle.good", **{**values, "error": -0.0001})
+    )

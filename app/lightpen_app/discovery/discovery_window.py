@@ -90,17 +90,19 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             grid.addWidget(name, row, 0)
             grid.addWidget(edit, row, 1)
             name.setBuddy(edit)
-        fill(side, self._compute, self._save, self._facts, 1)
+        fill(side, self._facts, 1)
         for picture in (self._dial, self._pen):
             picture.setMinimumHeight(LEAST_PICTURE)
         scroll = PageScroll()
         scroll.setWidget(panel)
-        scroll.setFixedWidth(SIDE_WIDTH)
+        column = QWidget()
+        column.setFixedWidth(SIDE_WIDTH)
+        vertical_layout(column, (scroll, 1), self._compute, self._save)
         layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
         vertical_layout(
             layout, self._instruction, (self._image, 1), stretch=1, spacing=-1
         )
-        layout.addWidget(scroll)
+        layout.addWidget(column)
 
         # Connections
         workbench.live.image_shown.connect(self._on_image_shown)
@@ -165,8 +167,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         for label, name in zip(
             self._names,
             (
-                self.tr("Length"),
-                self.tr("U (k = 2) of length"),
+                self.tr("Distance of the LEDs"),
+                self.tr("U (k = 2) of distance"),
                 self.tr("Disc diameter"),
             ),
             strict=True,
@@ -185,7 +187,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._dial.setVisible(state.is_capturing or state.found is None)
         why_not = "" if state.found else self.tr("Swing the pen first.")
         if not why_not and not self._length.value():
-            why_not = self.tr("Enter the length.")
+            why_not = self.tr("Enter the distance of the LEDs.")
         is_computing = state.progress is not None
         self._compute.set_why_not("" if is_computing else why_not)
         self._compute.setText(

@@ -2,8 +2,11 @@
 
 import math
 
+from lightpen.messages import Number
+
 AXES = ("x", "y", "z")
 MICROMETRES = 1000.0  # in a millimetre
+SHOWN_DECIMALS = 4  # of a millimetre, as in the sentences of the core
 MAX_DECIMALS = 6
 DIGITS = 2  # of an uncertainty, as the GUM recommends
 
@@ -20,5 +23,14 @@ def decimals_for(uncertainty: float) -> int:
 
 def number_text(value: float, decimals: int) -> str:
     """Return a number with so many decimals, without a sign before zero."""
-    text = f"{value:.{decimals}f}"
-    return text.lstrip("-") if float(text) == 0 else text
+    return f"{Number(value):.{decimals}f}"
+
+
+def mm_text(value: float) -> str:
+    """Return a length in mm as the screen shows it."""
+    return number_text(value, SHOWN_DECIMALS)
+
+
+def micrometres_text(value: float) -> str:
+    """Return a length in mm as micrometres, to the digit of `mm_text`."""
+    return number_text(MICROMETRES * value, 1)

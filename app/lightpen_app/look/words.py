@@ -4,7 +4,9 @@ import re
 from collections.abc import Iterable
 from datetime import datetime
 
-from PySide6.QtCore import QCoreApplication, QDateTime, QLocale
+from PySide6.QtCore import QCoreApplication
+
+from lightpen.local_time import local_time
 
 LONGEST_SHOWN = 32  # characters
 LONGEST_WORD = 24  # characters; what is longer may be parted
@@ -39,7 +41,11 @@ def _parted(word: str) -> str:
     return BREAK.join(parts)
 
 
-def moment_text(moment: datetime, pattern: str) -> str:
-    """Return a moment in local time, by a pattern of Qt, in the user's language."""
-    local = QDateTime.fromSecsSinceEpoch(int(moment.timestamp()))
-    return QLocale().toString(local, pattern)
+def moment_text(moment: datetime) -> str:
+    """Return a moment in local time, to the minute."""
+    return f"{local_time(moment):%Y-%m-%d %H:%M}"
+
+
+def day_text(moment: datetime) -> str:
+    """Return the local day of a moment."""
+    return f"{local_time(moment):%Y-%m-%d}"

@@ -4,9 +4,9 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QKeySequence
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QDialog, QGraphicsView, QWidget
 from typing_extensions import override
 
 from lightpen.formats.files import write_whole
@@ -63,16 +63,19 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._printer.setPageLayout(A4)
         self._pages = QPrintPreviewWidget(self._printer)
         self._pages.setZoomMode(QPrintPreviewWidget.ZoomMode.FitToWidth)
+        pages = self._pages.findChild(QGraphicsView)
+        assert pages is not None  # else the width changes as the bar comes
+        pages.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
         self._smaller = PushButton()
         self._larger = PushButton()
         self._save = PushButton()
         self._print = PushButton()
+        self._close = PushButton()
 
         # Layout
         layout = vertical_layout(self, (self._pages, 1), margins=GRID)
-        horizontal_layout(
-            layout, self._smaller, self._larger, 1, self._print, self._save
-        )
+        zoom = self._smaller, self._larger
+        horizontal_layout(layout, *zoom, 1, self._print, self._save, self._close)
 
         # Connections
         self._pages.paintRequested.connect(partial(paint_on, paper))
@@ -80,6 +83,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._larger.clicked.connect(self._pages.zoomIn)
         self._save.clicked.connect(self._ask_file)
         self._print.clicked.connect(self._ask_printer)
+        self._close.clicked.connect(self.close)
 
         self._retranslate()
 
@@ -100,6 +104,8 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._larger.setText(self.tr("Larger"))
         self._save.setText(self.tr("Save as PDF..."))
         self._print.setText(self.tr("Print..."))
+        self._close.setText(self.tr("Close"))
+        self._close.setShortcut(QKeySequence.StandardKey.Cancel)  # a text takes it away
 
     def _ask_file(self) -> None:
         path = self._place.folder() / f"{self._stem}.pdf"

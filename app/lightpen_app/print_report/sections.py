@@ -10,6 +10,7 @@ from PySide6.QtGui import QPainter
 from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.laboratory import Laboratory
+from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
@@ -100,6 +101,8 @@ def _verdict(calibration_file: CalibrationFile) -> Block:
             "paper", "This tip was reinstated from an earlier calibration. Reason: {0}"
         )
         lines.append(text.format(calibration_file.reason))
+    elif calibration_file.origin is Origin.SIMULATED:
+        lines.append(translate("paper", "Practice: not used for any pen."))
     elif calibration_file.grade is Grade.PASS:
         lines.append(translate("paper", "The tip was accepted."))
     else:
@@ -151,7 +154,9 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
             (translate("paper", "Computed"), zoned_moment_text(calibration.created)),
             (translate("paper", "Cone"), stated(names.cone)),
             (
-                translate("paper", "Accepted"),
+                translate("paper", "Saved")
+                if calibration_file.origin is Origin.SIMULATED
+                else translate("paper", "Accepted"),
                 translate("paper", "no")
                 if accepted is None
                 else zoned_moment_text(accepted),
@@ -314,6 +319,8 @@ def signature_blocks(by: str) -> Iterable[Block]:
 
 def _status(calibration_file: CalibrationFile) -> str:
     """Return the library entries of pen and tip."""
+    if calibration_file.origin is Origin.SIMULATED:
+        return translate("paper", "practice")
     if calibration_file.due is None:
         return stated("")
     return ", ".join(status_words(calibration_file)) or translate("paper", "valid")

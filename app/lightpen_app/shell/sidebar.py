@@ -53,7 +53,9 @@ def subject_of(
     """Return the item of the current swing, or the selected one."""
     if status.state is not None:
         return Subject(status.names, status.origin, statuses)
-    return Subject(chosen.names, chosen.origin, statuses)
+    has_files = chosen.camera_file is not None or chosen.pen_file is not None
+    origin = chosen.origin if has_files else Origin.LIVE  # nothing is chosen yet
+    return Subject(chosen.names, origin, statuses)
 
 
 class Sidebar(Translated, QFrame):

@@ -55,7 +55,7 @@ def draw_camera(
     painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
     painter.restore()
 
-    size = max(0.075 * radius, TextSize.SMALL)
+    size = max(0.09 * radius, TextSize.SMALL)
     painter.save()
     painter.setPen(color)
     painter.setFont(font(size))

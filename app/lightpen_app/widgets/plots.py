@@ -473,7 +473,6 @@ class TracePlot(Plot):
             pen = pg.mkPen(colors.muted, width=1, style=Qt.PenStyle.DashLine)
             self._limit.setPen(pen)
             self._limit.label.setColor(QColor(colors.muted))
-            self._limit.label.fill = pg.mkBrush(colors.panel)
 
     @override
     def _named_curves(self) -> tuple[str, ...]:

@@ -200,7 +200,7 @@ class PostureDial(Translated, QWidget):
             self._draw_field(painter, middle, rim, place, colors)
         if value.n_full < value.n_fields:
             painter.setPen(QColor(colors.muted))
-            painter.setFont(font(TextSize.SMALL))
+            painter.setFont(font(max(0.09 * rim, TextSize.SMALL)))
             left = max(middle.x() - 1.15 * rim, 0.0)  # of the rim
             corner = QRectF(left, middle.y() - rim, rim, rim)
             painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, legend)

@@ -11,7 +11,7 @@ from lightpen.verification.history.trend import Trend
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.quantities import AXES
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
-from lightpen_app.look.words import moment_text, shortened
+from lightpen_app.look.words import day_text, shortened
 from lightpen_app.widgets.plots import Axes, Plot
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
@@ -178,7 +178,7 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         if not trend.entries:
             return self.tr("Select an entry with a tip to see its trend.")
         days = (trend.entries[0].entry.event.at, trend.entries[-1].entry.event.at)
-        first, last = (moment_text(day, "yyyy-MM-dd") for day in days)
+        first, last = (day_text(day) for day in days)
         names = shortened(trend.pen), shortened(trend.tip)
         if len(trend.entries) == 1:
             return self.tr(

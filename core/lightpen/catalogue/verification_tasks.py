@@ -155,7 +155,7 @@ MESSAGES = {
     "tip.another": "The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Was the tip replaced, bent or refitted, or is it that of another pen?",
     "tip.differs": "The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The difference is significant.",
     "tip.with-power": "{reason} {power}",
-    "tip.verified": "Verifies the tip: an error of {detectable:.4f} mm would be found with 95 % probability.",
-    "tip.weak-power": "Verifies scale and form, not the tip: only a tip error of {detectable:.4f} mm would be found with 95 % probability (limit {limit:.4f} mm).",
-    "tip.no-power": "Verifies scale and form, not the tip: in these postures no tip error would be found (limit {limit:.4f} mm).",
+    "tip.verified": "Verifies the tip: had it an error of {detectable:.4f} mm or more, this verification would show it (probability 95 %).",
+    "tip.weak-power": "Verifies scale and form, not the tip: these points show only a tip error above {detectable:.4f} mm (probability 95 %), the limit is {limit:.4f} mm. Tilt the pen more, to all sides.",
+    "tip.no-power": "Verifies scale and form, not the tip: all points were probed in alike postures, which show no tip error. Tilt the pen to all sides.",
 }

@@ -359,6 +359,10 @@
         <translation>比例核查（可选）</translation>
     </message>
     <message>
+        <source>200 200.12 0.04 (mm)</source>
+        <translation>200 200.12 0.04 (mm)</translation>
+    </message>
+    <message>
         <source>Measured with a caliper: stated length, measured length and its U (k = 2) in mm. Screen: pixel pitch and its U in mm; the board is then in pixels. The scale does not affect the intrinsics of one camera.</source>
         <translation>用卡尺测量：标称长度、实测长度及其 U (k = 2)，单位 mm。屏幕：像素间距及其 U，单位 mm；此时标定板以像素为单位。比例不影响单台相机的内参。</translation>
     </message>
@@ -401,10 +405,6 @@
     <message>
         <source>Hold still.</source>
         <translation>请保持静止。</translation>
-    </message>
-    <message>
-        <source>Keep still.</source>
-        <translation>请继续保持静止。</translation>
     </message>
     <message>
         <source>View captured. Align the board with the outline.</source>
@@ -645,7 +645,7 @@
     </message>
     <message>
         <source>Camera {0:.0f} fps</source>
-        <translation>相机 {0:.0f} fps</translation>
+        <translation>相机 {0:.0f} 幅/秒</translation>
     </message>
     <message>
         <source>LEDs fit to {0:.2f} px only, usual is {1:g} px.</source>
@@ -829,14 +829,6 @@
         <translation>未指定</translation>
     </message>
     <message>
-        <source>Length</source>
-        <translation>长度</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of length</source>
-        <translation>长度的 U (k = 2)</translation>
-    </message>
-    <message>
         <source>Disc diameter</source>
         <translation>圆盘直径</translation>
     </message>
@@ -851,10 +843,6 @@
     <message>
         <source>Swing the pen first.</source>
         <translation>请先摆动光笔。</translation>
-    </message>
-    <message>
-        <source>Enter the length.</source>
-        <translation>请输入长度。</translation>
     </message>
     <message>
         <source>Cancel</source>
@@ -873,8 +861,20 @@
         <translation>请先求光笔和相机。</translation>
     </message>
     <message>
+        <source>Distance of the LEDs</source>
+        <translation>LED 间距</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of distance</source>
+        <translation>间距的 U (k = 2)</translation>
+    </message>
+    <message>
         <source>Images: {0} of {1}</source>
         <translation>图像：{0} / {1}</translation>
+    </message>
+    <message>
+        <source>Enter the distance of the LEDs.</source>
+        <translation>请输入 LED 间距。</translation>
     </message>
     <message>
         <source>Frame of the pen: click the LED at the origin, then one along y.</source>
@@ -1053,10 +1053,6 @@
     <message>
         <source>No entry selected</source>
         <translation>未选择条目</translation>
-    </message>
-    <message>
-        <source>d MMMM yyyy, hh:mm</source>
-        <translation>yyyy年M月d日 hh:mm</translation>
     </message>
     <message>
         <source>Entry {0}, {1}, SHA-256 {2}</source>
@@ -1562,7 +1558,7 @@
     </message>
     <message>
         <source>RMS / px</source>
-        <translation>残差 / px</translation>
+        <translation>均方根 / px</translation>
     </message>
     <message>
         <source>LEDs</source>
@@ -1773,10 +1769,6 @@
 </context>
 <context>
     <name>InterruptedRow</name>
-    <message>
-        <source>d MMM yyyy, hh:mm</source>
-        <translation>yyyy年M月d日 hh:mm</translation>
-    </message>
     <message>
         <source>Discard this swing? Its images remain on the disk.</source>
         <translation>放弃这次摆动吗？图像保留在磁盘上。</translation>
@@ -2162,10 +2154,6 @@
     <message>
         <source>Last calibration of this pen and tip</source>
         <translation>本光笔和测头的上次标定</translation>
-    </message>
-    <message>
-        <source>d MMMM yyyy, hh:mm</source>
-        <translation>yyyy年M月d日 hh:mm</translation>
     </message>
     <message>
         <source>Tip centre / mm</source>
@@ -3326,6 +3314,10 @@
 <context>
     <name>PartView</name>
     <message>
+        <source>No points yet</source>
+        <translation>尚无测点</translation>
+    </message>
+    <message>
         <source>The part in space: {0} points, {1} lines of features</source>
         <translation>工件三维图：{0} 个点，{1} 条要素线</translation>
     </message>
@@ -3470,7 +3462,7 @@
     </message>
     <message>
         <source>Features are recognised while they are probed; end with the main button.</source>
-        <translation>探测时自动识别要素；用主按钮结束。</translation>
+        <translation>触测时自动识别要素；用主按钮结束。</translation>
     </message>
     <message>
         <source>Use simulated plate</source>
@@ -3482,7 +3474,7 @@
     </message>
     <message>
         <source>Kind of the feature that is probed</source>
-        <translation>正在探测的要素类型</translation>
+        <translation>正在触测的要素类型</translation>
     </message>
     <message>
         <source>Recognise</source>
@@ -3502,7 +3494,7 @@
     </message>
     <message>
         <source>Part or camera was moved: probe three datum points again, which connect the new position with the old.</source>
-        <translation>工件或相机已移动：重新探测三个基准点，把新位置与原位置联系起来。</translation>
+        <translation>工件或相机已移动：重新触测三个基准点，把新位置与原位置联系起来。</translation>
     </message>
     <message>
         <source>Save plan...</source>
@@ -3635,6 +3627,10 @@ needed</source>
         <translation>打印...</translation>
     </message>
     <message>
+        <source>Close</source>
+        <translation>关闭</translation>
+    </message>
+    <message>
         <source>Save calibration report</source>
         <translation>保存标定报告</translation>
     </message>
@@ -3666,7 +3662,7 @@ needed</source>
     </message>
     <message>
         <source>Probes all tasks automatically.</source>
-        <translation>自动探测所有任务。</translation>
+        <translation>自动触测所有任务。</translation>
     </message>
     <message>
         <source>Simulated artefacts: ring radius {0} mm, bar length {1} mm, sphere diameter {2} mm (ball centres).</source>
@@ -4081,12 +4077,12 @@ needed</source>
         <translation>测头尚未接受。摆动已保存，下次启动时可以继续。</translation>
     </message>
     <message>
-        <source>Current since {0}. Earlier results stay in the archive.</source>
-        <translation>自 {0} 起使用。更早的结果保留在档案库中。</translation>
+        <source>Saved {0}. Earlier results stay in the archive.</source>
+        <translation>保存于 {0}。以前的结果保留在档案中。</translation>
     </message>
     <message>
-        <source>Current since {0}, check needed. Reason for acceptance: {1}</source>
-        <translation>自 {0} 起使用，需检查。接受理由：{1}</translation>
+        <source>Saved {0}, check needed. Reason for acceptance: {1}</source>
+        <translation>保存于 {0}，需检查。接受原因：{1}</translation>
     </message>
     <message>
         <source>This swing belongs to tip {0}, pen {1}; the step Start now shows tip {2}, pen {3}.</source>
@@ -5261,6 +5257,13 @@ needed</source>
     </message>
 </context>
 <context>
+    <name>TaskForm</name>
+    <message>
+        <source>Include: {0}</source>
+        <translation>包括：{0}</translation>
+    </message>
+</context>
+<context>
     <name>TaskPanel</name>
     <message>
         <source>Recorded images...</source>
@@ -5449,10 +5452,6 @@ mm</translation>
         <translation>已损坏：{0}</translation>
     </message>
     <message>
-        <source>d MMM yyyy, hh:mm</source>
-        <translation>yyyy年M月d日 hh:mm</translation>
-    </message>
-    <message>
         <source>verification, {0} of {1} tasks</source>
         <translation>验证，已完成 {0} / {1} 项任务</translation>
     </message>
@@ -5487,12 +5486,12 @@ mm</translation>
         <translation>空格：暂停</translation>
     </message>
     <message>
-        <source>Verify the current tip on reference artefacts.</source>
-        <translation>用参考标准器验证当前测头。</translation>
+        <source>Practice tip {0} of pen {1}, saved {2}</source>
+        <translation>光笔 {1} 的练习测头 {0}，保存于 {2}</translation>
     </message>
     <message>
-        <source>d MMMM yyyy, hh:mm</source>
-        <translation>yyyy年M月d日 hh:mm</translation>
+        <source>Verify the current tip on reference artefacts.</source>
+        <translation>用参考标准器验证当前测头。</translation>
     </message>
     <message>
         <source>Tip {0} of pen {1}, in use since {2}</source>
@@ -5539,8 +5538,16 @@ mm</translation>
         <translation>正在读取图像</translation>
     </message>
     <message>
+        <source>Enter the value</source>
+        <translation>请输入数值</translation>
+    </message>
+    <message>
         <source>Nothing to verify</source>
         <translation>无法验证</translation>
+    </message>
+    <message>
+        <source>Probe elsewhere</source>
+        <translation>请换一处触测</translation>
     </message>
     <message>
         <source>Wait</source>
@@ -5568,7 +5575,7 @@ mm</translation>
     </message>
     <message>
         <source>The camera sends no images. Probing continues when they arrive.</source>
-        <translation>相机未发送图像。收到图像后继续探测。</translation>
+        <translation>相机未发送图像。收到图像后继续触测。</translation>
     </message>
     <message>
         <source>Not verified</source>
@@ -5593,10 +5600,6 @@ mm</translation>
     <message>
         <source>Pick up the pen</source>
         <translation>请拿起光笔</translation>
-    </message>
-    <message>
-        <source>Probed before</source>
-        <translation>已触测过</translation>
     </message>
     <message>
         <source>Not recorded</source>
@@ -5689,7 +5692,7 @@ mm</translation>
     </message>
     <message>
         <source>RMS / px</source>
-        <translation>残差 / px</translation>
+        <translation>均方根 / px</translation>
     </message>
 </context>
 <context>
@@ -6179,7 +6182,7 @@ mm</translation>
     </message>
     <message>
         <source>No feature of the plan was probed. Probe at least one.</source>
-        <translation>未探测计划中的任何要素。请至少探测一个。</translation>
+        <translation>未触测计划中的任何要素。请至少触测一个。</translation>
     </message>
     <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
@@ -6335,7 +6338,7 @@ mm</translation>
     </message>
     <message>
         <source>Probe a reference sphere</source>
-        <translation>探测标准球</translation>
+        <translation>触测标准球</translation>
     </message>
     <message>
         <source>Probe a ring</source>
@@ -6347,7 +6350,7 @@ mm</translation>
     </message>
     <message>
         <source>Probe more points, or use a precise probing, for a smaller U.</source>
-        <translation>探测更多点，或采用更精密的探测，以减小 U。</translation>
+        <translation>触测更多点，或采用更精密的触测，以减小 U。</translation>
     </message>
     <message>
         <source>Probe one end</source>
@@ -6375,7 +6378,7 @@ mm</translation>
     </message>
     <message>
         <source>Probe the feature</source>
-        <translation>探测要素</translation>
+        <translation>触测要素</translation>
     </message>
     <message>
         <source>Probe the other end</source>
@@ -6395,15 +6398,15 @@ mm</translation>
     </message>
     <message>
         <source>Probe the sphere</source>
-        <translation>探测球</translation>
+        <translation>触测球</translation>
     </message>
     <message>
         <source>Probe the upper half of the sphere all over and hold still on each point: {n_points} of {needed}.</source>
-        <translation>在球的整个上半部探测，并在每个点保持静止：{n_points} / {needed}。</translation>
+        <translation>在球的整个上半部触测，并在每个点保持静止：{n_points} / {needed}。</translation>
     </message>
     <message>
         <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
-        <translation>探测{kind} {name}：{n_points} / {needed} 个点。</translation>
+        <translation>触测{kind} {name}：{n_points} / {needed} 个点。</translation>
     </message>
     <message>
         <source>Probed points in the camera frame / mm</source>
@@ -6774,6 +6777,18 @@ mm</translation>
         <translation>{axis} 的 U</translation>
     </message>
     <message>
+        <source>Verifies scale and form, not the tip: all points were probed in alike postures, which show no tip error. Tilt the pen to all sides.</source>
+        <translation>只验证了尺度和形状，未验证测头：各点的姿态相近，显示不出测头误差。请向各个方向倾斜光笔。</translation>
+    </message>
+    <message>
+        <source>Verifies scale and form, not the tip: these points show only a tip error above {detectable:.4f} mm (probability 95 %), the limit is {limit:.4f} mm. Tilt the pen more, to all sides.</source>
+        <translation>只验证了尺度和形状，未验证测头：这些点只能显示大于 {detectable:.4f} mm 的测头误差（概率 95 %），限值为 {limit:.4f} mm。请向各个方向更大幅度地倾斜光笔。</translation>
+    </message>
+    <message>
+        <source>Verifies the tip: had it an error of {detectable:.4f} mm or more, this verification would show it (probability 95 %).</source>
+        <translation>测头已验证：若测头误差达到 {detectable:.4f} mm 或更大，本次验证会显示出来（概率 95 %）。</translation>
+    </message>
+    <message>
         <source>Zoom or focus changed at {name}: {before}; {after}. Mainly the focal lengths differ, so a change of the setting is likelier than another camera. Lock zoom and focus, and take all views again.</source>
         <translation>从 {name} 起变焦或对焦发生了变化：{before}；{after}。主要是焦距不同，因此设置改变比换了相机更有可能。请锁定变焦和对焦，重新拍摄所有视图。</translation>
     </message>
@@ -7095,7 +7110,7 @@ mm</translation>
     </message>
     <message>
         <source>{n} points are usable; a sphere needs at least {needed}, 25 are usual. Probe its upper half all over.</source>
-        <translation>可用点 {n} 个；球至少需要 {needed} 个，通常为 25 个。请在整个上半部探测。</translation>
+        <translation>可用点 {n} 个；球至少需要 {needed} 个，通常为 25 个。请在整个上半部触测。</translation>
     </message>
     <message>
         <source>{other} was calibrated with another LED file than {first}. Give calibrations of one pen with one LED file.</source>
@@ -7107,7 +7122,7 @@ mm</translation>
     </message>
     <message>
         <source>{part}: not all features were probed. Missing: {names}.</source>
-        <translation>{part}：并非所有要素都已探测。缺少：{names}。</translation>
+        <translation>{part}：并非所有要素都已触测。缺少：{names}。</translation>
     </message>
     <message>
         <source>{part}: {n_features} features measured; the plan has no tolerances.</source>
@@ -7207,11 +7222,11 @@ mm</translation>
     </message>
     <message>
         <source>The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point probed with it by only {of_point:.4f} mm. A calibration error would shift both alike, so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.</source>
-        <translation>测头在各次标定间的分散为 {of_tip:.4f} mm，而用其探测的固定点仅为 {of_point:.4f} mm。标定误差会使两者同样偏移，因此在各次标定之间光笔上有部件移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 测量是否过粗。</translation>
+        <translation>测头在各次标定间的分散为 {of_tip:.4f} mm，而用其触测的固定点仅为 {of_point:.4f} mm。标定误差会使两者同样偏移，因此在各次标定之间光笔上有部件移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 测量是否过粗。</translation>
     </message>
     <message>
         <source>The touches of {name} do not show its kind. Probe more points of it, or state its kind: {kinds}.</source>
-        <translation>{name} 的触测点无法确定其类型。请探测更多点，或指定类型：{kinds}。</translation>
+        <translation>{name} 的触测点无法确定其类型。请触测更多点，或指定类型：{kinds}。</translation>
     </message>
     <message>
         <source>The verification belongs to {result}, which is no longer current for tip {tip} of pen {pen}. Close the verification and start another one.</source>
@@ -8239,7 +8254,7 @@ mm</translation>
     </message>
     <message>
         <source>Next: probe more points with more images each, tilt the pen farther to all sides, and turn it.</source>
-        <translation>下一步：探测更多的点，每点更多图像，将光笔向各侧进一步倾斜并转动。</translation>
+        <translation>下一步：触测更多的点，每点更多图像，将光笔向各侧进一步倾斜并转动。</translation>
     </message>
     <message>
         <source>Next: repeat the calibration, with the tip seated anew each time.</source>
@@ -8271,7 +8286,7 @@ mm</translation>
     </message>
     <message>
         <source>Next: verify the tip in a fixed point, or probe again with the pen tilted and turned another way at each point.</source>
-        <translation>下一步：用固定点验证测头，或重新探测，每点以不同方式倾斜和转动光笔。</translation>
+        <translation>下一步：用固定点验证测头，或重新触测，每点以不同方式倾斜和转动光笔。</translation>
     </message>
     <message>
         <source>No Dask scheduler responds at {address}. Check the address, such as tcp://10.0.0.5:8786, and that the scheduler is running.</source>
@@ -8355,7 +8370,7 @@ mm</translation>
     </message>
     <message>
         <source>Position {position} shares {n_shared} datum points (points, circles, slots, spheres) with the positions before; at least {needed} are needed. Probe more of them again.</source>
-        <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、槽、球）；至少需要 {needed} 个。请再探测几个。</translation>
+        <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、槽、球）；至少需要 {needed} 个。请再触测几个。</translation>
     </message>
     <message>
         <source>Position {position}: datum points agree with the first position within {residual:.4f} mm.</source>
@@ -8395,7 +8410,7 @@ mm</translation>
     </message>
     <message>
         <source>Probe the ring all round and hold still on each point. Points: {n_touches}.</source>
-        <translation>沿环规整圈探测，在每个点上保持静止。点数：{n_touches}。</translation>
+        <translation>沿环规整圈触测，在每个点上保持静止。点数：{n_touches}。</translation>
     </message>
     <message>
         <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or capturing takes longer.</source>
@@ -8703,7 +8718,7 @@ mm</translation>
     </message>
     <message>
         <source>The feature {name} has {n_touches} touches; the plan needs {needed}. Probe the missing points.</source>
-        <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请探测缺少的点。</translation>
+        <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请触测缺少的点。</translation>
     </message>
     <message>
         <source>The file agrees with the images if it contains rig_from_cam; cam_from_rig is needed. For each camera transpose the rotation R and replace the translation t by -R^T t.</source>
@@ -9231,7 +9246,7 @@ mm</translation>
     </message>
     <message>
         <source>The touches of {name} come from both sides of the surface. Probe the feature again from one side.</source>
-        <translation>{name} 的测点来自表面的两侧。请从一侧重新探测该要素。</translation>
+        <translation>{name} 的测点来自表面的两侧。请从一侧重新触测该要素。</translation>
     </message>
     <message>
         <source>The touches of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
@@ -9243,7 +9258,7 @@ mm</translation>
     </message>
     <message>
         <source>The two points are {distance:.2f} mm apart; the certified length is {certified} mm. Probe its other end.</source>
-        <translation>两点相距 {distance:.2f} mm，校准长度为 {certified} mm。请探测其另一端。</translation>
+        <translation>两点相距 {distance:.2f} mm，校准长度为 {certified} mm。请触测其另一端。</translation>
     </message>
     <message>
         <source>The two recordings have different numbers of images. Choose two simultaneous recordings.</source>
@@ -9363,7 +9378,7 @@ mm</translation>
     </message>
     <message>
         <source>This place of the sphere was probed before. Probe it elsewhere.</source>
-        <translation>球的此处已探测过。请探测其他位置。</translation>
+        <translation>球的此处已触测过。请触测其他位置。</translation>
     </message>
     <message>
         <source>This posture was recorded before. Keep the tip in the cone and change the pen tilt.</source>
@@ -9472,18 +9487,6 @@ mm</translation>
     <message>
         <source>Verification complete. You can put the pen down.</source>
         <translation>验证完成。可以放下光笔。</translation>
-    </message>
-    <message>
-        <source>Verifies scale and form, not the tip: in these postures no tip error would be found (limit {limit:.4f} mm).</source>
-        <translation>仅验证比例和形状，不验证测头：在这些姿态下不会发现测头误差（限值 {limit:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Verifies scale and form, not the tip: only a tip error of {detectable:.4f} mm would be found with 95 % probability (limit {limit:.4f} mm).</source>
-        <translation>仅验证比例和形状，不验证测头：只有 {detectable:.4f} mm 的测头误差才会以 95 % 的概率被发现（限值 {limit:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Verifies the tip: an error of {detectable:.4f} mm would be found with 95 % probability.</source>
-        <translation>可验证测头：{detectable:.4f} mm 的误差会以 95 % 的概率被发现。</translation>
     </message>
     <message>
         <source>Version {version} of Lightpen is available. {text}</source>
@@ -9847,7 +9850,7 @@ mm</translation>
     </message>
     <message>
         <source>{n_points} points, circles, slots and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.</source>
-        <translation>已探测 {n_points} 个点、圆、槽和球；联系新位置需要 {needed} 个不共线的基准点。请重新开始。</translation>
+        <translation>已触测 {n_points} 个点、圆、槽和球；联系新位置需要 {needed} 个不共线的基准点。请重新开始。</translation>
     </message>
     <message>
         <source>{n_tips} calibrations do not suffice for a verdict on repeatability: {needed} are needed, and ten for control limits.</source>
@@ -10083,11 +10086,11 @@ mm</translation>
     </message>
     <message>
         <source>The lens deviates by {size:.3f} px (RMS) from its distortion model; the result is corrected and U includes the rest. Calibrate the camera with views that fill the image; its file then states the lens field.</source>
-        <translation>镜头偏离畸变模型 {size:.3f} px (RMS)；结果已修正，其余计入 U。请用充满图像的视图标定相机；其文件随后会给出镜头残差场。</translation>
+        <translation>镜头偏离畸变模型 {size:.3f} px（均方根）；结果已修正，其余计入 U。请用充满图像的视图标定相机；其文件随后会给出镜头残差场。</translation>
     </message>
     <message>
         <source>The pen tilt differs from that of the first visit, so this point does not count. Hold the pen as at the first visit, so that systematic errors of the pen cancel.</source>
-        <translation>光笔倾斜与首次探测时不同，因此此点不计入。请按首次的姿态握持光笔，使光笔的系统误差抵消。</translation>
+        <translation>光笔倾斜与首次触测时不同，因此此点不计入。请按首次的姿态握持光笔，使光笔的系统误差抵消。</translation>
     </message>
     <message>
         <source>The pen tilt differs from that of the points before, so this point does not count. Keep the tilt until the posture is complete.</source>
@@ -10099,7 +10102,7 @@ mm</translation>
     </message>
     <message>
         <source>The points cover too little of a sphere to determine it. Probe its upper half all over, from the pole to the equator.</source>
-        <translation>这些点覆盖的球面太小，无法确定球。请在整个上半部探测，从顶点到赤道。</translation>
+        <translation>这些点覆盖的球面太小，无法确定球。请在整个上半部触测，从顶点到赤道。</translation>
     </message>
     <message>
         <source>The points deviate by up to {form:.4f} mm from a sphere (limit {limit:.4f} mm): the tip slipped, the sphere is dirty, or the tip is wrong.</source>
@@ -10111,11 +10114,11 @@ mm</translation>
     </message>
     <message>
         <source>The points lie on no sphere: {n_off} of {n} are outliers, and the others deviate by up to {off:.2f} mm. Probe one sphere.</source>
-        <translation>这些点不在球面上：{n} 个中有 {n_off} 个离群点，其余最大偏差 {off:.2f} mm。请只探测一个球。</translation>
+        <translation>这些点不在球面上：{n} 个中有 {n_off} 个离群点，其余最大偏差 {off:.2f} mm。请只触测一个球。</translation>
     </message>
     <message>
         <source>The points of {run} are at more than two positions: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>
-        <translation>{run} 的点位于两个以上的位置：{touch} 与其所在端的其他点相距 {distance:.2f} mm。光笔是否在该处被抬起？请只探测两端。</translation>
+        <translation>{run} 的点位于两个以上的位置：{touch} 与其所在端的其他点相距 {distance:.2f} mm。光笔是否在该处被抬起？请只触测两端。</translation>
     </message>
     <message>
         <source>The seal {file} is missing: entries removed from the end of the archive cannot be detected.</source>
@@ -10562,6 +10565,14 @@ mm</translation>
         <translation>下次到期</translation>
     </message>
     <message>
+        <source>Practice: not used for any pen.</source>
+        <translation>练习：不用于任何光笔。</translation>
+    </message>
+    <message>
+        <source>Saved</source>
+        <translation>已保存</translation>
+    </message>
+    <message>
         <source>Status</source>
         <translation>状态</translation>
     </message>
@@ -10624,6 +10635,10 @@ mm</translation>
     <message>
         <source>SHA-256 of the previous entry</source>
         <translation>前一条目的 SHA-256</translation>
+    </message>
+    <message>
+        <source>practice</source>
+        <translation>练习</translation>
     </message>
     <message>
         <source>RETIRED</source>

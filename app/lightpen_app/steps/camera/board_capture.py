@@ -204,7 +204,7 @@ def sight_text(sight: BoardVisibility) -> str:
     words = {
         BoardVisibility.UNSEEN: translate("BoardWindow", "Board not detected"),
         BoardVisibility.MOVING: translate("BoardWindow", "Hold still."),
-        BoardVisibility.STILL: translate("BoardWindow", "Keep still."),
+        BoardVisibility.STILL: translate("BoardWindow", "Hold still."),
         BoardVisibility.KEPT: translate(
             "BoardWindow", "View captured. Align the board with the outline."
         ),

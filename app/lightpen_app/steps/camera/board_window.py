@@ -84,6 +84,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._worst_title = text_label(TextSize.SMALL, Tone.QUIET)
         self._worst = QListWidget()
         self._remove = PushButton()
+        self._outcome = QWidget()
         self._save = PushButton()
 
         # Layout
@@ -91,18 +92,21 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         side = vertical_layout(panel, self.board, self._print, margins=None)
         fill(side, self._measured_name, self._measured)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
-        fill(side, self._progress, self._count, self._compute, self._facts)
+        fill(side, self._progress, self._count, self._compute, (self._outcome, 1), 1)
+        outcome = vertical_layout(self._outcome, self._facts)
         horizontal_layout(
-            side, self._shows_residuals, self._shows_uncertainty, spacing=-1
+            outcome, self._shows_residuals, self._shows_uncertainty, spacing=-1
         )
-        fill(side, self._worst_title, (self._worst, 1), self._remove, self._save)
+        fill(outcome, self._worst_title, (self._worst, 1), self._remove)
         self._worst.setMinimumHeight(LEAST_LIST)
         scroll = PageScroll()
         scroll.setWidget(panel)
-        scroll.setFixedWidth(SIDE_WIDTH)
+        column = QWidget()
+        column.setFixedWidth(SIDE_WIDTH)
+        vertical_layout(column, (scroll, 1), self._save)
         layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
         vertical_layout(layout, (self._image, 1), self._remark, stretch=1, spacing=-1)
-        layout.addWidget(scroll)
+        layout.addWidget(column)
 
         # Connections
         live.image_shown.connect(self._on_image_shown)
@@ -250,7 +254,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._print.setText(self.tr("Print (PDF)..."))
         self._measured_name.setText(self.tr("Scale check (optional)"))
         self._measured.setAccessibleName(self.tr("Scale check (optional)"))
-        self._measured.setPlaceholderText("200 200.12 0.04")
+        self._measured.setPlaceholderText(self.tr("200 200.12 0.04 (mm)"))
         self._measured.setToolTip(
             self.tr(
                 "Measured with a caliper: stated length, measured length and its U "
@@ -296,6 +300,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._save.set_why_not("" if found is not None else nothing)
         is_chosen = found is not None and self._worst.currentItem() is not None
         self._remove.set_why_not("" if is_chosen else self.tr("Select a view."))
+        self._outcome.setVisible(found is not None)
         self._facts.setText("" if found is None else facts_text(found))
         for button in (self._shows_residuals, self._shows_uncertainty):
             button.setVisible(found is not None)

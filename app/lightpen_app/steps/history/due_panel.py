@@ -10,7 +10,7 @@ from lightpen.archive.history.due import DueTip
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.look.words import PARTED, moment_text, shortened
+from lightpen_app.look.words import PARTED, day_text, shortened
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -131,7 +131,7 @@ class DuePanel(Translated, QWidget):
     def _cells(self, tip: DueTip, now: datetime) -> tuple[str, ...]:
         days = (tip.calibrated, tip.due)
         return (
-            *(moment_text(day, "yyyy-MM-dd") for day in days),
+            *(day_text(day) for day in days),
             f"{tip.n_swings}",
             self.tr("No limit") if tip.n_left is None else f"{max(0, tip.n_left)}",
             self.tr("DUE") if tip.is_due(now) else self.tr("valid"),

@@ -198,7 +198,7 @@ class EntryPanel(Translated, QWidget):
         if line.entry is None:
             return ("",) * len(self._texts)
         entry, event = line.entry.entry, line.entry.entry.event
-        when = moment_text(event.at, self.tr("d MMMM yyyy, hh:mm"))
+        when = moment_text(event.at)
         kept = self.tr("Entry {0}, {1}, SHA-256 {2}").format(
             entry.number, event.program, line.entry.sha256[:SHORT]
         )
@@ -220,7 +220,7 @@ class EntryPanel(Translated, QWidget):
         lines = []
         for each in self._messages:
             event = each.entry.event
-            when = moment_text(event.at, "yyyy-MM-dd hh:mm")
+            when = moment_text(event.at)
             head = [kind_text(event.kind, event.grade), when, event.names.operator]
             heading = PARTED.join(filter(None, head))
             lines.append(f"{heading}: {event.reason}" if event.reason else heading)

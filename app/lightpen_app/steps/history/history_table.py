@@ -21,7 +21,7 @@ from typing_extensions import override
 from lightpen.archive.history.history import Line
 from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.phrases import grade_text
-from lightpen_app.look.quantities import decimals_for, number_text
+from lightpen_app.look.quantities import mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, set_size
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.reader import BLOCK
@@ -45,7 +45,7 @@ NAMED = {  # the least and the most that is shown whole, of what anybody may hav
     BY: ("A. Name", 16 * "n"),
 }
 MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
-CELL_MARGIN = 24  # px, beside the words
+CELL_MARGIN = 22  # px, beside the words
 LEAST_WORDS = 8 * GRID  # px, of the last column
 LEAST_ROWS = 5
 MOST_BLOCKS = 40  # that are kept
@@ -317,7 +317,7 @@ def _text(line: Line, column: int) -> str:
     event = line.entry.entry.event
     names = event.names
     if column == WHEN:
-        return moment_text(event.at, "yyyy-MM-dd hh:mm")
+        return moment_text(event.at)
     if column == VERDICT:
         return verdict_text(event.grade)
     if column in NUMBERS:
@@ -333,13 +333,12 @@ def _text(line: Line, column: int) -> str:
 
 
 def _number(line: Line, column: int) -> str:
-    """Return a coordinate of the tip, or the largest U, to the digits that count."""
+    """Return a coordinate of the tip, or the largest U."""
     assert line.entry is not None
     event = line.entry.entry.event
     tip, uncertainty = event.tip_pen_mm, event.expanded_uncertainty_mm
     if tip is None or uncertainty is None:
         return ""
     if column == U:
-        return number_text(max(uncertainty), decimals_for(max(uncertainty)))
-    axis = column - X
-    return number_text(tip[axis], decimals_for(uncertainty[axis]))
+        return mm_text(max(uncertainty))
+    return mm_text(tip[column - X])

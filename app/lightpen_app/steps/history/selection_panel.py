@@ -19,7 +19,7 @@ from lightpen.verification.history.trend import (
 from lightpen.verification.tasks.repeatability import Repeatability, RepeatedPoint
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import grid_layout
-from lightpen_app.look.quantities import AXES, decimals_for, number_text
+from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -31,7 +31,6 @@ from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 PAIR = 2
-DECIMALS = 4  # of mm
 
 
 class SelectionPanel(Translated, QWidget):
@@ -168,8 +167,7 @@ class SelectionPanel(Translated, QWidget):
             )
             return
         dates = [
-            moment_text(each.entry.event.at, "yyyy-MM-dd hh:mm")
-            for each in (found.earlier, found.later)
+            moment_text(each.entry.event.at) for each in (found.earlier, found.later)
         ]
         self._heads[0].setText(self.tr("{0} and {1}").format(*dates))
         columns = (
@@ -236,9 +234,9 @@ class SelectionPanel(Translated, QWidget):
         self._touched.setText(
             words.format(
                 len(touched.points),
-                moment_text(touched.when, "yyyy-MM-dd hh:mm"),
+                moment_text(touched.when),
                 *(
-                    ", ".join(number_text(float(x), DECIMALS) for x in each)
+                    ", ".join(mm_text(float(x)) for x in each)
                     for each in (touched.deviation, touched.expected_deviation)
                 ),
             )
@@ -248,20 +246,18 @@ class SelectionPanel(Translated, QWidget):
 def _compared_row(found: Comparison, axis: int) -> tuple[str, ...]:
     change = found.change
     uncertainty = float(change.expanded_uncertainty[axis])
-    decimals = decimals_for(uncertainty)
     values = []
     for each in (found.earlier, found.later):
         tip = each.entry.event.tip_pen_mm
         assert tip is not None
         values.append(tip[axis])
     values += [float(change.difference[axis]), uncertainty]
-    return tuple(number_text(value, decimals) for value in values)
+    return tuple(map(mm_text, values))
 
 
 def _scattered_row(found: Repeatability, axis: int) -> tuple[str, ...]:
     points = found.scatter.points[:, axis]
     deviation = float(found.scatter.deviation[axis])
-    decimals = decimals_for(deviation)
     stated = sum(float(tip.uncertainty[axis]) for tip in found.tips) / len(found.tips)
     values = (float(points.mean()), deviation, float(points.max() - points.min()))
-    return tuple(number_text(value, decimals) for value in (*values, stated))
+    return tuple(map(mm_text, (*values, stated)))

@@ -7,8 +7,10 @@ from lightpen.archive.history.history import Line, TipState
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.verification.tasks.registry import ALL_TASKS
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, origin_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 from lightpen_app.look.words import PARTED, listed
@@ -74,7 +76,7 @@ def what_text(line: Line) -> str:
     if event.origin in MARKED:
         words.append(origin_text(event.origin))
     if not words or event.kind is not Kind.ACCEPTED:
-        words.append(kind_text(event.kind, event.grade))
+        words.append(task_text(event) or kind_text(event.kind, event.grade))
     if line.state is TipState.IN_FORCE and event.is_simulated:
         words.append(_translated(_KEPT))
     elif line.state is not TipState.NONE:
@@ -90,7 +92,11 @@ def usual_words() -> tuple[str, ...]:
     """Return the usual remarks on a calibration, by origin of its images."""
     of_tips = (kind_text(Kind.ACCEPTED), *map(origin_text, MARKED))
     states = tuple(map(_translated, _STATES.values()))
-    return tuple(listed([word, state]) for word in of_tips for state in states)
+    verified = kind_text(Kind.VERIFICATION)
+    return (
+        *(listed([word, state]) for word in of_tips for state in states),
+        *(listed([origin_text(origin), verified]) for origin in MARKED),
+    )
 
 
 def rare_words() -> tuple[str, ...]:
@@ -112,6 +118,12 @@ def item_text(event: Event) -> str:
     if event.settings.get("is_retired"):
         words.append(_translated(_RETIRED))
     return PARTED.join(words)
+
+
+def task_text(event: Event) -> str:
+    """Return the name of the task that was verified; empty for all of them."""
+    kind = event.settings.get("verified")
+    return next((worded(task.title) for task in ALL_TASKS if task.kind == kind), "")
 
 
 def verdict_text(grade: str) -> str:

@@ -16,7 +16,7 @@ from lightpen.record.swings.solving import Solution
 from lightpen.swing.failed_swing import FailedSwing
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import share_text
-from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.quantities import AXES, MICROMETRES, micrometres_text, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
@@ -270,7 +270,7 @@ class UncertaintyPanel(PlotsPanel):
         self._budget.set_data(list(parts), *expanded.T)
         weakest = self.tr("Weakest direction ({0}): U = {1} µm").format(
             ", ".join(f"{share:.2f}" for share in budget.weakest_direction.tolist()),
-            _digits(budget.weakest_uncertainty * MICROMETRES),
+            micrometres_text(budget.weakest_uncertainty),
         )
         texts = [weakest]
         if any(share.assumed for share in budget.shares):
@@ -330,18 +330,17 @@ class MethodsPanel(PlotsPanel):
         joint = result_of(solution.calibration, "joint")
         paper = result_of(solution.calibration, "two-stage")
         joint_u, paper_u = joint.expanded_uncertainty, paper.expanded_uncertainty
-        within = np.hypot(joint_u, paper_u)
         rows = (
-            (self.tr("Joint fit"), joint.tip_pen, joint_u, joint.rms_mm),
-            (self.tr("U (k = 2)"), joint_u, joint_u, None),
-            (self.tr("Two-stage (paper)"), paper.tip_pen, paper_u, paper.rms_mm),
-            (self.tr("U (k = 2), noise only"), paper_u, paper_u, None),
-            (self.tr("Difference"), paper.tip_pen - joint.tip_pen, within, None),
+            (self.tr("Joint fit"), joint.tip_pen, joint.rms_mm),
+            (self.tr("U (k = 2)"), joint_u, None),
+            (self.tr("Two-stage (paper)"), paper.tip_pen, paper.rms_mm),
+            (self.tr("U (k = 2), noise only"), paper_u, None),
+            (self.tr("Difference"), paper.tip_pen - joint.tip_pen, None),
         )
         columns = (*(f"{axis} / mm" for axis in AXES), self.tr("RMS / mm"))
         cells = tuple(
-            (*_rounded(values[:3], u[:3]), "" if rms is None else f"{rms:.4f}")
-            for _, values, u, rms in rows
+            (*_rounded(values[:3]), "" if rms is None else mm_text(rms))
+            for _, values, rms in rows
         )
         return Figures(columns, tuple(name for name, *_ in rows), cells)
 
@@ -351,12 +350,6 @@ def _expanded(covariance: FloatArray) -> FloatArray:
     return COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[:3])
 
 
-def _digits(value: float) -> str:
-    """Return an uncertainty by two significant digits."""
-    return number_text(value, decimals_for(value))
-
-
-def _rounded(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:
-    """Return numbers, each to the digit that its uncertainty warrants."""
-    decimals = map(decimals_for, uncertainties.tolist())
-    return tuple(map(number_text, values.tolist(), decimals))
+def _rounded(values: FloatArray) -> tuple[str, ...]:
+    """Return lengths in mm."""
+    return tuple(map(mm_text, values.tolist()))

@@ -9,18 +9,17 @@ from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.self_check import SelfCheck
 from lightpen.estimation.reports.verdict import halves_agree
-from lightpen.local_time import local_time
 from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.quantities import AXES, micrometres_text, mm_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
-from lightpen_app.look.words import shortened
+from lightpen_app.look.words import day_text, shortened
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
@@ -177,15 +176,14 @@ class ResultPanel(Translated, QFrame):
         halves = solution.calibration.halves
         u = halves.expanded_uncertainty
         rows = self.tr("Odd - even"), self.tr("U (k = 2)")
-        return Figures(AXES, rows, (_texts(halves.difference, u), _texts(u, u)))
+        return Figures(AXES, rows, (_texts(halves.difference), _texts(u)))
 
     def _as_found_message(self, assessment: SwingAssessment) -> StatusMessage:
         """Return the deviation of the tip as found, with its limit."""
         change, last, limit = assessment.change, assessment.last, assessment.max_change
         if change is None or last is None:
             return StatusMessage(self.tr("No earlier result"), Sign.RING, Tone.PLAIN)
-        decimals = decimals_for(float(change.expanded_uncertainty.max()))
-        off = number_text(change.distance, decimals)
+        off = mm_text(change.distance)
         if limit is None:
             text = self.tr(
                 "As found: {0} mm from the previous calibration (no limit set)"
@@ -223,23 +221,21 @@ def _tip_value(outcome: ReviewedResult) -> TipValue:
     """Return the tip beside the previous and the nominal one, if known."""
     x, y, z = outcome.tip_pen.tolist()
     u_x, u_y, u_z = outcome.uncertainty.tolist()
-    u, assessment = outcome.uncertainty, outcome.assessment
+    assessment = outcome.assessment
     value = TipValue((x, y, z), (u_x, u_y, u_z))
     change, last = assessment.change, assessment.last
     if change is not None and last is not None:
         before = outcome.tip_pen - change.difference
         value = replace(
             value,
-            previous=_in_mm(before, u),
+            previous=_in_mm(before),
             change=_with_u(change.difference, change.expanded_uncertainty),
-            since=f"{local_time(last.accepted):%Y-%m-%d}",
+            since=day_text(last.accepted),
         )
     nominal = outcome.solution.source.pen.nominal_tip
     if nominal is not None:
         value = replace(
-            value,
-            nominal=tuple(f"{each:g}" for each in nominal.tolist()),
-            deviation=_in_mm(outcome.tip_pen - nominal, u),
+            value, nominal=_in_mm(nominal), deviation=_in_mm(outcome.tip_pen - nominal)
         )
     return value
 
@@ -258,26 +254,15 @@ def _postures(coverage: Coverage) -> DialValue:
 
 def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:
     """Return lengths in micrometres, each with its U."""
-    pairs = zip(_texts(values, u), _texts(u, u), strict=True)
+    pairs = zip(_texts(values), _texts(u), strict=True)
     return tuple(f"{value} \N{PLUS-MINUS SIGN} {within}" for value, within in pairs)
 
 
-def _in_mm(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:
-    """Return lengths in mm, to the digit that their uncertainty warrants."""
-    pairs = zip(values.tolist(), uncertainties.tolist(), strict=True)
-    return tuple(number_text(value, decimals_for(u)) for value, u in pairs)
+def _in_mm(values: FloatArray) -> tuple[str, ...]:
+    """Return lengths in mm."""
+    return tuple(map(mm_text, values.tolist()))
 
 
-def _texts(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:
-    """Return lengths in micrometres, to the digit that their uncertainty warrants."""
-    pairs = zip(
-        (values * MICROMETRES).tolist(),
-        (uncertainties * MICROMETRES).tolist(),
-        strict=True,
-    )
-    return tuple(number_text(v, min(decimals_for(u), _room(v))) for v, u in pairs)
-
-
-def _room(value: float) -> int:
-    """Return the number of decimals that fit a column."""
-    return 3 if abs(value) < 100 else 1 if abs(value) < 1000 else 0
+def _texts(values: FloatArray) -> tuple[str, ...]:
+    """Return lengths in micrometres."""
+    return tuple(map(micrometres_text, values.tolist()))

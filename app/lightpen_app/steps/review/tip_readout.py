@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import grid_layout
-from lightpen_app.look.quantities import AXES, decimals_for, number_text
+from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.widgets.translated import Translated
 
@@ -63,7 +63,7 @@ class TipReadout(Translated, QWidget):
         self._heads = [_number_label(TextSize.SMALL, Tone.QUIET) for _ in range(6)]
 
         # Layout
-        layout = grid_layout(self, spacing=(GRID // 2, 0))
+        self._layout = layout = grid_layout(self, spacing=(GRID, 0))
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBaseline
         columns = self._numbers, self._uncertainties, *self._compared
         for column, (head, labels) in enumerate(
@@ -98,8 +98,11 @@ class TipReadout(Translated, QWidget):
         self._retranslate()
         columns = ((),) * 4 if value is None else value.comparisons()
         labels = self._heads[2:], self._compared, columns
-        for head, cells, texts in zip(*labels, strict=True):
+        for column, (head, cells, texts) in enumerate(zip(*labels, strict=True), 3):
             head.setVisible(bool(texts))
+            self._layout.setColumnStretch(
+                column, int(bool(texts))
+            )  # else it keeps a gap
             for cell, text in zip(cells, texts or BLANK, strict=True):
                 cell.setText(text)
                 cell.setVisible(bool(texts))
@@ -109,9 +112,8 @@ class TipReadout(Translated, QWidget):
                 number.clear()
                 uncertainty.clear()
                 continue
-            decimals = decimals_for(value.uncertainty[row])
-            number.setText(number_text(value.tip[row], decimals))
-            within = number_text(value.uncertainty[row], decimals)
+            number.setText(mm_text(value.tip[row]))
+            within = mm_text(value.uncertainty[row])
             uncertainty.setText(f"\N{PLUS-MINUS SIGN} {within}")
             number.setAccessibleName(f"{axis} = {number.text()} mm")
             uncertainty.setAccessibleName(f"{uncertainty.text()} mm")

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
-from lightpen.local_time import local_time
 from lightpen.messages import Message
 from lightpen.model.origin import Origin
 from lightpen.record.results.results import Result
@@ -18,7 +17,7 @@ from lightpen_app.look.phrases import accepted_phrase, grade_text, phase_text, p
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import shortened
+from lightpen_app.look.words import moment_text, shortened
 from lightpen_app.steps.page import MainAction
 from lightpen_app.widgets.question_bar import Question
 from lightpen_app.widgets.sign_label import StatusMessage
@@ -323,15 +322,14 @@ def step_of_file(reason: Message) -> str:
 
 def _accepted_state(result: Result) -> State:
     translate = QCoreApplication.translate
-    since = f"{local_time(result.accepted):%Y-%m-%d %H:%M:%S}"
     accepted = accepted_phrase(result.origin)
     text = translate(
-        "ReviewPage", "Current since {0}. Earlier results stay in the archive."
-    ).format(since)
+        "ReviewPage", "Saved {0}. Earlier results stay in the archive."
+    ).format(moment_text(result.accepted))
     if result.reason:
         text = translate(
-            "ReviewPage", "Current since {0}, check needed. Reason for acceptance: {1}"
-        ).format(since, result.reason)
+            "ReviewPage", "Saved {0}, check needed. Reason for acceptance: {1}"
+        ).format(moment_text(result.accepted), result.reason)
     sign, tone = GRADE_MARKS[result.grade]
     return State(
         accepted.short, " ".join(filter(None, (accepted.hint, text))), sign, tone

@@ -63,7 +63,7 @@ class InterruptedRow(InterruptedItem):
             case DamagedSwing(folder):
                 return self.tr("Damaged: {0}").format(shortened(folder.name))
             case Record(header=header):
-                return moment_text(header.created, self.tr("d MMM yyyy, hh:mm"))
+                return moment_text(header.created)
 
     def _description(self) -> str:
         if isinstance(self._swing, DamagedSwing):
@@ -101,7 +101,7 @@ class VerificationRow(InterruptedItem):
         under_way = self._found.under_way
         if under_way is None:
             return self.tr("Damaged: {0}").format(shortened(self._found.path.stem))
-        return moment_text(under_way.began, self.tr("d MMM yyyy, hh:mm"))
+        return moment_text(under_way.began)
 
     def _description(self) -> str:
         under_way, fault = self._found.under_way, self._found.fault

@@ -20,7 +20,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.phrases import grade_text
-from lightpen_app.look.quantities import AXES, decimals_for, number_text
+from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
@@ -252,18 +252,16 @@ class LastResultPanel(Translated, QGroupBox):
         self._grade.set_value(
             StatusMessage(grade_text(result.grade), *GRADE_MARKS[result.grade])
         )
-        when = moment_text(result.accepted, self.tr("d MMMM yyyy, hh:mm"))
+        when = moment_text(result.accepted)
         by = shortened(result.names.operator)
         self._when.setText(PARTED.join(filter(None, (when, by))))
         heads = ("", self.tr("Tip centre / mm"), self.tr("U (k = 2) / mm"))
         for head, text in zip(self._heads, heads, strict=True):
             head.setText(text)
         for axis in range(3):
-            uncertainty = float(result.uncertainty[axis])
-            decimals = decimals_for(uncertainty)
-            tip = number_text(float(result.tip_pen[axis]), decimals)
-            self._tip[axis].setText(tip)
-            self._uncertainty[axis].setText(number_text(uncertainty, decimals))
+            self._tip[axis].setText(mm_text(float(result.tip_pen[axis])))
+            uncertainty = mm_text(float(result.uncertainty[axis]))
+            self._uncertainty[axis].setText(uncertainty)
         self._origin.set_value(origin_message(result.origin))
         self._reason.set_value(self._reason_of(result))
         self._warning.set_value(self._warning_of(result, now))

@@ -23,12 +23,14 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.part_view import PartView, part_value
 from lightpen_app.steps.verify.ring_view import RingValue, RingView
 from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 
 MOST_TABLES = 2  # of a task; others are only printed
 NOWHERE = Qt.AlignmentFlag(0)  # but all over
+LEAST_HEIGHT = 16 * GRID  # px, of the results
 DIAL_SIZE = 22 * GRID  # px
 PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 5, 9, 13  # of the width
 
@@ -154,13 +156,22 @@ class TaskFinding(ResponsiveLayout, QWidget):
         self._pictured = None if self._picture is None else self._picture.make()
         self._tables = tuple(FiguresView() for _ in range(MOST_TABLES))
 
-        # Layout
-        self._columns = horizontal_layout(self, spacing=2 * GRID)
+        # Layout: only tables scroll; those of a part are as wide as the page and have
+        # the picture below
+        results, scroll = QWidget(), PageScroll()
+        scroll.setMinimumHeight(LEAST_HEIGHT)
+        self._side = horizontal_layout(results, *self._tables, spacing=2 * GRID)
+        is_part = task is PART
+        content = QWidget() if is_part else results
+        scroll.setWidget(ShrinkingScrollContent(content))
+        self._columns = horizontal_layout(
+            content if is_part else self, spacing=2 * GRID
+        )
         if self._pictured is not None:
             fill(self._columns, self._pictured)
-        self._side = horizontal_layout(
-            self._columns, *self._tables, spacing=2 * GRID, stretch=TABLES_SHARE
-        )
+        fill(self._columns, (results if is_part else scroll, TABLES_SHARE))
+        if is_part:
+            vertical_layout(self, scroll)
         self._use_room()
 
     def set_value(self, setup: SessionSetup | None, state: SessionState | None) -> None:
@@ -175,6 +186,8 @@ class TaskFinding(ResponsiveLayout, QWidget):
             if self._pictured is not None and self._picture is not None:
                 value = self._picture.value(setup, state, self._task)
                 self._pictured.set_value(value)
+        if is_found and self._task is not PART:  # the summary first
+            tables = tuple(sorted(tables[:MOST_TABLES], key=_is_of_points))
         for index, view in enumerate(self._tables):
             view.set_value(tables[index] if index < len(tables) else None)
 
@@ -198,11 +211,9 @@ class TaskFinding(ResponsiveLayout, QWidget):
             direction.TopToBottom if is_stacked else direction.LeftToRight
         )
         self._columns.setDirection(
-            direction.LeftToRight
-            if not (is_narrow and is_part)
-            else direction.BottomToTop  # results first
-            if self._is_found
-            else direction.TopToBottom  # the next point first
+            direction.BottomToTop
+            if is_narrow and is_part and self._is_found
+            else direction.LeftToRight
         )
         self._side.setStretch(0, 0 if is_stacked else 1)
         self._side.setStretch(1, 1)
@@ -254,6 +265,11 @@ def live_posture(setup: SessionSetup, state: SessionState) -> Posture | None:
     if not touching.held or touching.n_lost:
         return None
     return posture_of(setup.instrument.pen, touching.held[-1].frame.rotation)
+
+
+def _is_of_points(table: ResultTable) -> bool:
+    name = table.rows[0].name if table.rows else ""
+    return isinstance(name, Message) and name.code == "table.point"
 
 
 def _words(name: Message | str) -> str:

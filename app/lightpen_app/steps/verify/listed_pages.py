@@ -59,7 +59,7 @@ class ListedPages(ResponsiveLayout, QWidget):
         self._list = QListWidget()
         self._list.setObjectName("task_list")
         self._list.setItemDelegate(_Cards(self))
-        self._list.setSpacing(GRID // 4)
+        self._list.setSpacing(1)
         self._list.setFrameShape(QFrame.Shape.NoFrame)
         never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self._list.setHorizontalScrollBarPolicy(never)

@@ -12,6 +12,7 @@ from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen_app.look.quantities import number_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.steps.verify.presenter import VerifyPresenter
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -32,7 +33,12 @@ class MeasurePresenter(VerifyPresenter):
         if status.setup is None or status.state is None or value.fraction is None:
             return value
         place = self._live_tip(status.setup, status.state)
-        return replace(value, count=place) if place else value
+        banner = replace(value.state, detail=place or value.state.detail)
+        if status.task is PART and PART.count is not None:  # the hint names the feature
+            options = status.setup.choices.options_of(PART)
+            progress = status.state.progress(status.setup, PART)
+            value = replace(value, count=worded(PART.count(options, progress)))
+        return replace(value, state=banner)
 
     def _live_tip(self, setup: SessionSetup, state: SessionState) -> str:
         """Return the tip with its U at the present pose; empty if it is not seen."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QPointF, QSize
+from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -148,6 +148,9 @@ class PartView(Translated, QWidget):
             [value.points, *value.outlines, *(m[None] for m in marks)]
         )
         if not len(all_):
+            painter.setPen(QColor(colors.muted))
+            place = Qt.AlignmentFlag.AlignCenter
+            painter.drawText(self.rect(), place, self.tr("No points yet"))
             return
         flat = all_ @ self._turn.T
         low, high = flat[:, :2].min(axis=0), flat[:, :2].max(axis=0)

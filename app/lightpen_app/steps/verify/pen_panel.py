@@ -323,7 +323,7 @@ class PenPanel(Translated, QWidget):
         for swing, judged in list(zip(found.swings, health.swings, strict=True))[
             -LATEST:
         ]:
-            names.append(moment_text(swing.when, "yyyy-MM-dd hh:mm"))
+            names.append(moment_text(swing.when))
             lengths = np.linalg.norm(judged.shifts, axis=1) * MICROMETRES
             moves = (number_text(x, 0) if np.isfinite(x) else "" for x in lengths)
             growth = judged.growth

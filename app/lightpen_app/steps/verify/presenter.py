@@ -121,9 +121,15 @@ class VerifyPresenter(QObject):
         if status.tip is None:
             return self._purpose()
         tip = status.tip
-        when = moment_text(tip.calibration.when, self.tr("d MMMM yyyy, hh:mm"))
-        words = self.tr("Tip {0} of pen {1}, in use since {2}").format(
-            shortened(tip.names.tip), shortened(tip.names.pen), when
+        is_practice = self._selection.preparation.origin is Origin.SIMULATED
+        words = (
+            self.tr("Practice tip {0} of pen {1}, saved {2}")
+            if is_practice
+            else self.tr("Tip {0} of pen {1}, in use since {2}")
+        ).format(
+            shortened(tip.names.tip),
+            shortened(tip.names.pen),
+            moment_text(tip.calibration.when),
         )
         doubt = grade_text(Grade.CHECK) if self._tip_is_doubted() else ""
         files = ", ".join(file.name for file in status.files)
@@ -189,7 +195,9 @@ class VerifyPresenter(QObject):
             hint = self.tr("Measuring the points in the recorded images.")
             return Instruction(self.tr("Reading images"), hint)
         if status.refusal is not None:
-            return Instruction(self._refused(), worded(status.refusal))
+            is_possible = status.tip is not None  # once the missing value is entered
+            short = self.tr("Enter the value") if is_possible else self._refused()
+            return Instruction(short, worded(status.refusal))
         if setup is None or state is None:
             return Instruction(self.tr("Wait"), self.tr("Reading the current tip."))
         if status.assessment is not None and status.is_done:
@@ -226,7 +234,7 @@ class VerifyPresenter(QObject):
         if is_at_rest(state):
             return self.tr("Pick up the pen")
         if touching.phase is ProbingPhase.KNOWN:
-            return self.tr("Probed before")
+            return self.tr("Probe elsewhere")
         if state.fault is not None:
             is_broken = state.fault.code == BROKEN_OFF.code
             return self.tr("Not recorded") if is_broken else self.tr("Not counted")

@@ -36,8 +36,8 @@ STATE_HEIGHT = 9 * GRID  # px, at least
 PLACES = {
     "_instruction": (0, 0),
     "_hint": (1, 0),
-    "_state": (0, 1, 2, 1),
-    "_buttons": (2, 0, 1, 2),
+    "_buttons": (2, 0),
+    "_state": (0, 1, 3, 1),
 }
 NARROW_PLACES = {
     "_instruction": (0, 0),
@@ -89,7 +89,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         )
         vertical_layout(self._numbers, self._count, self._progress, spacing=GRID // 2)
         buttons = self._accept, self._report, self._act, self._undo, self._start_over
-        horizontal_layout(self._buttons, 1, *buttons)
+        horizontal_layout(self._buttons, *buttons, 1)
         fill(layout, self._lamps)
         self._use_room()
 
@@ -119,7 +119,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._numbers.setVisible(operator.fraction is not None)
         self._progress.setValue(round(PROGRESS_STEPS * (operator.fraction or 0.0)))
         self._act.setText(view.pause)
-        self._act.setEnabled(view.task is not None)
+        self._act.setVisible(view.task is not None)
+        self._undo.setVisible(view.task is not None)
         self._undo.setEnabled(view.can_undo)
         self._accept.setVisible(view.can_be_accepted)
         self._report.setVisible(view.has_report)

@@ -151,7 +151,8 @@ class TaskForm(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._is_chosen.setText(worded(self._task.purpose))
+        purpose = worded(self._task.purpose)
+        self._is_chosen.setText(self.tr("Include: {0}").format(purpose))
         fields = self._fields.values()
         for option, label, field in zip(
             self._options, self._labels, fields, strict=True

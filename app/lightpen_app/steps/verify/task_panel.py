@@ -11,16 +11,12 @@ from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.theme import GRID
 from lightpen_app.steps.verify.findings import TaskFinding
 from lightpen_app.steps.verify.images_row import ImagesRow
 from lightpen_app.steps.verify.task_form import TaskForm
-from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-
-LEAST_HEIGHT = 16 * GRID  # px, of the results
 
 
 class TaskPanel(Translated, QWidget):
@@ -53,12 +49,10 @@ class TaskPanel(Translated, QWidget):
         self._form = TaskForm(task, self._recorded, self._anew)
         self._verdict = SignLabel()
         self._images = ImagesRow()
-        scroll = PageScroll()
-        scroll.setWidget(ShrinkingScrollContent(self._finding))
-        scroll.setMinimumHeight(LEAST_HEIGHT)
 
         # Layout
-        vertical_layout(self, self._form, self._images, self._verdict, (scroll, 1))
+        rows = self._form, self._images, self._verdict, (self._finding, 1)
+        vertical_layout(self, *rows)
 
         # Connections
         self._form.value_changed.connect(self._on_form_changed)

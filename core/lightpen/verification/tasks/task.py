@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.messages import Message, message
+from lightpen.messages import Message, Number, message
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import NO_DRIFT, ProbedPoint
@@ -196,7 +196,7 @@ class ResultRow:
         return tuple(
             x or ""
             if x is None or isinstance(x, str)
-            else f"{round(x, self.decimals) + 0.0:.{self.decimals}f}"
+            else f"{Number(x):.{self.decimals}f}"
             for x in self.values
         )
 

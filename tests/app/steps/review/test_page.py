@@ -1417,7 +1417,7 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     np.testing.assert_array_equal(result.tip_pen, tip(workbench))
     state = banner(page)
     assert state.word == "IN USE"
-    assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M:%S}" in state.detail
+    assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M}" in state.detail
     assert page.is_complete()
     assert page.unsaved() == ""
     assert "No earlier result" in reported_of_result(page)  # not compared with itself

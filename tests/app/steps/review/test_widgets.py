@@ -48,16 +48,16 @@ def test_zero_has_no_sign() -> None:
     assert number_text(-0.5, 1) == "-0.5"
 
 
-def test_each_coordinate_has_the_digits_of_its_own_uncertainty(qtbot: QtBot) -> None:
+def test_coordinates_have_the_digits_of_the_sentences(qtbot: QtBot) -> None:
     readout = TipReadout()
     qtbot.addWidget(readout)
 
     readout.set_value(TipValue((-1.319796, -90.40969, 0.0), (0.00011, 0.0031, 0.02)))
 
     assert readout.texts() == (
-        "-1.31980 \xb1 0.00011",
+        "-1.3198 \xb1 0.0001",
         "-90.4097 \xb1 0.0031",
-        "0.000 \xb1 0.020",
+        "0.0000 \xb1 0.0200",
     )
     readout.set_value(None)
     assert {text.strip() for text in readout.texts()} == {""}

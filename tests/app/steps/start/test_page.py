@@ -669,7 +669,7 @@ def test_the_tip_in_force_is_shown_with_age_verdict_and_uncertainty(
 
     assert (age, verdict) == ("12 days ago", "PASS")
     assert when.endswith("  \u00b7  Ann")
-    assert table == ["x -1.3182 0.0031", "y -90.410 0.012", "z -23.85 0.10"]
+    assert table == ["x -1.3182 0.0031", "y -90.4095 0.0121", "z -23.8548 0.0998"]
 
 
 def test_on_a_large_screen_the_tip_in_force_is_reported_in_larger_figures(
