@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence
+from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
 from PySide6.QtWidgets import QDialog, QGraphicsView, QWidget
 from typing_extensions import override
@@ -93,6 +93,13 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         if self._saving is None:  # else it reports it first
             self.deleteLater()
 
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        else:
+            super().keyPressEvent(event)
+
     def n_pages(self) -> int:
         """Return the number of pages."""
         return self._pages.pageCount()
@@ -105,7 +112,6 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._save.setText(self.tr("Save as PDF..."))
         self._print.setText(self.tr("Print..."))
         self._close.setText(self.tr("Close"))
-        self._close.setShortcut(QKeySequence.StandardKey.Cancel)  # a text takes it away
 
     def _ask_file(self) -> None:
         path = self._place.folder() / f"{self._stem}.pdf"

@@ -45,14 +45,10 @@ MARK_HEIGHT = 3 * GRID  # px, below a saved plot
 LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = 6 * GRID  # px that a title leaves free, as for a button
 LEAST_TITLE = 9  # px
-LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
 SIDE = 0.045  # of many numbered items, beside the first and the last
 N_LEAST = 10  # a trace has room for whole multiples, so that its numbers are whole
 MARGIN = 0.06  # of the range, left free around the data
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
-
-PLACES = (0.2, 0.8)  # of the width, where the words of a limit may stand
-ABOVE, BELOW = (0.5, 1.0), (0.5, 0.0)  # which point of the words is on the line
 
 Column: TypeAlias = FloatArray | tuple[str, ...]
 
@@ -333,15 +329,9 @@ class TracePlot(Plot):
             curve.setSegmentedLineMode("on")
             self._item.addItem(curve)
             self._curves.append(curve)
-        # Decades are for what falls to its limit: at the left there is room for words.
-        place = 0.2 if y_log else 0.8
-        words = {"position": place}
-        self._limit = pg.InfiniteLine(angle=0, movable=False, label="", labelOpts=words)
-        self._limit.label.setFont(font(TextSize.SMALL))
-        self._limit.label.textItem.document().setDocumentMargin(1)
+        self._limit = pg.InfiniteLine(angle=0, movable=False)
         self._limit.hide()
         self._item.addItem(self._limit)
-        self._item.vb.sigResized.connect(self._on_area_resized)
         self._restyle()
 
     def set_names(self, *names: str) -> None:
@@ -357,26 +347,18 @@ class TracePlot(Plot):
             curve.setData(x, height, connect="finite")
         self._show_range()
 
-    def set_limit(self, value: float | None, text: str = "") -> None:
-        """Draw a limit line with words on it, or none."""
+    def set_limit(self, value: float | None) -> None:
+        """Draw a limit line, or none."""
         assert self._limit is not None
         self._limit_at = value
         self._limit.setVisible(value is not None)
         if value is not None:
             self._limit.setValue(float(self._height(np.array([value]))[0]))
-            self._limit.label.setFormat(text)
         if not len(next(iter(self._columns.values()), ())):
             self._show_nothing()
-        self._place_words()
-
-    def words_cover(self) -> float:
-        """Return the part of the curves that the limit's label covers, px."""
-        assert self._limit is not None
-        label = self._limit.label
-        return self._n_covered(label.orthoPos, label.anchors[0])
 
     def _show_range(self) -> None:
-        """Set the range to show all that is required, and the label of the limit."""
+        """Set the range to show all that is required."""
         x, *values = map(np.asarray, self._columns.values())
         if not len(x):
             self._show_nothing()
@@ -385,24 +367,16 @@ class TracePlot(Plot):
         n_hidden = int((1 - self._tail) * len(x))
         in_sight = [self._height(value)[n_hidden:] for value in values]
         if self._limit_at is not None:
-            reach = (1.0, LABEL_ROOM if self._y_log else 1.0)
-            in_sight.append(self._height(self._limit_at * np.array(reach)))
+            in_sight.append(self._height(np.array([self._limit_at])))
         n_steps = max(math.ceil((x.max() - x.min() + 1) / N_LEAST), 1)
         room = np.append(x, x.min() + n_steps * N_LEAST - 1)
         self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero, is_rounded=True)
-        self._place_words()
-        if self._limit_at is not None and self.words_cover():
-            self._make_room()
-
-    def _on_area_resized(self) -> None:
-        if self._columns:
-            self._show_range()
 
     def _show_nothing(self) -> None:
         """Show the axes without numbers, and the limit."""
         top = np.ones(1)
         if self._limit_at is not None and self._y_log:
-            top = np.maximum(top, self._height(np.array([LABEL_ROOM * self._limit_at])))
+            top = np.maximum(top, self._height(np.array([self._limit_at])))
         y_range = (0.0, float(top[0]))
         self._show_numbers(False)
         self._item.setRange(xRange=(1, N_LEAST), yRange=y_range, padding=0.01)
@@ -410,51 +384,6 @@ class TracePlot(Plot):
     def _show_numbers(self, shown: bool) -> None:
         for side in ("left", "bottom"):
             self._item.getAxis(side).setStyle(showValues=shown)
-
-    def _place_words(self) -> None:
-        """Put the words of the limit where they cover the least of the curves."""
-        if self._limit is None or self._limit_at is None:
-            return
-        label = self._limit.label
-        sides = (BELOW, ABOVE)
-        if self._limit.value() < sum(self.ranges()[1]) / 2:
-            sides = (ABOVE, BELOW)
-        firsts = PLACES if self._y_log else PLACES[::-1]
-        tried = [(place, side) for side in sides for place in firsts]
-        place, side = min(tried, key=lambda each: self._n_covered(*each))
-        label.anchors = [side, side]
-        label.setPosition(place)
-
-    def _make_room(self) -> None:
-        """Extend the range below the limit so that its label is under the curves."""
-        assert self._limit is not None
-        (_, _), (low, high) = self.ranges()
-        words = self._limit.label.textItem.boundingRect()
-        share = min(words.height() / max(self._item.vb.height(), 1.0), 0.75)
-        needed = (self._limit.value() - share * high) / (1 - share)
-        self._item.setYRange(min(low, needed), high, padding=0.01)
-        self._place_words()
-
-    def _n_covered(self, place: float, side: tuple[float, float]) -> float:
-        """Return the part of curves and edges that a label would cover, px."""
-        assert self._limit is not None
-        (left, right), (low, high) = self.ranges()
-        area, words = self._item.vb, self._limit.label.textItem.boundingRect()
-        x_scale = area.width() / (right - left)
-        y_scale = area.height() / (high - low)
-        top = (high - self._limit.value()) * y_scale - side[1] * words.height()
-        middle = place * area.width()
-        bottom = top + words.height()
-        outside = max(-top, 0.0) + max(bottom - area.height(), 0.0)
-        columns = np.arange(middle - words.width() / 2, middle + words.width() / 2)
-        covered = 0
-        for curve in self._curves:
-            x, y = curve.getData()
-            if x is None or len(x) < 2:
-                continue
-            rows = (high - np.interp(columns / x_scale + left, x, y)) * y_scale
-            covered += int(np.sum((rows >= top) & (rows <= bottom)))
-        return float(covered + area.width() * outside)
 
     def _height(self, values: FloatArray) -> FloatArray:
         """Return the drawn values (N,)."""
@@ -472,7 +401,6 @@ class TracePlot(Plot):
         if self._limit is not None:
             pen = pg.mkPen(colors.muted, width=1, style=Qt.PenStyle.DashLine)
             self._limit.setPen(pen)
-            self._limit.label.setColor(QColor(colors.muted))
 
     @override
     def _named_curves(self) -> tuple[str, ...]:

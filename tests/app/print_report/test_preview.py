@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QThreadPool
+from PySide6.QtCore import Qt, QThreadPool
 from PySide6.QtPrintSupport import QPrinter
-from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QGraphicsView, QPushButton
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
@@ -37,6 +37,21 @@ def test_all_pages_are_shown(
     printed: Callable[..., PrintReport],
 ) -> None:
     qtbot.waitUntil(lambda: window.n_pages() == printed(result).n_pages)
+
+
+def test_escape_closes_it_and_nothing_is_scrolled_to_the_sides(
+    qtbot: QtBot, window: PrintReportWindow
+) -> None:
+    qtbot.waitUntil(lambda: window.n_pages() > 1)
+    pages = window.findChild(QGraphicsView)
+    assert pages is not None
+    assert pages.horizontalScrollBar().maximum() == 0
+
+    with qtbot.waitActive(window):
+        window.activateWindow()
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+
+    assert not window.isVisible()
 
 
 def test_it_is_saved_where_it_is_wanted(

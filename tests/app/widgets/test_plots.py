@@ -56,7 +56,7 @@ def trace(qtbot: QtBot) -> TracePlot:
 
 
 def test_the_range_holds_all_data_the_zero_and_the_limit(trace: TracePlot) -> None:
-    trace.set_limit(0.2, "limit 0.2")
+    trace.set_limit(0.2)
     trace.set_data(IMAGES, VALUES)
 
     (left, right), (bottom, top) = trace.ranges()

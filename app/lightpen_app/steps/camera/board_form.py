@@ -95,6 +95,11 @@ def _cells(board: Board) -> tuple[np.ndarray, float]:
     return lattice[(x + y).ravel() % 2 == 0] * board.pitch, board.pitch
 
 
+# Row and column of kind, dictionary, columns, rows, pitch and detail: most boards have
+# no dictionary and no detail.
+PLACES = (0, 0), (2, 1), (1, 0), (1, 1), (0, 1), (2, 0)
+
+
 class BoardForm(Translated, QWidget):
     """Kind, columns, rows and lengths of a board.
 
@@ -134,8 +139,8 @@ class BoardForm(Translated, QWidget):
 
         # Layout
         layout = grid_layout(self, spacing=(GRID, GRID))
-        for i, (label, field) in enumerate(zip(self._labels, fields, strict=True)):
-            add_labelled(layout, label, field, at=divmod(i, 2))
+        for label, field, place in zip(self._labels, fields, PLACES, strict=True):
+            add_labelled(layout, label, field, at=place)
         layout.addWidget(self._picture, 3, 0, 1, 2)
         layout.setColumnStretch(0, 1)
         layout.setColumnStretch(1, 1)

@@ -103,8 +103,9 @@ class SwingPlots(Translated, QWidget):
 
     def _show_uncertainty(self, state: SwingState, max_uncertainty: float) -> None:
         trace = state.trace
-        self._limit = MICROMETRES * max_uncertainty
-        self._show_limit()
+        if self._limit != MICROMETRES * max_uncertainty:
+            self._limit = MICROMETRES * max_uncertainty
+            self._show_limit()
         finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
         floors = np.where(np.isfinite(finite), trace.floors, np.nan)
         self._uncertainty.set_data(
@@ -113,16 +114,18 @@ class SwingPlots(Translated, QWidget):
         )
 
     def _show_limit(self) -> None:
+        title = self.tr("U (k = 2) / µm")
         if self._limit is not None:
-            words = self.tr("limit {0}").format(f"{self._limit:g}")
-            self._uncertainty.set_limit(self._limit, words)
+            limit = self.tr("limit {0}").format(f"{self._limit:g}")
+            title = f"{title}, {limit}"
+        self._uncertainty.set_limit(self._limit)
+        self._uncertainty.set_axes(Axes(title))
 
     def _retranslate(self) -> None:
         """Translate the titles."""
         self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
-        self._uncertainty.set_axes(Axes(self.tr("U (k = 2) / µm")))
         self._uncertainty.set_names("U", self.tr("lowest achievable"))
         self._show_limit()
 

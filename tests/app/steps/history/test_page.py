@@ -266,6 +266,23 @@ def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
     ]
 
 
+def test_the_tasks_of_a_verification_are_told_apart(desk: Desk) -> None:
+    logbook = desk.workbench.run.logbook.opened()
+    for n, verified in enumerate(("conclusion", "circle", "fixed point")):
+        event = Event(
+            kind=Kind.VERIFICATION,
+            at=NOON + timedelta(days=n),
+            names=names("T-10"),
+            program="lightpen 1",
+            grade=Grade.PASS,
+            settings={"verified": verified},
+        )
+        append(logbook.database, logbook.chain, event)
+    desk.open()
+
+    assert desk.column(WHAT) == ["Fixed point", "Ring", "Verification"]
+
+
 @pytest.mark.slow
 def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk: Desk,
