@@ -4979,12 +4979,12 @@ needed</source>
         <translation>测头估计值 / µm</translation>
     </message>
     <message>
-        <source>U (k = 2) / µm</source>
-        <translation>U (k = 2) / µm</translation>
+        <source>achievable</source>
+        <translation>可达到</translation>
     </message>
     <message>
-        <source>lowest achievable</source>
-        <translation>可达到的最小值</translation>
+        <source>U (k = 2) / µm</source>
+        <translation>U (k = 2) / µm</translation>
     </message>
 </context>
 <context>

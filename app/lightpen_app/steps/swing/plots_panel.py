@@ -126,7 +126,7 @@ class SwingPlots(Translated, QWidget):
         self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
-        self._uncertainty.set_names("U", self.tr("lowest achievable"))
+        self._uncertainty.set_names("U", self.tr("achievable"))
         self._show_limit()
 
 
