@@ -63,7 +63,7 @@ class TipReadout(Translated, QWidget):
         self._heads = [_number_label(TextSize.SMALL, Tone.QUIET) for _ in range(6)]
 
         # Layout
-        self._layout = layout = grid_layout(self, spacing=(GRID, 0))
+        self._layout = layout = grid_layout(self, spacing=(3 * GRID // 4, 0))
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBaseline
         columns = self._numbers, self._uncertainties, *self._compared
         for column, (head, labels) in enumerate(

@@ -24,7 +24,7 @@ from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
-RESULT_WIDTH, LARGE_RESULT_WIDTH = 56 * GRID, 88 * GRID
+RESULT_WIDTH, LARGE_RESULT_WIDTH = 57 * GRID, 88 * GRID
 ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 
 
