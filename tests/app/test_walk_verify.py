@@ -108,8 +108,8 @@ def test_a_tip_that_was_accepted_with_doubts_is_verified_under_that_word(
     )
     walker.click_step("Verify")
 
-    walker.until_tells("Tip T-10 of pen LP-04, in use since")
-    (lead,) = (text for text in walker.texts() if "in use since" in text)
+    walker.until_tells("Practice tip T-10 of pen LP-04, saved")
+    (lead,) = (text for text in walker.texts() if "Practice tip" in text)
     assert lead.endswith("CHECK")
 
 

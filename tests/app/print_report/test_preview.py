@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt, QThreadPool
 from PySide6.QtPrintSupport import QPrinter
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QGraphicsView, QPushButton
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
@@ -49,7 +50,7 @@ def test_escape_closes_it_and_nothing_is_scrolled_to_the_sides(
 
     with qtbot.waitActive(window):
         window.activateWindow()
-    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    QTest.keyClick(window, Qt.Key.Key_Escape)
 
     assert not window.isVisible()
 
