@@ -27,7 +27,7 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.ellipse import ellipse_centers_with_jacobian
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import nearest_rotation, rotation_from_vector
+from lightpen.model.rigid import nearest_rotation, rotation_from_vector, with_turns
 
 MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
@@ -330,14 +330,7 @@ def disc_residuals(
         rad, and a translation, mm.
     """
     imaged = ellipse_centers_with_jacobian(camera, centers_cam, normals_cam, radius)
-    A = imaged.jacobian
-    J = np.empty((*A.shape[:-1], 6))
-    x, y, z = (lever[..., None, k] for k in range(3))
-    J[..., 0] = y * A[..., 2] - z * A[..., 1]
-    J[..., 1] = z * A[..., 0] - x * A[..., 2]
-    J[..., 2] = x * A[..., 1] - y * A[..., 0]
-    J[..., 3:] = A
-    return pixels - imaged.points, J
+    return pixels - imaged.points, with_turns(imaged.jacobian, lever)
 
 
 def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:

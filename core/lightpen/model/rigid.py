@@ -41,6 +41,29 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray:
     return rotations
 
 
+def with_turns(moves: FloatArray, arms: FloatArray) -> FloatArray:
+    """Return derivatives by a rotation vector and a move, from those by a move alone.
+
+    Parameters
+    ----------
+    moves : (..., k, 3) array
+        Derivatives of k values by the move of a point.
+    arms : (..., 3) array
+        From the centre of rotation to the point.
+
+    Returns
+    -------
+    (..., k, 6) array
+    """
+    J = np.empty((*moves.shape[:-1], 6))
+    x, y, z = (arms[..., None, k] for k in range(3))
+    J[..., 0] = y * moves[..., 2] - z * moves[..., 1]
+    J[..., 1] = z * moves[..., 0] - x * moves[..., 2]
+    J[..., 2] = x * moves[..., 1] - y * moves[..., 0]
+    J[..., 3:] = moves
+    return J
+
+
 def vector_from_rotation(rotations: FloatArray) -> FloatArray:
     """Return the rotation vectors, of length 0 to pi, of rotation matrices.
 

@@ -14,7 +14,7 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.labelling.constellation import Constellation
 from lightpen.detection.labelling.spot_arrays import SpotArrays
 from lightpen.model.ellipse import conic_centers, conic_images
-from lightpen.model.rigid import rotation_from_vector, skew
+from lightpen.model.rigid import rotation_from_vector, with_turns
 
 MIN_FACING = 0.1  # cosine between a disc's normal and the direction to the camera
 
@@ -257,10 +257,10 @@ def _step(
     arms = pen.leds @ candidates.R.transpose(0, 2, 1)
     leds = arms + candidates.t[:, None]
     scale = sight.focal / leds[..., 2]
-    J = np.zeros((*scale.shape, 2, 6))
-    J[..., 0, 3] = J[..., 1, 4] = scale
-    J[..., 5] = leds[..., :2] * (scale / -leds[..., 2])[..., None]
-    J[..., :3] = J[..., 3:] @ skew(-arms)
+    moves = np.zeros((*scale.shape, 2, 3))
+    moves[..., 0, 0] = moves[..., 1, 1] = scale
+    moves[..., 2] = leds[..., :2] * (scale / -leds[..., 2])[..., None]
+    J = with_turns(moves, arms)
     weights = np.where(candidates.spot >= 0, weights, 0.0)
     n_equations = 2 * arms.shape[1]
     weighted = (J * weights[..., None, None]).reshape(-1, n_equations, 6)
