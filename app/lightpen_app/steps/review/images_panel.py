@@ -31,7 +31,7 @@ from lightpen_app.widgets.translated import Translated
 from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
 from lightpen_app.work.job import Job, Report
 
-TABLE_WIDTH = 40 * GRID
+TABLE_WIDTH = 38 * GRID
 VIEW_SHARE, PLOT_SHARE = 3, 2  # of the height
 LEAST_HEIGHT = 20 * GRID  # px, of the image
 RING = 10.0  # image px about an LED
