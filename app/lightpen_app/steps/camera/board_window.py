@@ -92,7 +92,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         side = vertical_layout(panel, self.board, self._print, margins=None)
         fill(side, self._measured_name, self._measured)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
-        fill(side, self._progress, self._count, self._compute, (self._outcome, 1), 1)
+        fill(side, self._progress, self._count, (self._outcome, 1), 1)
         outcome = vertical_layout(self._outcome, self._facts)
         horizontal_layout(
             outcome, self._shows_residuals, self._shows_uncertainty, spacing=-1
@@ -103,7 +103,8 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         scroll.setWidget(panel)
         column = QWidget()
         column.setFixedWidth(SIDE_WIDTH)
-        vertical_layout(column, (scroll, 1), self._save)
+        rows = vertical_layout(column, (scroll, 1))
+        horizontal_layout(rows, (self._compute, 1), (self._save, 1))
         layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
         vertical_layout(layout, (self._image, 1), self._remark, stretch=1, spacing=-1)
         layout.addWidget(column)
