@@ -308,7 +308,7 @@ def main() -> int:
         application.exec()
         print(json.dumps(user.figures()))
         wizard.crash_hook.remove()
-        wizard.workbench.run.runner.abandon()
+        wizard.workbench.run.runner.ask(lambda workflow: workflow.abandon())
         wizard.window.close_unasked()
     return 0
 

@@ -130,8 +130,9 @@ class Soak(QObject):
         run = self._wizard.workbench.run
         if run.status.state is not None and run.status.state.phase is Phase.VERDICT:
             self._n_swings += 1
-            run.runner.set_aside()
-            run.runner.begin(self._wizard.workbench.selection.preparation)
+            run.runner.ask(lambda workflow: workflow.set_aside())
+            chosen = self._wizard.workbench.selection.preparation
+            run.runner.ask(lambda workflow: workflow.begin(chosen))
 
 
 def memory_mb() -> float:
@@ -159,7 +160,7 @@ def main() -> int:
         QTimer.singleShot(0, soak.start)
         application.exec()
         print(json.dumps(soak.figures()))
-        workbench.run.runner.abandon()
+        workbench.run.runner.ask(lambda workflow: workflow.abandon())
         wizard.window.close_unasked()
     return 0
 

@@ -59,10 +59,12 @@ def main() -> int:
     offered = find_unfinished(run.records_folder).interrupted
     if offered:
         record = offered[0]
-        run.runner.go_on(read_resumable(record.folder))
+        resumable = read_resumable(record.folder)
+        run.runner.ask(lambda workflow: workflow.go_on(resumable))
         _say("resumed", record.folder.name, len(record.images))
     else:
-        run.runner.begin(workbench.selection.preparation)
+        chosen = workbench.selection.preparation
+        run.runner.ask(lambda workflow: workflow.begin(chosen))
     return application.exec()
 
 

@@ -236,7 +236,7 @@ class Stage:
 
     def close(self) -> None:
         """Close the window without a question, and leave no widget of it."""
-        self._workbench.run.runner.abandon()
+        self._workbench.run.runner.ask(lambda workflow: workflow.abandon())
         window = self.wizard.window
         window.close_unasked()
         others = window.operator_view(), window.help_window()
@@ -322,7 +322,8 @@ class Stage:
         swing = _swing(selection.preparation.swing_setup(), self._scene)
         heading = swing.heading  # kept for the next swings, as by a real one
         selection.set_preparation(replace(selection.preparation, heading=heading))
-        run.runner.begin(selection.preparation)
+        chosen = selection.preparation
+        run.runner.ask(lambda workflow: workflow.begin(chosen))
         self._wait_until(lambda: run.status.state is not None)
         run.on_swing(replace(run.status, state=swing), ())
         for index in range(N_SHOWN):
@@ -337,7 +338,7 @@ class Stage:
 
     def _fill_verify(self) -> None:
         run = self._workbench.run
-        run.runner.accept("The station is being set up.")
+        run.runner.ask(lambda workflow: workflow.accept("The station is being set up."))
         self._wait_until(lambda: run.status.result is not None)
         self._fill_probing(self._workbench.verification, CHOICES, _touched)
 
@@ -400,8 +401,9 @@ class Stage:
         run = self._workbench.run
         folder = run.records_folder / "20260930-095900_LP-04_T-10-80"
         _record(folder, self._workbench.selection.preparation)
-        run.runner.go_on(read_resumable(folder))
-        run.runner.finish()
+        resumable = read_resumable(folder)
+        run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        run.runner.ask(lambda workflow: workflow.finish())
         self._wait_until(lambda: run.status.solution is not None)
 
     def _show_image(self, index: int) -> None:

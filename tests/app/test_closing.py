@@ -225,9 +225,10 @@ def test_closing_waits_for_all_that_is_under_way_together(
 
     monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve)
     swing_before(workbench, stuck)
-    workbench.run.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
-    workbench.run.runner.finish()
+    workbench.run.runner.ask(lambda workflow: workflow.finish())
     qtbot.waitUntil(stuck.is_reached.is_set)
 
     assert_closes_soon(workbench)
@@ -248,7 +249,8 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     )
     workbench.live.open([camera], CameraSettings(), around.clock)
     workbench.live.set_following(True)
-    workbench.run.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
 
     def write(writer: RecordWriter, *image: object) -> int:
@@ -283,8 +285,9 @@ def test_a_solution_that_ends_in_time_is_waited_for(
         return solution
 
     monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve)
-    workbench.run.runner.go_on(read_resumable(interrupted))
-    workbench.run.runner.finish()
+    resumable = read_resumable(interrupted)
+    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    workbench.run.runner.ask(lambda workflow: workflow.finish())
     qtbot.waitUntil(began.is_set)
 
     assert workbench.shut_down(TIMEOUT / 1000)
@@ -311,8 +314,9 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     shutil.copytree(swung(), folder)
     with monkeypatch.context() as slow:
         slow.setattr("lightpen.swing.workflow.solve_record", solve)
-        run.runner.go_on(read_resumable(folder))
-        run.runner.finish()
+        resumable = read_resumable(folder)
+        run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        run.runner.ask(lambda workflow: workflow.finish())
         walker.until(stuck.is_reached.is_set)
 
     began = time.monotonic()

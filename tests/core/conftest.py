@@ -170,17 +170,19 @@ class Station:
     def begin(self, limits: SwingLimits = SHORT) -> None:
         """Begin a swing, and wait until it has begun."""
         before = self.status.record_folder
-        self.runner.begin(replace(self.preparation, limits=limits))
+        chosen = replace(self.preparation, limits=limits)
+        self.runner.ask(lambda workflow: workflow.begin(chosen))
         self.wait_until(lambda: self.status.record_folder not in (None, before))
 
     def go_on(self, folder: Path) -> None:
         """Go on with an interrupted swing, and wait until it does."""
-        self.runner.go_on(read_resumable(folder))
+        resumable = read_resumable(folder)
+        self.runner.ask(lambda workflow: workflow.go_on(resumable))
         self.wait_until(lambda: self.status.record_folder == folder)
 
     def solve(self) -> None:
         """End the capture, and wait for the verdict."""
-        self.runner.finish()
+        self.runner.ask(lambda workflow: workflow.finish())
         self.wait_for_phase(Phase.VERDICT)
 
     def see(self, n_images: int = 1) -> None:
@@ -211,7 +213,7 @@ class Station:
 
     def accept(self, reason: str = "It is seen to.") -> None:
         """Put the tip in force, and wait until it is."""
-        self.runner.accept(reason)
+        self.runner.ask(lambda workflow: workflow.accept(reason))
         self.wait_until(lambda: self.status.result is not None)
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:

@@ -97,7 +97,7 @@ class Walk(QObject):
         is_whole = status.verdict is not None  # its tip was computed at once
         if self._window.page().key == "swing" and (status.is_capturing or is_whole):
             if not is_whole:
-                self._workbench.run.runner.finish()
+                self._workbench.run.runner.ask(lambda workflow: workflow.finish())
             self._next = self._review
         return False
 

@@ -137,7 +137,7 @@ class Workbench(QObject):
         folder = self.folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
         self._look_for_update()
-        self.run.runner.open_logbook()
+        self.run.runner.ask(lambda workflow: workflow.open_logbook())
         self._read_supervision()
         self.library.refresh()
         self.folder_watch.start()
@@ -195,7 +195,7 @@ class Workbench(QObject):
 
     def _update_runners(self) -> None:
         chosen, choices = self.selection.preparation, self.selection.choices
-        self.run.runner.choose(chosen)
+        self.run.runner.ask(lambda workflow: workflow.choose(chosen))
         drift = {DRIFT.kind} & {*choices.kinds}
         part = replace(choices, kinds=(*drift, PART.kind))
         self.verification.runner.ask(lambda workflow: workflow.choose(chosen, choices))

@@ -573,8 +573,16 @@ class SwingWorkflow:
         status = replace(status, state=transition.state)
         self._publish(status, *(transition.events if is_first else ()))
 
-    def accept(self, reason: str, signature: Signature | None = None) -> None:
-        """Accept the tip, or report why it cannot be."""
+    def accept(self, reason: str = "", signature: Signature | None = None) -> None:
+        """Accept the tip, or report why it cannot be; the previous one then stays.
+
+        Parameters
+        ----------
+        reason : str
+            Reason for accepting the result despite findings.
+        signature : Signature, optional
+            Signature of a supervisor, if one is required.
+        """
         self._faults.trying(lambda: self._store(reason, signature))
 
     def _store(self, reason: str, signature: Signature | None) -> None:
@@ -603,7 +611,15 @@ class SwingWorkflow:
         reason: str = "",
         signature: Signature | None = None,
     ) -> None:
-        """Revoke a result in favour of the one before, or report why not."""
+        """Revoke a result in favour of the one before, or report why not.
+
+        Parameters
+        ----------
+        reason : str
+            In the words of the operator.
+        signature : Signature, optional
+            Signature of a supervisor, if one is required.
+        """
         self._faults.trying(lambda: self._withdraw(result, operator, reason, signature))
 
     def _withdraw(

@@ -23,6 +23,7 @@ from lightpen.simulator.hand import Operator
 from lightpen.streaming.server import PoseStream
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
@@ -336,7 +337,8 @@ def n_kept(run: SwingRun) -> int:
 def test_a_swing_is_captured_though_the_gui_is_busy(
     run: SwingRun, stage: Stage, interrupted: Path
 ) -> None:
-    run.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    run.runner.ask(lambda workflow: workflow.go_on(resumable))
     stage.open()
     stage.hold_up_until(lambda: n_kept(run) > N_IMAGES + 2)
 
@@ -347,7 +349,8 @@ def test_a_swing_goes_on_when_its_camera_is_closed_and_another_is_opened(
     run: SwingRun, view: LiveView, stage: Stage, interrupted: Path
 ) -> None:
     stage.open()
-    run.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    run.runner.ask(lambda workflow: workflow.go_on(resumable))
     stage.hold_up_until(lambda: n_kept(run) > N_IMAGES)
     stage.close()
     before = n_kept(run)
@@ -364,9 +367,10 @@ def test_what_is_wished_for_between_two_cameras_is_done(
     run: SwingRun, stage: Stage, interrupted: Path, wish: str
 ) -> None:
     stage.open()
-    run.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    run.runner.ask(lambda workflow: workflow.go_on(resumable))
     stage.close()
-    getattr(run.runner, wish)()
+    run.runner.ask(getattr(SwingWorkflow, wish))
     stage.open()
     stage.hold_up_until(
         lambda: (

@@ -77,7 +77,7 @@ def test_records_and_results_are_kept_in_the_folder(
     run: SwingRun, prepared: Preparation, qtbot: QtBot, tmp_path: Path
 ) -> None:
     with qtbot.waitSignal(run.changed, timeout=round(1000 * TIMEOUT)):
-        run.runner.begin(prepared)
+        run.runner.ask(lambda workflow: workflow.begin(prepared))
 
     assert run.records_folder.parent == run.archive.folder.parent == tmp_path / "run"
     assert run.status.record_folder is not None
@@ -88,7 +88,8 @@ def test_records_and_results_are_kept_in_the_folder(
 def test_what_changed_is_known_when_it_is_reported(
     run: SwingRun, diary: Diary, interrupted: Path, qtbot: QtBot
 ) -> None:
-    run.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    run.runner.ask(lambda workflow: workflow.go_on(resumable))
     hold_up_until(lambda: run.runner.status.is_capturing)
     assert run.status.state is None  # the GUI was busy
     assert diary.entries == []
@@ -103,11 +104,13 @@ def test_a_gui_that_was_busy_gets_every_event_and_then_the_newest_status(
     run: SwingRun, diary: Diary, prepared: Preparation
 ) -> None:
     for _ in range(2):
-        run.runner.begin(prepared)
+        run.runner.ask(lambda workflow: workflow.begin(prepared))
         hold_up_until(lambda: run.runner.status.is_capturing)
-        run.runner.finish()  # without an image there is no tip
+        # without an image there is no tip
+        run.runner.ask(lambda workflow: workflow.finish())
         hold_up_until(lambda: phase(run) is Phase.VERDICT)
-    run.runner.pause()  # does nothing; all that was reported before is on its way
+    # does nothing; all that was reported before is on its way
+    run.runner.ask(lambda workflow: workflow.pause())
     run.runner.shut_down()
     assert run.runner.await_end(TIMEOUT)
     QApplication.processEvents()
@@ -127,8 +130,8 @@ def test_an_event_comes_before_the_status_after_it(
             phases.append(run.status.state.phase)
 
     run.happened.connect(note)
-    run.runner.begin(prepared)
-    run.runner.finish()
+    run.runner.ask(lambda workflow: workflow.begin(prepared))
+    run.runner.ask(lambda workflow: workflow.finish())
     qtbot.waitUntil(
         lambda: SwingEventKind.FAILED in diary.event_kinds(),
         timeout=round(1000 * TIMEOUT),
@@ -152,12 +155,13 @@ def test_all_is_reported_on_the_thread_of_the_gui(
     notifications.withdrawn.connect(withdrawn.append)
     run.records_folder.rename(run.records_folder.with_name("old"))
     run.records_folder.write_text("not a folder")
-    run.runner.begin(prepared)
+    run.runner.ask(lambda workflow: workflow.begin(prepared))
     qtbot.waitUntil(lambda: "refused" in diary.names(), timeout=round(1000 * TIMEOUT))
     run.records_folder.unlink()
     run.records_folder.with_name("old").rename(run.records_folder)
-    run.runner.go_on(read_resumable(interrupted))
-    run.runner.finish()
+    resumable = read_resumable(interrupted)
+    run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    run.runner.ask(lambda workflow: workflow.finish())
     qtbot.waitUntil(
         lambda: run.status.solution is not None, timeout=round(1000 * TIMEOUT)
     )
@@ -185,10 +189,11 @@ def test_a_follower_sees_every_state_though_the_gui_is_busy(
     watcher = Watcher(Operator(SkippingClock()))
     watcher.seen = []
     run.follower = watcher
-    run.runner.begin(prepared)
-    run.runner.pause()
-    run.runner.resume()
-    run.runner.abandon()  # of which there is nothing to follow
+    run.runner.ask(lambda workflow: workflow.begin(prepared))
+    run.runner.ask(lambda workflow: workflow.pause())
+    run.runner.ask(lambda workflow: workflow.resume())
+    # of which there is nothing to follow
+    run.runner.ask(lambda workflow: workflow.abandon())
     run.runner.shut_down()
     assert run.runner.await_end(TIMEOUT)
 
@@ -199,8 +204,9 @@ def test_a_follower_sees_every_state_though_the_gui_is_busy(
 def test_a_swing_is_left_to_be_resumed_when_the_program_ends(
     run: SwingRun, interrupted: Path
 ) -> None:
-    run.runner.go_on(read_resumable(interrupted))
-    run.runner.finish()
+    resumable = read_resumable(interrupted)
+    run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    run.runner.ask(lambda workflow: workflow.finish())
     run.runner.shut_down()
     assert run.runner.await_end(TIMEOUT)
 

@@ -484,7 +484,8 @@ def test_a_swing_of_a_recorded_source_finds_its_images(
     )
     stage.workbench.camera.open()
     stage.wait_for_size((1224, 1024))
-    stage.workbench.run.runner.begin(stage.workbench.selection.preparation)
+    chosen = stage.workbench.selection.preparation
+    stage.workbench.run.runner.ask(lambda workflow: workflow.begin(chosen))
     run = stage.workbench.run
     stage.qtbot.waitUntil(
         lambda: run.status.state is not None and run.status.state.n_kept >= 3

@@ -415,7 +415,7 @@ def test_after_a_swing_a_recording_that_waited_for_its_reader_goes_on(
     screen.wait_for_images(1)
     screen.may_go_on.clear()
     wait_until_camera_waits(camera, screen)
-    station.runner.finish()
+    station.runner.ask(lambda workflow: workflow.finish())
     screen.may_go_on.set()
     station.wait_until(lambda: not station.status.is_capturing)
     screen.wait_for_images(8)
@@ -436,8 +436,8 @@ def test_a_swing_begins_with_the_images_of_whoever_is_there(
     station: "Station", make_live: MakeLive
 ) -> None:
     make_live()
-    station.runner.choose(station.preparation)
-    station.runner.come()
+    station.runner.ask(lambda workflow: workflow.choose(station.preparation))
+    station.runner.ask(lambda workflow: workflow.come())
     station.wait_until(lambda: station.status.is_capturing)
     station.wait_until(lambda: station.state.phase is not Phase.WAIT)
 
@@ -581,9 +581,9 @@ def test_a_bug_while_looking_leaves_the_swing_to_the_next_camera(
     n_kept = station.state.n_kept
     assert station.status.is_capturing
     assert not station.status.is_paused_by_user
-    station.runner.pause()
+    station.runner.ask(lambda workflow: workflow.pause())
     station.wait_until(lambda: station.status.is_paused_by_user)
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     make_live()
     station.wait_until(lambda: station.state.n_kept > n_kept)
 
@@ -605,7 +605,7 @@ def test_a_bug_while_an_image_is_taken_does_not_end_the_camera(
         broken.setattr("lightpen.swing.swing_recorder.advance_swing", fail)
         station.wait_until(lambda: len(station.witness.faults) == 1)
         screen.wait_for_images(3)
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.wait_until(lambda: station.state.n_kept > N_IMAGES)
 
     assert screen.failures == []

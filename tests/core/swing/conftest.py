@@ -33,8 +33,8 @@ def in_force(solved: "Station") -> "Station":
 @pytest.fixture
 def present(station: "Station") -> "Station":
     """Somebody is at the swing, and all is chosen; no image has come yet."""
-    station.runner.choose(station.preparation)
-    station.runner.come()
+    station.runner.ask(lambda workflow: workflow.choose(station.preparation))
+    station.runner.ask(lambda workflow: workflow.come())
     return station
 
 

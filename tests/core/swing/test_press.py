@@ -22,10 +22,10 @@ N_IMAGES = 12
 @pytest.fixture
 def pressing(solved: "Station") -> "Station":
     """A swing that was solved, and a press test under way."""
-    solved.runner.choose(solved.preparation)
-    solved.runner.keep_choices()
+    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
+    solved.runner.ask(lambda workflow: workflow.keep_choices())
     first = solved.record_folder
-    solved.runner.press()
+    solved.runner.ask(lambda workflow: workflow.press())
     solved.wait_until(lambda: solved.status.record_folder != first)
     return solved
 
@@ -45,13 +45,13 @@ def test_its_solution_comes_beside_the_first_and_replaces_nothing(
     solved: "Station",
 ) -> None:
     before, first = solved.solution, solved.record_folder
-    solved.runner.choose(solved.preparation)
-    solved.runner.keep_choices()
-    solved.runner.press()
+    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
+    solved.runner.ask(lambda workflow: workflow.keep_choices())
+    solved.runner.ask(lambda workflow: workflow.press())
     solved.wait_until(lambda: solved.status.record_folder != first)
     firm = solved.record_folder
     solved.keep(N_IMAGES)
-    solved.runner.finish()
+    solved.runner.ask(lambda workflow: workflow.finish())
     solved.wait_until(lambda: solved.status.record_folder == first)
 
     assert solved.state.phase is Phase.VERDICT
@@ -68,7 +68,7 @@ def test_its_solution_comes_beside_the_first_and_replaces_nothing(
 def test_it_can_be_left_for_the_first_swing(pressing: "Station") -> None:
     pressing.keep(1)
     firm = pressing.record_folder
-    pressing.runner.set_aside()
+    pressing.runner.ask(lambda workflow: workflow.set_aside())
     pressing.wait_until(lambda: pressing.status.solution is not None)
 
     assert pressing.record_folder != firm
@@ -94,11 +94,12 @@ def test_one_that_was_interrupted_is_neither_resumed_nor_accepted(
 
 def test_it_needs_the_choices_of_the_first_swing(solved: "Station") -> None:
     first = solved.record_folder
-    solved.runner.choose(solved.preparation)
-    solved.runner.keep_choices()
+    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
+    solved.runner.ask(lambda workflow: workflow.keep_choices())
     names = replace(solved.preparation.names, tip="T-11")
-    solved.runner.choose(replace(solved.preparation, names=names))
-    solved.runner.press()
+    chosen = replace(solved.preparation, names=names)
+    solved.runner.ask(lambda workflow: workflow.choose(chosen))
+    solved.runner.ask(lambda workflow: workflow.press())
     solved.see()
 
     assert solved.record_folder == first

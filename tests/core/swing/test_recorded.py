@@ -205,7 +205,7 @@ def test_an_interrupted_reading_goes_on_and_takes_no_image_twice(
 ) -> None:
     recording.show(8)
     folder = station.record_folder
-    station.runner.abandon()
+    station.runner.ask(lambda workflow: workflow.abandon())
     station.wait_until(lambda: station.status.state is None)
     station.go_on(folder)
     recording.show(N_IMAGES - 8)  # to the end of the pass
@@ -221,10 +221,10 @@ def test_a_pause_waits_and_goes_on_with_the_next_image(
     recording: Recording, station: "Station"
 ) -> None:
     recording.show(5)
-    station.runner.pause()
+    station.runner.ask(lambda workflow: workflow.pause())
     recording.show(N_IMAGES)
     assert station.state.progress.n_read == 5
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     recording.show(N_IMAGES)
 
     station.wait_for_phase(Phase.VERDICT)
@@ -237,7 +237,7 @@ def test_after_the_verdict_nothing_more_can_be_captured_or_confirmed(
 ) -> None:
     recording.show(N_IMAGES)
     station.wait_for_phase(Phase.VERDICT)
-    station.runner.capture_more()
+    station.runner.ask(lambda workflow: workflow.capture_more())
     recording.show(N_IMAGES)
 
     assert station.state.phase is Phase.VERDICT
@@ -258,7 +258,7 @@ def test_a_reading_goes_on_with_its_own_recording_only(
     recording: Recording, station: "Station", tmp_path: Path
 ) -> None:
     recording.show(3)
-    station.runner.abandon()
+    station.runner.ask(lambda workflow: workflow.abandon())
     station.wait_until(lambda: station.status.state is None)
     (folder,) = station.interrupted()
     swing = read_resumable(folder)

@@ -27,6 +27,7 @@ from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.resuming import read_resumable
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ def test_a_record_that_cannot_be_made_leaves_the_swing_before(
     before, state = station.record_folder, station.state
     station.records.rename(station.records.with_name("old"))
     station.records.write_text("not a folder")
-    station.runner.begin(station.preparation)
+    station.runner.ask(lambda workflow: workflow.begin(station.preparation))
     station.wait_until(lambda: len(station.witness.faults) == 1)
 
     assert "cannot be written" in station.witness.faults[0]
@@ -189,7 +190,8 @@ def test_files_that_are_gone_are_reported_before_anything_begins(
     pen_file = station.preparation.pen_file
     assert pen_file is not None
     gone = replace(pen_file, path=tmp_path / "gone.csv")
-    station.runner.begin(replace(station.preparation, pen_file=gone))
+    chosen = replace(station.preparation, pen_file=gone)
+    station.runner.ask(lambda workflow: workflow.begin(chosen))
     station.wait_until(lambda: len(station.witness.faults) == 1)
 
     assert "does not exist" in station.witness.faults[0]
@@ -208,12 +210,18 @@ def test_a_swing_waits_for_its_first_image(station: "Station") -> None:
 def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
     runner = station.runner
     for act in (
-        *(runner.pause, runner.resume, runner.finish, runner.solve, runner.cancel),
-        *(runner.capture_more, runner.accept, runner.set_aside),
+        SwingWorkflow.pause,
+        SwingWorkflow.resume,
+        SwingWorkflow.finish,
+        SwingWorkflow.solve,
+        SwingWorkflow.cancel,
+        SwingWorkflow.capture_more,
+        SwingWorkflow.accept,
+        SwingWorkflow.set_aside,
     ):
-        act()
-    runner.take_out([1])
-    runner.put_back([1])
+        runner.ask(act)
+    runner.ask(lambda workflow: workflow.take_out([1]))
+    runner.ask(lambda workflow: workflow.put_back([1]))
     station.see()
 
     assert station.witness.reported == []
@@ -230,7 +238,7 @@ def test_a_paused_swing_keeps_nothing_until_it_is_resumed(
 ) -> None:
     station.go_on(interrupted)
     station.keep(1)
-    station.runner.pause()
+    station.runner.ask(lambda workflow: workflow.pause())
     station.wait_for_phase(Phase.PAUSED)
     assert station.state.pause is Pause.BY_USER
     assert station.state.message.code == Code.PAUSED
@@ -240,14 +248,14 @@ def test_a_paused_swing_keeps_nothing_until_it_is_resumed(
     assert station.n_recorded == n_images
     assert station.state.pause is Pause.BY_USER
 
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
     assert station.n_recorded == n_images + 1
 
 
 def test_a_paused_swing_can_be_finished(station: "Station", interrupted: Path) -> None:
     station.go_on(interrupted)
-    station.runner.pause()
+    station.runner.ask(lambda workflow: workflow.pause())
     station.solve()
 
     assert station.status.solution is not None
@@ -309,7 +317,7 @@ def test_a_disk_that_is_gone_pauses_the_swing_and_costs_one_image(
 
     (interrupted / "elsewhere").rename(interrupted / IMAGES)
     assert station.n_recorded == n_kept == N_IMAGES + 1
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.see()
     assert not station.status.has_fault
     assert station.witness.reliefs == []  # who knows yet
@@ -325,7 +333,7 @@ def test_a_pause_of_the_user_is_not_taken_for_a_fault(
     station: "Station", interrupted: Path
 ) -> None:
     station.go_on(interrupted)
-    station.runner.pause()
+    station.runner.ask(lambda workflow: workflow.pause())
     station.see(2)
 
     assert station.status.is_paused_by_user
@@ -341,8 +349,10 @@ def test_the_record_is_closed_however_the_swing_ends(
     station.go_on(interrupted)
     if end == "begin":
         station.begin()
+    elif end == "shut_down":
+        station.runner.shut_down()
     else:
-        getattr(station.runner, end)()
+        station.runner.ask(getattr(SwingWorkflow, end))
     station.wait_until(lambda: not station.status.is_capturing or end == "begin")
 
     assert station.is_free(interrupted)
@@ -381,8 +391,8 @@ def test_every_status_is_reported_in_order_with_its_events_by_one_thread(
 ) -> None:
     station.go_on(interrupted)
     station.keep(2)
-    station.runner.pause()
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.pause())
+    station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
     station.solve()
     n_kept = N_IMAGES
@@ -405,7 +415,7 @@ def test_an_abandoned_swing_is_resumed_with_all_its_images(
     station.go_on(interrupted)
     names, setup = station.status.names, station.status.setup
     station.keep(2)
-    station.runner.abandon()
+    station.runner.ask(lambda workflow: workflow.abandon())
     station.wait_until(lambda: station.status.state is None)
     assert station.status.record_folder is None
     assert station.status.setup is setup
@@ -432,7 +442,8 @@ def test_resuming_the_swing_that_is_under_way_changes_nothing(
 ) -> None:
     station.go_on(interrupted)
     status = station.status
-    station.runner.go_on(read_resumable(interrupted))
+    resumable = read_resumable(interrupted)
+    station.runner.ask(lambda workflow: workflow.go_on(resumable))
     station.runner.take(station.camera.read(1.0), None)
 
     assert station.status is status
@@ -445,7 +456,7 @@ def test_a_swing_that_was_changed_since_it_was_read_is_refused_and_nothing_begin
     swing = read_resumable(interrupted)
     with RecordWriter.resume(swing.record) as writer:
         writer.take_out([1], "by somebody else")
-    station.runner.go_on(swing)
+    station.runner.ask(lambda workflow: workflow.go_on(swing))
     station.wait_until(lambda: len(station.witness.faults) == 1)
 
     assert "changed the swing" in station.witness.faults[0]
@@ -458,7 +469,7 @@ def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
     other = station.records / "other"
     shutil.copytree(swung(), other)
     station.go_on(other)
-    station.runner.finish()  # which begins to solve
+    station.runner.ask(lambda workflow: workflow.finish())  # which begins to solve
     station.go_on(interrupted)
     station.keep(1)
 
@@ -475,7 +486,7 @@ def test_what_was_commanded_before_the_end_is_done(
     station: "Station", interrupted: Path
 ) -> None:
     station.go_on(interrupted)
-    station.runner.set_aside()
+    station.runner.ask(lambda workflow: workflow.set_aside())
     station.runner.shut_down()
     assert station.runner.await_end(TIMEOUT)
 
@@ -502,7 +513,7 @@ def test_an_end_while_a_solution_is_computed_leaves_the_swing_to_be_resumed(
     station: "Station", interrupted: Path
 ) -> None:
     station.go_on(interrupted)
-    station.runner.finish()
+    station.runner.ask(lambda workflow: workflow.finish())
     station.runner.shut_down()
     assert station.runner.await_end(TIMEOUT)
 
@@ -536,7 +547,7 @@ def test_nobody_waits_longer_than_he_says_for_a_disk_that_does_not_answer(
     station: "Station", stuck: threading.Event
 ) -> None:
     stuck.set()
-    station.runner.set_aside()
+    station.runner.ask(lambda workflow: workflow.set_aside())
     station.runner.shut_down()
 
     assert not station.runner.await_end(0.05)
@@ -546,10 +557,10 @@ def test_an_image_waits_for_a_disk_that_does_not_answer_but_no_command_does(
     station: "Station", stuck: threading.Event
 ) -> None:
     stuck.set()
-    station.runner.set_aside()
+    station.runner.ask(lambda workflow: workflow.set_aside())
     looking = threading.Thread(target=station.see, daemon=True)
     looking.start()
-    station.runner.pause()
+    station.runner.ask(lambda workflow: workflow.pause())
     looking.join(0.2)
 
     assert looking.is_alive()
@@ -563,7 +574,7 @@ def test_an_image_that_comes_after_the_end_is_not_waited_for(
     assert station.runner.await_end(TIMEOUT)
     n_reported = len(station.witness.reported)
     station.see(2)
-    station.runner.begin(station.preparation)
+    station.runner.ask(lambda workflow: workflow.begin(station.preparation))
     station.see()
 
     assert len(station.witness.reported) == n_reported

@@ -12,6 +12,7 @@ from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen.swing.workflow import SwingWorkflow
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station
@@ -35,24 +36,24 @@ def test_no_swing_begins_while_something_lacks(station: "Station") -> None:
     prepared = station.preparation
     lacking = replace(prepared, image_size=None)
     assert lacking.missing_inputs() == (MissingInput.IMAGES,)
-    station.runner.come()
+    station.runner.ask(lambda workflow: workflow.come())
     station.see()
     assert station.status.state is None
-    station.runner.choose(lacking)
+    station.runner.ask(lambda workflow: workflow.choose(lacking))
     station.see()
     assert station.status.state is None
 
-    station.runner.choose(prepared)
+    station.runner.ask(lambda workflow: workflow.choose(prepared))
     station.see()
     assert station.status.is_capturing
 
 
 def test_no_swing_begins_while_nobody_is_there(station: "Station") -> None:
-    station.runner.choose(station.preparation)
+    station.runner.ask(lambda workflow: workflow.choose(station.preparation))
     station.see()
     assert station.status.state is None
-    station.runner.come()
-    station.runner.leave()
+    station.runner.ask(lambda workflow: workflow.come())
+    station.runner.ask(lambda workflow: workflow.leave())
     station.see()
     assert station.status.state is None
     assert not station.records.exists()
@@ -71,7 +72,7 @@ def test_a_record_that_cannot_be_made_is_reported_once_and_tried_again_when_aske
     present.records.unlink()
     present.see()
     assert present.status.state is None
-    present.runner.try_again()
+    present.runner.ask(lambda workflow: workflow.try_again())
     present.see()
 
     assert present.status.is_capturing
@@ -83,8 +84,8 @@ def test_whoever_comes_again_tries_again(present: "Station") -> None:
     present.records.write_text("not a folder")
     present.see()
     present.records.unlink()
-    present.runner.leave()
-    present.runner.come()
+    present.runner.ask(lambda workflow: workflow.leave())
+    present.runner.ask(lambda workflow: workflow.come())
     present.see()
 
     assert present.status.is_capturing
@@ -97,13 +98,13 @@ def test_leaving_pauses_and_coming_back_goes_on(
 ) -> None:
     present.go_on(interrupted)
     present.keep(1)
-    present.runner.leave()
+    present.runner.ask(lambda workflow: workflow.leave())
     present.wait_until(lambda: present.status.is_paused_by_user)
     n_images = present.n_recorded
     present.see(30)
     assert present.n_recorded == n_images
 
-    present.runner.come()
+    present.runner.ask(lambda workflow: workflow.come())
     present.keep(1)
 
 
@@ -111,13 +112,13 @@ def test_a_swing_that_its_user_paused_stays_paused_when_he_comes_back(
     present: "Station",
 ) -> None:
     present.see()
-    present.runner.pause()
-    present.runner.leave()
-    present.runner.come()
+    present.runner.ask(lambda workflow: workflow.pause())
+    present.runner.ask(lambda workflow: workflow.leave())
+    present.runner.ask(lambda workflow: workflow.come())
     present.see()
     assert present.status.is_paused_by_user
 
-    present.runner.resume()
+    present.runner.ask(lambda workflow: workflow.resume())
     present.see()
     assert not present.status.is_paused_by_user
 
@@ -126,9 +127,9 @@ def test_a_swing_that_is_paused_while_nobody_is_there_stays_paused(
     present: "Station",
 ) -> None:
     present.see()
-    present.runner.leave()
-    present.runner.pause()
-    present.runner.come()
+    present.runner.ask(lambda workflow: workflow.leave())
+    present.runner.ask(lambda workflow: workflow.pause())
+    present.runner.ask(lambda workflow: workflow.come())
     present.see()
 
     assert present.status.is_paused_by_user
@@ -138,11 +139,12 @@ def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
     present: "Station", interrupted: Path
 ) -> None:
     present.go_on(interrupted)
-    present.runner.leave()
-    present.runner.resume()  # by somebody who is elsewhere
+    present.runner.ask(lambda workflow: workflow.leave())
+    # by somebody who is elsewhere
+    present.runner.ask(lambda workflow: workflow.resume())
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
     present.see_until(lambda: present.status.has_fault)
-    present.runner.come()
+    present.runner.ask(lambda workflow: workflow.come())
     present.see()
 
     assert present.status.has_fault
@@ -152,22 +154,22 @@ def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
 def test_a_swing_that_begins_while_everybody_is_away_waits(
     present: "Station", interrupted: Path
 ) -> None:
-    present.runner.leave()
+    present.runner.ask(lambda workflow: workflow.leave())
     present.go_on(interrupted)
     present.wait_until(lambda: present.status.is_paused_by_user)
     present.see(2)
     assert present.status.is_paused_by_user
 
-    present.runner.come()
+    present.runner.ask(lambda workflow: workflow.come())
     present.see()
     assert not present.status.is_paused_by_user
 
 
 def test_more_that_is_captured_while_everybody_is_away_waits(solved: "Station") -> None:
-    solved.runner.leave()
-    solved.runner.capture_more()
+    solved.runner.ask(lambda workflow: workflow.leave())
+    solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_paused_by_user)
-    solved.runner.come()
+    solved.runner.ask(lambda workflow: workflow.come())
     solved.see()
 
     assert solved.status.is_capturing
@@ -193,7 +195,8 @@ def test_other_choices_do_not_change_a_swing_that_is_under_way(
     present.see()
     setup = present.status.setup
     assert not present.status.has_other_choices
-    present.runner.choose(other_operator(present.preparation))
+    chosen = other_operator(present.preparation)
+    present.runner.ask(lambda workflow: workflow.choose(chosen))
     present.see()
 
     assert present.status.has_other_choices
@@ -205,13 +208,14 @@ def test_other_choices_are_settled_when_they_are_kept_or_taken_back(
     present: "Station",
 ) -> None:
     present.see()
-    present.runner.choose(other_operator(present.preparation))
-    present.runner.choose(present.preparation)
+    chosen = other_operator(present.preparation)
+    present.runner.ask(lambda workflow: workflow.choose(chosen))
+    present.runner.ask(lambda workflow: workflow.choose(present.preparation))
     present.see()
     assert not present.status.has_other_choices
 
-    present.runner.choose(other_operator(present.preparation))
-    present.runner.keep_choices()
+    present.runner.ask(lambda workflow: workflow.choose(chosen))
+    present.runner.ask(lambda workflow: workflow.keep_choices())
     present.see()
     assert not present.status.has_other_choices
     assert present.status.names.operator == "Ann"
@@ -221,14 +225,15 @@ def test_other_choices_are_settled_when_they_are_kept_or_taken_back(
 def test_other_choices_are_not_settled_by_capturing_more(
     solved: "Station", interrupted: Path
 ) -> None:
-    solved.runner.choose(solved.preparation)
-    solved.runner.abandon()
+    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
+    solved.runner.ask(lambda workflow: workflow.abandon())
     solved.wait_until(lambda: solved.status.state is None)
     solved.go_on(interrupted)
-    solved.runner.choose(other_operator(solved.preparation))
+    chosen = other_operator(solved.preparation)
+    solved.runner.ask(lambda workflow: workflow.choose(chosen))
     solved.solve()
     assert solved.status.has_other_choices  # or a mended file would not be looked at
-    solved.runner.capture_more()
+    solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
 
     assert solved.status.has_other_choices
@@ -239,8 +244,9 @@ def test_a_swing_that_starts_over_begins_with_what_is_chosen_now(
 ) -> None:
     present.see()
     before = present.record_folder
-    present.runner.choose(other_operator(present.preparation))
-    present.runner.start_over()
+    chosen = other_operator(present.preparation)
+    present.runner.ask(lambda workflow: workflow.choose(chosen))
+    present.runner.ask(lambda workflow: workflow.start_over())
     present.see()
 
     assert present.record_folder != before
@@ -252,7 +258,7 @@ def test_starting_over_keeps_the_images_of_the_old_swing(
     present: "Station", interrupted: Path
 ) -> None:
     present.go_on(interrupted)
-    present.runner.start_over()
+    present.runner.ask(lambda workflow: workflow.start_over())
     present.see()
 
     assert present.status.is_capturing
@@ -268,8 +274,8 @@ def test_a_swing_that_cannot_be_set_aside_goes_on_instead_of_starting_over(
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
     status = solved.status
-    for act in (solved.runner.start_over, solved.runner.set_aside):
-        act()
+    for act in (SwingWorkflow.start_over, SwingWorkflow.set_aside):
+        solved.runner.ask(act)
         solved.see()
         assert solved.status.record_folder == status.record_folder
         assert solved.status.solution is status.solution
@@ -282,7 +288,7 @@ def test_starting_over_a_swing_whose_tip_is_in_force_leaves_its_verdict(
     folder, grade = in_force.record_folder, in_force.status.result
     assert grade is not None
     journal = (folder / JOURNAL).read_bytes()
-    in_force.runner.start_over()
+    in_force.runner.ask(lambda workflow: workflow.start_over())
     in_force.wait_until(lambda: in_force.status.state is None)
 
     assert (folder / JOURNAL).read_bytes() == journal
@@ -294,11 +300,11 @@ def test_an_accepted_swing_is_left_and_the_next_begins_when_somebody_comes_again
 ) -> None:
     folder = in_force.record_folder
     journal = (folder / JOURNAL).read_bytes()
-    in_force.runner.choose(in_force.preparation)
-    in_force.runner.leave()
+    in_force.runner.ask(lambda workflow: workflow.choose(in_force.preparation))
+    in_force.runner.ask(lambda workflow: workflow.leave())
     in_force.see()
     assert in_force.record_folder == folder
-    in_force.runner.come()
+    in_force.runner.ask(lambda workflow: workflow.come())
     in_force.see()
 
     assert in_force.status.is_capturing
@@ -312,7 +318,8 @@ def test_another_source_leaves_the_swing_to_be_resumed(
 ) -> None:
     present.go_on(interrupted)
     source = SourceChoice(SourceKind.RECORDED, str(interrupted))
-    present.runner.choose(replace(present.preparation, source=source, image_size=None))
+    chosen = replace(present.preparation, source=source, image_size=None)
+    present.runner.ask(lambda workflow: workflow.choose(chosen))
     present.see()
 
     assert present.status.state is None
@@ -322,9 +329,10 @@ def test_another_source_leaves_the_swing_to_be_resumed(
 def test_another_source_leaves_a_swing_that_is_solved_to_be_accepted(
     solved: "Station",
 ) -> None:
-    solved.runner.choose(solved.preparation)
+    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
     source = SourceChoice(SourceKind.RECORDED, str(solved.folder))
-    solved.runner.choose(replace(solved.preparation, source=source))
+    chosen = replace(solved.preparation, source=source)
+    solved.runner.ask(lambda workflow: workflow.choose(chosen))
     solved.see()
 
     assert solved.status.solution is not None
@@ -333,11 +341,12 @@ def test_another_source_leaves_a_swing_that_is_solved_to_be_accepted(
 def test_after_the_verdict_other_choices_are_asked_about_until_the_tip_is_accepted(
     solved: "Station",
 ) -> None:
-    solved.runner.choose(solved.preparation)
-    solved.runner.keep_choices()
+    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
+    solved.runner.ask(lambda workflow: workflow.keep_choices())
     solved.see()
     assert not solved.status.has_other_choices
-    solved.runner.choose(other_operator(solved.preparation))
+    chosen = other_operator(solved.preparation)
+    solved.runner.ask(lambda workflow: workflow.choose(chosen))
     solved.see()
     assert solved.status.has_other_choices
 

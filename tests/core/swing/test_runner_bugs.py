@@ -63,7 +63,7 @@ def test_a_bug_while_an_image_is_taken_pauses_the_swing_and_costs_nothing_else(
     assert station.status.is_paused_by_user
     assert not station.status.has_fault
     assert station.n_recorded == station.state.n_kept == N_IMAGES + 1
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
     assert station.witness.reliefs == station.witness.faults
     station.solve()
@@ -81,7 +81,7 @@ def test_a_bug_when_a_swing_begins_is_reported_once_and_tried_again_when_asked_f
     assert len(list(present.records.iterdir())) == 1
     assert present.status.state is None
 
-    present.runner.try_again()
+    present.runner.ask(lambda workflow: workflow.try_again())
     present.see()
     assert present.status.is_capturing
 
@@ -95,12 +95,12 @@ def test_a_bug_in_a_command_pauses_the_swing_and_costs_nothing_else(
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.finish", fail)
-        station.runner.finish()
+        station.runner.ask(lambda workflow: workflow.finish())
         station.wait_until(lambda: len(station.witness.faults) == 1)
     assert is_reported_once(crashes)
     assert station.status.is_paused_by_user
 
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
     station.solve()
     assert station.solution.numbers.tolist() == list(range(1, N_IMAGES + 2))
@@ -118,9 +118,10 @@ def test_a_swing_whose_entrance_fails_by_a_bug_leaves_the_one_before_whole(
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.recorded_names", fail)
-        station.runner.go_on(read_resumable(other))
+        resumable = read_resumable(other)
+        station.runner.ask(lambda workflow: workflow.go_on(resumable))
         station.wait_until(lambda: len(station.witness.faults) == 1)
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
 
     assert is_reported_once(crashes)
@@ -139,13 +140,13 @@ def test_a_bug_while_the_tip_is_computed_leaves_the_swing_to_be_solved_again(
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.solve_record", fail)
-        station.runner.finish()
+        station.runner.ask(lambda workflow: workflow.finish())
         station.wait_for_phase(Phase.SOLVING)
         station.wait_until(lambda: not station.status.is_solving)
     assert is_reported_once(crashes)
     assert station.status.solution is None
 
-    station.runner.solve()
+    station.runner.ask(lambda workflow: workflow.solve())
     station.wait_for_phase(Phase.VERDICT)
     assert station.status.solution is not None
 
@@ -159,12 +160,12 @@ def test_a_bug_when_the_tip_is_judged_leaves_the_swing_to_be_solved_again(
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.assess", fail)
-        station.runner.finish()
+        station.runner.ask(lambda workflow: workflow.finish())
         assert is_reported_once(crashes)
         station.wait_until(lambda: not station.status.is_solving)
     assert station.status.solution is None
 
-    station.runner.solve()
+    station.runner.ask(lambda workflow: workflow.solve())
     station.wait_for_phase(Phase.VERDICT)
 
 
@@ -174,12 +175,12 @@ def test_a_bug_while_images_are_read_again_leaves_the_solution(
     before = solved.solution
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.read_for_more", fail)
-        solved.runner.capture_more()
+        solved.runner.ask(lambda workflow: workflow.capture_more())
         assert is_reported_once(crashes)
         solved.wait_until(lambda: not solved.status.is_reading)
     assert solved.solution is before
 
-    solved.runner.capture_more()
+    solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
     assert solved.state.n_kept == N_IMAGES
 
@@ -189,7 +190,7 @@ def test_a_bug_while_a_result_is_stored_leaves_the_tip_to_be_accepted(
 ) -> None:
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.accept", fail)
-        solved.runner.accept("It is seen to.")
+        solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
         solved.wait_until(lambda: len(solved.witness.faults) == 1)
     assert is_reported_once(crashes)
     assert solved.status.activity is Activity.NONE
@@ -207,8 +208,8 @@ def test_a_bug_in_a_command_lets_what_is_computed_go_on(
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.operator_presence.replace", fail)
-        station.runner.finish()
-        station.runner.come()
+        station.runner.ask(lambda workflow: workflow.finish())
+        station.runner.ask(lambda workflow: workflow.come())
         station.wait_until(lambda: len(station.witness.faults) == 1)
     station.wait_for_phase(Phase.VERDICT)
 
@@ -230,6 +231,6 @@ def test_a_bug_of_the_listener_ends_neither_the_swing_nor_the_runner(
         assert crashes.get(timeout=TIMEOUT) is MistakeError
     assert crashes.empty()
 
-    station.runner.resume()
+    station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
     assert station.n_recorded == N_IMAGES + 1

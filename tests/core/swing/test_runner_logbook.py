@@ -58,8 +58,9 @@ def test_accepted_and_taken_back_tips_are_entered(
     assert (accepted.kind, accepted.reason) == (Kind.ACCEPTED, "It is seen to.")
     assert accepted.tip_pen_mm == tuple(logging.tip)
 
-    assert logging.status.result is not None
-    logging.runner.revoke(logging.status.result, "Ben")
+    result = logging.status.result
+    assert result is not None
+    logging.runner.ask(lambda workflow: workflow.revoke(result, "Ben"))
     logging.wait_until(lambda: logging.status.revoked is not None)
     _, back = entered(logging)
     assert (back.kind, back.names.operator) == (Kind.TAKEN_BACK, "Ben")
@@ -71,7 +72,7 @@ def test_a_tip_that_is_not_accepted_is_entered_as_refused_with_its_verdict(
     logging.go_on(interrupted)
     logging.solve()
     tip, verdict = logging.tip, logging.status.verdict
-    logging.runner.set_aside()
+    logging.runner.ask(lambda workflow: workflow.set_aside())
     logging.wait_until(lambda: logging.status.record_folder is None)
     logging.see()
 
@@ -81,7 +82,7 @@ def test_a_tip_that_is_not_accepted_is_entered_as_refused_with_its_verdict(
     assert event.why is not None
     assert event.why.code == verdict.reason.code
     assert event.tip_pen_mm == tuple(tip)
-    logging.runner.open_logbook()
+    logging.runner.ask(lambda workflow: workflow.open_logbook())
     logging.see()
     assert len(entered(logging)) == 1
 
@@ -91,7 +92,7 @@ def test_what_the_files_tell_of_is_entered_at_the_start(
 ) -> None:
     discard_swing(interrupted)
     Logbook(logging.folder).close()  # which makes what is looked into below
-    logging.runner.open_logbook()
+    logging.runner.ask(lambda workflow: workflow.open_logbook())
     deadline = time.monotonic() + TIMEOUT
     while not entered(logging):
         assert time.monotonic() < deadline
@@ -104,7 +105,7 @@ def test_what_the_files_tell_of_is_entered_at_the_start(
 def test_a_swing_without_a_tip_is_entered_as_abandoned(logging: Station) -> None:
     logging.begin()
     logging.keep(2)
-    logging.runner.set_aside()
+    logging.runner.ask(lambda workflow: workflow.set_aside())
     logging.wait_until(lambda: logging.status.record_folder is None)
     logging.see()
 

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import Activity
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:
@@ -59,16 +61,16 @@ def test_so_it_is_after_taking_images_out_and_putting_some_back(
     solved: "Station", command: Command
 ) -> None:
     before = solved.tip
-    solved.runner.take_out([2, 5, 9])
+    solved.runner.ask(lambda workflow: workflow.take_out([2, 5, 9]))
     solved.wait_until_solved()
     without = solved.tip
-    solved.runner.put_back([5])
+    solved.runner.ask(lambda workflow: workflow.put_back([5]))
     solved.wait_until_solved()
     assert len({tuple(tip) for tip in (before, without, solved.tip)}) == 3
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
     assert set(open_record(solved.record_folder).taken_out) == {2, 9}
 
-    solved.runner.put_back([2, 9])
+    solved.runner.ask(lambda workflow: workflow.put_back([2, 9]))
     solved.wait_until_solved()
     assert solved.tip == before == command(solved.record_folder)["tip_pen_mm"]
 
@@ -86,8 +88,8 @@ def test_images_taken_out_in_quick_succession_all_count(
     solved: "Station", command: Command
 ) -> None:
     for number in range(1, 8):
-        solved.runner.take_out([number])
-    solved.runner.put_back([4])
+        solved.runner.ask(partial(SwingWorkflow.take_out, numbers=[number]))
+    solved.runner.ask(lambda workflow: workflow.put_back([4]))
     solved.wait_until_solved()
 
     assert set(solved.solution.taken_out) == {1, 2, 3, 5, 6, 7}
@@ -102,10 +104,10 @@ def test_images_taken_out_in_quick_succession_all_count(
 def test_too_few_images_left_keep_the_solution_and_the_record(
     solved: "Station",
 ) -> None:
-    solved.runner.take_out([1])
+    solved.runner.ask(lambda workflow: workflow.take_out([1]))
     solved.wait_until_solved()
     before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
-    solved.runner.take_out(range(1, N_IMAGES))
+    solved.runner.ask(lambda workflow: workflow.take_out(range(1, N_IMAGES)))
     solved.wait_until_solved()
 
     assert solved.solution is before
@@ -117,15 +119,16 @@ def test_too_few_images_left_keep_the_solution_and_the_record(
         in sentence
     )
     assert solved.witness.reliefs == []
-    solved.runner.take_out([2])  # what failed is not asked for again
+    # what failed is not asked for again
+    solved.runner.ask(lambda workflow: workflow.take_out([2]))
     solved.wait_until_solved()
     assert set(solved.solution.taken_out) == {1, 2}
     assert solved.witness.reliefs == solved.witness.faults
 
 
 def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: "Station") -> None:
-    solved.runner.take_out(range(1, N_IMAGES))
-    solved.runner.put_back(range(4, N_IMAGES))
+    solved.runner.ask(lambda workflow: workflow.take_out(range(1, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.put_back(range(4, N_IMAGES)))
     solved.wait_until_solved()
 
     assert set(solved.solution.taken_out) == {1, 2, 3}
@@ -136,7 +139,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     before = solved.solution
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.runner.take_out([3])
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
     solved.wait_until_solved()
     journal.with_name("elsewhere").rename(journal)
 
@@ -145,7 +148,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     assert "does not exist" in sentence
     assert "stay in" not in sentence
     assert solved.witness.reliefs == []
-    solved.runner.take_out([3])
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
     solved.wait_until_solved()
     assert solved.witness.reliefs == [sentence]
 
@@ -154,15 +157,15 @@ def test_solving_can_be_cancelled_and_done_again(
     station: "Station", interrupted: Path
 ) -> None:
     station.go_on(interrupted)
-    station.runner.finish()
-    station.runner.cancel()
+    station.runner.ask(lambda workflow: workflow.finish())
+    station.runner.ask(lambda workflow: workflow.cancel())
     station.see()
     assert Activity.SOLVING in [s.activity for s in station.witness.statuses]
     assert not station.status.is_solving
     assert station.state.phase is Phase.SOLVING
     assert station.status.solution is None
 
-    station.runner.solve()
+    station.runner.ask(lambda workflow: workflow.solve())
     station.wait_for_phase(Phase.VERDICT)
     assert station.status.solution is not None
 
@@ -191,8 +194,8 @@ def test_nothing_comes_of_a_solution_after_its_swing_was_abandoned(
 
     monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve_late)
     station.go_on(interrupted)
-    station.runner.finish()
-    station.runner.abandon()
+    station.runner.ask(lambda workflow: workflow.finish())
+    station.runner.ask(lambda workflow: workflow.abandon())
     station.see()
     may_go_on.set()
     assert is_solved.wait(TIMEOUT)
@@ -210,11 +213,11 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
     solved: "Station",
 ) -> None:
     before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
-    solved.runner.take_out([3])
-    solved.runner.cancel()
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.cancel())
     solved.see()
     assert not solved.status.is_solving
-    solved.runner.take_out([7])
+    solved.runner.ask(lambda workflow: workflow.take_out([7]))
     solved.wait_until_solved()
 
     assert before.taken_out == {}
@@ -246,9 +249,9 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_is_reported_once(
 def test_more_images_can_be_captured_after_the_verdict(
     solved: "Station", command: Command
 ) -> None:
-    solved.runner.take_out([3])
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
     solved.wait_until_solved()
-    solved.runner.capture_more()
+    solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
     assert solved.status.solution is None
     assert not solved.status.is_reading
@@ -266,12 +269,14 @@ def test_the_operators_side_is_that_of_the_station_and_kept_for_more_images(
     station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> None:
     rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
-    station.runner.choose(replace(station.preparation, heading=np.pi))
+    chosen = replace(station.preparation, heading=np.pi)
+    station.runner.ask(lambda workflow: workflow.choose(chosen))
     station.go_on(interrupted)
     assert station.state.heading == np.pi
     station.solve()
-    station.runner.choose(replace(station.preparation, heading=0.0))
-    station.runner.capture_more()
+    turned = replace(station.preparation, heading=0.0)
+    station.runner.ask(lambda workflow: workflow.choose(turned))
+    station.runner.ask(lambda workflow: workflow.capture_more())
     station.wait_until(lambda: station.status.is_capturing)
 
     assert station.state.heading == np.pi
@@ -281,7 +286,7 @@ def test_the_operators_side_is_that_of_the_station_and_kept_for_more_images(
 def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
     solved: "Station",
 ) -> None:
-    solved.runner.capture_more()
+    solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
     assert solved.status.setup is not None
     assert solved.status.setup.limits.min_images > N_IMAGES + 1
@@ -296,8 +301,8 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
 def test_more_images_can_be_captured_while_a_wish_is_computed(
     solved: "Station",
 ) -> None:
-    solved.runner.take_out([3])
-    solved.runner.capture_more()
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
     solved.keep(1)
 
@@ -311,23 +316,24 @@ def test_images_that_cannot_be_read_again_leave_the_solution_and_no_wish(
     before = solved.solution
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.runner.take_out([3])
-    solved.runner.capture_more()
-    solved.runner.take_out([4])  # while they are read nothing is taken out
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.capture_more())
+    # while they are read nothing is taken out
+    solved.runner.ask(lambda workflow: workflow.take_out([4]))
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
     solved.wait_until(lambda: solved.status.activity is Activity.NONE)
     journal.with_name("elsewhere").rename(journal)
     assert solved.solution is before
     assert not solved.status.is_capturing
 
-    solved.runner.take_out([7])
+    solved.runner.ask(lambda workflow: workflow.take_out([7]))
     solved.wait_until_solved()
     assert set(solved.solution.taken_out) == {7}
 
 
 def test_a_solved_swing_is_set_aside_with_its_images(solved: "Station") -> None:
     folder = solved.record_folder
-    solved.runner.set_aside()
+    solved.runner.ask(lambda workflow: workflow.set_aside())
     solved.wait_until(lambda: solved.status.state is None)
 
     assert open_record(folder).verdict == DISCARDED
@@ -340,7 +346,7 @@ def test_a_swing_that_is_captured_is_set_aside_for_good(
 ) -> None:
     station.go_on(interrupted)
     station.keep(1)
-    station.runner.set_aside()
+    station.runner.ask(lambda workflow: workflow.set_aside())
     station.wait_until(lambda: station.status.state is None)
     assert open_record(interrupted).verdict == DISCARDED
     station.begin()
@@ -400,8 +406,8 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(
 
 
 def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
-    solved.runner.accept("It is seen to.")
-    solved.runner.accept("It is seen to.")
+    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
     solved.see()
 
     assert solved.status.result is not None
@@ -409,8 +415,8 @@ def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
 
 
 def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
-    solved.runner.take_out([3])
-    solved.runner.accept("It is seen to.")
+    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
     solved.wait_until_solved()
 
     assert solved.status.result is None
@@ -420,7 +426,7 @@ def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> N
 def test_without_a_reason_a_tip_that_is_to_be_checked_is_not_accepted(
     solved: "Station",
 ) -> None:
-    solved.runner.accept()
+    solved.runner.ask(lambda workflow: workflow.accept())
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
 
     assert solved.status.result is None
@@ -435,7 +441,7 @@ def test_what_was_accepted_can_be_taken_back_and_accepted_again(
     solved.accept("First.")
     first = solved.status.result
     assert first is not None
-    solved.runner.revoke(first, "Ben")
+    solved.runner.ask(lambda workflow: workflow.revoke(first, "Ben"))
     solved.wait_until(lambda: solved.status.revoked is first)
 
     assert solved.status.result is None
@@ -453,7 +459,7 @@ def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
     first = in_force.status.result
     assert first is not None
     in_force.go_on(other)
-    in_force.runner.revoke(first, "Ben")
+    in_force.runner.ask(lambda workflow: workflow.revoke(first, "Ben"))
     in_force.wait_until(lambda: in_force.status.revoked is first)
 
     assert in_force.status.is_capturing
@@ -464,7 +470,7 @@ def test_a_result_that_is_not_in_force_is_not_taken_back(in_force: "Station") ->
     first = in_force.status.result
     assert first is not None
     for _ in range(2):
-        in_force.runner.revoke(first, "Ben")
+        in_force.runner.ask(lambda workflow: workflow.revoke(first, "Ben"))
     in_force.wait_until(lambda: len(in_force.witness.faults) == 1)
 
     assert "is no longer current" in in_force.witness.faults[0]
@@ -480,7 +486,7 @@ def test_a_tip_that_is_to_be_repeated_is_not_accepted(
     assert station.status.verdict.grade is Grade.REPEAT
     assert station.witness.event_kinds[-1] is SwingEventKind.FAILED
 
-    station.runner.accept("It is seen to.")
+    station.runner.ask(lambda workflow: workflow.accept("It is seen to."))
     station.see()
     assert station.status.result is None
     assert station.in_force() is None
@@ -491,10 +497,14 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
     solution, result = in_force.solution, in_force.status.result
     journal = (in_force.record_folder / JOURNAL).read_bytes()
     runner = in_force.runner
-    runner.take_out([1])
-    runner.accept("It is seen to.")
-    for act in (runner.solve, runner.capture_more, runner.set_aside):
-        act()
+    runner.ask(lambda workflow: workflow.take_out([1]))
+    runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    for act in (
+        SwingWorkflow.solve,
+        SwingWorkflow.capture_more,
+        SwingWorkflow.set_aside,
+    ):
+        runner.ask(act)
     in_force.see()
 
     assert in_force.status.activity is Activity.NONE
@@ -507,7 +517,7 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> None:
     solved.results.parent.mkdir()
     solved.results.write_text("not a folder")
-    solved.runner.accept("It is seen to.")
+    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
     assert solved.status.result is None
     assert solved.status.activity is Activity.NONE
@@ -527,10 +537,11 @@ def test_a_result_bears_the_time_that_the_runner_goes_by(
         station.records, station.archive, station.witness, now=lambda: noon
     )
     rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
-    runner.go_on(read_resumable(interrupted))
-    runner.finish()
+    resumable = read_resumable(interrupted)
+    runner.ask(lambda workflow: workflow.go_on(resumable))
+    runner.ask(lambda workflow: workflow.finish())
     station.witness.wait_until(lambda: runner.status.verdict is not None)
-    runner.accept("It is seen to.")
+    runner.ask(lambda workflow: workflow.accept("It is seen to."))
     runner.shut_down()
     assert runner.await_end(TIMEOUT)
     result = station.in_force()

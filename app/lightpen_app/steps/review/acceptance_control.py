@@ -20,7 +20,7 @@ class AcceptanceControl(QObject):
 
         # Connections
         view.accept.clicked.connect(self._ask_reason)
-        view.reason.given.connect(self._runner.accept)
+        view.reason.given.connect(self._accept)
         view.repeat.clicked.connect(self.ask_to_repeat)
         view.take_back.clicked.connect(self._ask_to_take_back)
         view.withdrawal.given.connect(self._withdraw)
@@ -28,7 +28,7 @@ class AcceptanceControl(QObject):
 
     def ask_to_repeat(self) -> None:
         """Ask whether to set the swing aside and repeat it."""
-        self._view.question.ask_about(repeat_question, self._runner.set_aside)
+        self._view.question.ask_about(repeat_question, self._set_aside)
 
     def _ask_reason(self) -> None:
         status = self._run.status
@@ -36,6 +36,12 @@ class AcceptanceControl(QObject):
             supervision, station = self._selection.supervision, status.names.station
             of_supervisor = takes_supervisor(supervision, status.assessment, station)
             self._view.reason.ask(of_supervisor=of_supervisor)
+
+    def _accept(self, reason: str, signature: Signature | None) -> None:
+        self._runner.ask(lambda workflow: workflow.accept(reason, signature))
+
+    def _set_aside(self) -> None:
+        self._runner.ask(lambda workflow: workflow.set_aside())
 
     def _ask_to_take_back(self) -> None:
         if self._selection.supervision.is_guarded:
@@ -47,7 +53,9 @@ class AcceptanceControl(QObject):
         result = self._run.status.result
         if result is not None:
             operator = self._selection.preparation.names.operator
-            self._runner.revoke(result, operator, reason, signature)
+            self._runner.ask(
+                lambda workflow: workflow.revoke(result, operator, reason, signature)
+            )
 
     def _on_refused(self) -> None:
         if self._run.status.result is None:

@@ -157,7 +157,7 @@ class NextTipsControl(QObject):
         self._row.set_statuses(self._tips.statuses)
 
     def _on_chosen(self, tip: NextTip) -> None:
-        self._run.runner.abandon()
+        self._run.runner.ask(lambda workflow: workflow.abandon())
         chosen = self._selection.preparation
         if tip.last is not None:
             chosen = chosen.with_last(tip.last)

@@ -73,8 +73,8 @@ class ReviewPage(Page):
         self._run.progressed.connect(view.set_progress)
         self._accepted.timeout.connect(self.changed)
         self._reading.timeout.connect(self.changed)
-        view.cancel.clicked.connect(self._runner.cancel)
-        view.capture_more.clicked.connect(self._runner.capture_more)
+        view.cancel.clicked.connect(self._on_cancel_clicked)
+        view.capture_more.clicked.connect(self._capture_more)
         view.verify.clicked.connect(self._on_verify_clicked)
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.saved.connect(notices.show_status)
@@ -119,15 +119,16 @@ class ReviewPage(Page):
         if status.result is not None:
             if not self._next_tip():
                 self.step_requested.emit("start")
-            self._runner.abandon()  # which leads to the next swing
+            # which leads to the next swing
+            self._runner.ask(lambda workflow: workflow.abandon())
             return
         if why_not_now(status):
             return
         match next_step(status):
             case NextStep.ACCEPT:
-                self._runner.accept()
+                self._runner.ask(lambda workflow: workflow.accept())
             case NextStep.CAPTURE_MORE if not status.is_recording:
-                self._runner.capture_more()
+                self._capture_more()
             case NextStep.SEE_TO_CAUSE:
                 self.step_requested.emit("start")
             case step if step in OF_FILES:
@@ -214,8 +215,20 @@ class ReviewPage(Page):
 
     def _on_images_made(self, images: "ImagesPanel") -> None:
         self._refresh_words()
-        images.take_out_requested.connect(self._runner.take_out)
-        images.put_back_requested.connect(self._runner.put_back)
+        images.take_out_requested.connect(self._take_out)
+        images.put_back_requested.connect(self._put_back)
+
+    def _on_cancel_clicked(self) -> None:
+        self._runner.ask(lambda workflow: workflow.cancel())
+
+    def _capture_more(self) -> None:
+        self._runner.ask(lambda workflow: workflow.capture_more())
+
+    def _take_out(self, numbers: list[int]) -> None:
+        self._runner.ask(lambda workflow: workflow.take_out(numbers))
+
+    def _put_back(self, numbers: list[int]) -> None:
+        self._runner.ask(lambda workflow: workflow.put_back(numbers))
 
     def _next_tip(self) -> str:
         """Return the tip that can be swung at once, as it is chosen by now."""

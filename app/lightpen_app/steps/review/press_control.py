@@ -16,12 +16,16 @@ class PressTestControl(QObject):
         self, run: SwingRun, view: ReviewView, notifications: Notifications
     ) -> None:
         super().__init__(view)
+        self._runner = run.runner
         self._result, self._notices = view.result, notifications
         self._compared: tuple[object, object] = None, None
         self._job: Job | None = None
 
         # Connections
-        view.tools.press_requested.connect(run.runner.press)
+        view.tools.press_requested.connect(self._press)
+
+    def _press(self) -> None:
+        self._runner.ask(lambda workflow: workflow.press())
 
     def follow(self, status: SwingStatus) -> None:
         """Compare the swings of a status, if there are two."""

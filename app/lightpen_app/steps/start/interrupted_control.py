@@ -189,8 +189,8 @@ class InterruptedControl(QObject):
         self._take_over(swing)
         self._reviewed = swing.record.folder
         runner = self._run.runner
-        runner.go_on(swing)
-        runner.finish()
+        runner.ask(lambda workflow: workflow.go_on(swing))
+        runner.ask(lambda workflow: workflow.finish())
 
     def _on_swing_read(self, swing: Resumable) -> None:
         self._panel.set_waiting("")
@@ -227,7 +227,7 @@ class InterruptedControl(QObject):
             )
         else:
             self._resumed = swing.record.folder
-            self._run.runner.go_on(swing)
+            self._run.runner.ask(lambda workflow: workflow.go_on(swing))
 
     def _take_over(self, swing: Resumable) -> None:
         """Select the item of the swing and the cameras of its station and its own."""

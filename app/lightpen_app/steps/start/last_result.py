@@ -123,7 +123,9 @@ class LastResultPresenter(QObject):
         self, result: Result, reason: str, signature: Signature | None
     ) -> None:
         operator = self._selection.preparation.names.operator
-        self._run.runner.revoke(result, operator, reason, signature)
+        self._run.runner.ask(
+            lambda workflow: workflow.revoke(result, operator, reason, signature)
+        )
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:

@@ -7,6 +7,7 @@ from typing_extensions import override
 from lightpen.cameras.worker_events import Connection
 from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.image_sources import SourceKind
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sounds import Sound, Sounds
@@ -31,6 +32,11 @@ from lightpen_app.work.workbench import Workbench
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
 PLOTTING_MS = 40  # from one plot to the next
 PAUSES = {SideAction.PAUSE, SideAction.RESUME}
+COMMANDS = {
+    SideAction.STOP_COMPUTING: SwingWorkflow.cancel,
+    SideAction.COMPUTE: SwingWorkflow.solve,
+    SideAction.CAPTURE_MORE: SwingWorkflow.capture_more,
+}
 
 
 class SwingPage(Page):
@@ -98,10 +104,10 @@ class SwingPage(Page):
             self.advance_requested.emit()
         elif missing_text(self._run.status):
             self._question.ask_about(
-                lambda: finish_question(self._run.status), self._runner.finish
+                lambda: finish_question(self._run.status), self._finish
             )
         else:
-            self._runner.finish()
+            self._finish()
 
     @override
     def is_hands_free(self) -> bool:
@@ -110,7 +116,7 @@ class SwingPage(Page):
     @override
     def toggle_pause(self) -> None:
         is_paused = self._run.status.is_paused_by_user
-        (self._runner.resume if is_paused else self._runner.pause)()
+        self._runner.ask(SwingWorkflow.resume if is_paused else SwingWorkflow.pause)
 
     @override
     def first_control(self) -> QWidget:
@@ -122,7 +128,7 @@ class SwingPage(Page):
         is_recording = self._selection.preparation.source.kind == SourceKind.RECORDED
         if is_recording and self._run.status.state is None:
             self._camera.open()  # it begins with its first image
-        self._runner.come()
+        self._runner.ask(lambda workflow: workflow.come())
         self._ask_about_choices()
         self._show()
         self._plotting.start()
@@ -132,7 +138,7 @@ class SwingPage(Page):
         self._plotting.stop()
         self._question.hide()
         self._is_entered = False
-        self._runner.leave()
+        self._runner.ask(lambda workflow: workflow.leave())
         self._show()
 
     @override
@@ -155,7 +161,7 @@ class SwingPage(Page):
     def _ask_about_choices(self) -> None:
         """Ask whether to continue a swing although the selection has changed."""
         if self._is_entered and self._run.status.has_other_choices:
-            self._runner.keep_choices()
+            self._runner.ask(lambda workflow: workflow.keep_choices())
             self._question.ask_about(other_choices_question, self._start_anew)
 
     def _show_soon(self) -> None:
@@ -213,16 +219,16 @@ class SwingPage(Page):
         self._show_soon()
 
     def _on_act_clicked(self) -> None:
-        if self._shown.side is SideAction.OPEN_CAMERA:
+        side = self._shown.side
+        if side in PAUSES:
+            self.toggle_pause()
+            return
+        if side is SideAction.OPEN_CAMERA:
             self._camera.open()
-        runner, pause = self._runner, self.toggle_pause
-        acts = {
-            **dict.fromkeys(PAUSES, pause),
-            SideAction.STOP_COMPUTING: runner.cancel,
-            SideAction.COMPUTE: runner.solve,
-            SideAction.CAPTURE_MORE: runner.capture_more,
-        }
-        acts.get(self._shown.side, runner.try_again)()
+        self._runner.ask(COMMANDS.get(side, SwingWorkflow.try_again))
+
+    def _finish(self) -> None:
+        self._runner.ask(lambda workflow: workflow.finish())
 
     def _on_start_over_clicked(self) -> None:
         status = self._run.status
@@ -234,12 +240,12 @@ class SwingPage(Page):
             )
 
     def _on_swapped_clicked(self) -> None:
-        self._runner.forget_side()
+        self._runner.ask(lambda workflow: workflow.forget_side())
         self._face.dial.setFocus()  # the button is no longer there
 
     def _start_anew(self) -> None:
         if why_not := self._missing_input():
             self._notices.notify(self.key, why_not)
             return
-        self._runner.start_over()
+        self._runner.ask(lambda workflow: workflow.start_over())
         self._face.dial.setFocus()  # Enter would restart

@@ -1149,7 +1149,8 @@ def test_names_come_before_the_camera(page: CameraPage, workbench: Workbench) ->
 def test_a_swing_under_way_is_reported(live: "Seen", workbench: Workbench) -> None:
     assert "A swing is in progress." not in live.words
 
-    workbench.run.runner.begin(workbench.selection.preparation)
+    chosen = workbench.selection.preparation
+    workbench.run.runner.ask(lambda workflow: workflow.begin(chosen))
 
     live.wait("A swing is in progress.")
 

@@ -196,8 +196,9 @@ class Bed:
         settings = {"max_uncertainty_mm": limit, "origin": self.origin}
         self.rewrite_header(folder, settings)
         before = workbench.run.status.assessment
-        workbench.run.runner.go_on(self.solved_once.read(folder))
-        workbench.run.runner.finish()
+        resumable = self.solved_once.read(folder)
+        workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        workbench.run.runner.ask(lambda workflow: workflow.finish())
         self.qtbot.waitUntil(
             lambda: workbench.run.status.assessment not in (None, before)
         )
@@ -526,7 +527,7 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     assert page.main_action() == MainAction("Capture more")
     assert not button(page, "Accept...").isEnabled()
     assert button(page, "Accept...").toolTip().startswith("Result not acceptable.")
-    workbench.run.runner.accept("whatever")
+    workbench.run.runner.ask(lambda workflow: workflow.accept("whatever"))
     with bed.qtbot.waitSignal(workbench.notifications.raised) as reported:
         pass
     assert reported.args[0].startswith("The tip cannot be accepted.")
@@ -1299,7 +1300,7 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
     before = workbench.run.status.solution
 
     with solving_on():
-        workbench.run.runner.solve()
+        workbench.run.runner.ask(lambda workflow: workflow.solve())
         bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
         click(page, "Cancel")
         bed.qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
@@ -1464,16 +1465,15 @@ def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     folder, setup = first.record_folder, first.setup
     assert folder is not None
     assert setup is not None
-    run.runner.choose(
-        replace(
-            workbench.selection.preparation,
-            names=first.names,
-            camera_file=CameraFile.read(next(folder.glob("camera.*"))),
-            pen_file=PenFile.read(next(folder.glob("pen.*"))),
-            image_size=setup.camera.image_size,
-        )
+    chosen = replace(
+        workbench.selection.preparation,
+        names=first.names,
+        camera_file=CameraFile.read(next(folder.glob("camera.*"))),
+        pen_file=PenFile.read(next(folder.glob("pen.*"))),
+        image_size=setup.camera.image_size,
     )
-    run.runner.keep_choices()
+    run.runner.ask(lambda workflow: workflow.choose(chosen))
+    run.runner.ask(lambda workflow: workflow.keep_choices())
     with qtbot.waitSignal(page.step_requested, timeout=20000) as asked:
         click(page, "Press test")
 
@@ -1662,8 +1662,9 @@ def failed(bed: Bed, monkeypatch: pytest.MonkeyPatch) -> ReviewPage:
 
     monkeypatch.setattr("lightpen.swing.workflow.solve_record", diverges)
     workbench, folder = bed.workbench, bed.workbench.run.records_folder / "swing"
-    workbench.run.runner.go_on(bed.solved_once.read(folder))
-    workbench.run.runner.finish()
+    resumable = bed.solved_once.read(folder)
+    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    workbench.run.runner.ask(lambda workflow: workflow.finish())
     bed.qtbot.waitUntil(lambda: workbench.run.status.failure is not None)
     with undressed():
         page = ReviewPage(workbench)

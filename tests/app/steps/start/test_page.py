@@ -366,7 +366,8 @@ def test_any_name_will_do(
     again.start()
     assert again.selection.preparation.names == names
     qtbot.waitUntil(lambda: not again.files.is_reading)
-    again.run.runner.begin(again.selection.preparation)
+    chosen = again.selection.preparation
+    again.run.runner.ask(lambda workflow: workflow.begin(chosen))
     qtbot.waitUntil(lambda: again.run.status.record_folder is not None)
     again.shut_down()
     accepted(workbench, timedelta(0))

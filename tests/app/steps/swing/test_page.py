@@ -276,7 +276,8 @@ def capturing(qtbot: QtBot, shared_desk: Desk) -> Desk:
         workbench.selection.set_preparation(
             replace(workbench.selection.preparation, limits=LONG)
         )
-        desk.run.runner.set_aside()  # the next may begin at once
+        # the next may begin at once
+        desk.run.runner.ask(lambda workflow: workflow.set_aside())
         until(
             qtbot,
             lambda: (
@@ -488,7 +489,7 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
     desk = at_verdict
     folder = desk.run.status.record_folder
     desk.window.go_to(2)
-    desk.run.runner.accept("It is seen to.")
+    desk.run.runner.ask(lambda workflow: workflow.accept("It is seen to."))
     until(qtbot, lambda: desk.value.state.word == "PRACTICE SAVED")
     assert desk.value.instruction == "Accepted"
     assert folder is not None
@@ -673,11 +674,12 @@ def test_finishing_early_says_what_is_missing_and_can_be_declined(
 def test_closing_the_window_asks_and_names_the_images(
     qtbot: QtBot, capturing: Desk
 ) -> None:
-    capturing.run.runner.pause()
+    capturing.run.runner.ask(lambda workflow: workflow.pause())
     until(qtbot, lambda: capturing.state.phase is Phase.PAUSED)
 
     said = capturing.page.unsaved()
-    capturing.run.runner.resume()  # for the tests that go on with this swing
+    # for the tests that go on with this swing
+    capturing.run.runner.ask(lambda workflow: workflow.resume())
     assert f"captured images ({capturing.state.n_kept}) are saved" in said
 
 
