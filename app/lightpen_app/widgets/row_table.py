@@ -1,11 +1,61 @@
-"""A table with selection of whole rows."""
+"""A table with selection of whole rows, and its model."""
 
-from PySide6.QtCore import QAbstractItemModel, Qt
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractItemModel,
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    Qt,
+)
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
 
+Index = QModelIndex | QPersistentModelIndex
 ROW_HEIGHT = 7 * GRID // 2
+
+
+class TitledModel(QAbstractTableModel):
+    """A model whose columns have titles."""
+
+    n_columns: int
+
+    def titles(self) -> tuple[str, ...]:
+        """Return the titles of the columns in the selected language."""
+        raise NotImplementedError
+
+    def side(self, column: int) -> Qt.AlignmentFlag | None:
+        """Return the horizontal alignment of a title; None for that of the view."""
+
+    def hint(self, column: int) -> str | None:
+        """Return the tool tip of a title, if it has one."""
+
+    @override
+    def columnCount(self, parent: Index | None = None) -> int:
+        is_cell = parent is not None and parent.isValid()
+        return 0 if is_cell else self.n_columns
+
+    @override
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> Any:
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return self.titles()[section]
+            case Qt.ItemDataRole.ToolTipRole:
+                return self.hint(section)
+            case Qt.ItemDataRole.TextAlignmentRole:
+                side = self.side(section)
+                return None if side is None else side | Qt.AlignmentFlag.AlignVCenter
+        return None
 
 
 class RowTable(QTableView):

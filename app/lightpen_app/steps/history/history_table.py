@@ -5,15 +5,7 @@ from collections.abc import Sequence
 from itertools import chain, islice
 from typing import Any
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QEvent,
-    QItemSelectionModel,
-    QModelIndex,
-    QPersistentModelIndex,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import QEvent, QItemSelectionModel, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QWidget
 from typing_extensions import override
@@ -32,10 +24,9 @@ from lightpen_app.steps.history.texts import (
     verdict_text,
     what_text,
 )
-from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
+from lightpen_app.widgets.row_table import ROW_HEIGHT, Index, RowTable, TitledModel
 from lightpen_app.widgets.translated import Translated
 
-Index = QModelIndex | QPersistentModelIndex
 WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
 NUMBERS = (X, Y, Z, U)
 NAMED = {  # the least and the most that is shown whole, of what anybody may have named
@@ -53,7 +44,7 @@ MOST_SELECTED = 1000  # lines that are compared
 UNREAD = "\u2026"
 
 
-class HistoryModel(QAbstractTableModel):
+class HistoryModel(TitledModel):
     """One row for each entry; visible rows are read.
 
     Signals
@@ -62,6 +53,7 @@ class HistoryModel(QAbstractTableModel):
         Number of the first line of a block that is to be shown.
     """
 
+    n_columns = WORDS + 1
     block_wanted = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -113,10 +105,6 @@ class HistoryModel(QAbstractTableModel):
         return 0 if parent is not None and parent.isValid() else self._n_lines
 
     @override
-    def columnCount(self, parent: Index | None = None) -> int:
-        return 0 if parent is not None and parent.isValid() else WORDS + 1
-
-    @override
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         column = index.column()
         if role == Qt.ItemDataRole.TextAlignmentRole and column in NUMBERS:
@@ -135,27 +123,26 @@ class HistoryModel(QAbstractTableModel):
         return None
 
     @override
-    def headerData(
-        self,
-        section: int,
-        orientation: Qt.Orientation,
-        role: int = Qt.ItemDataRole.DisplayRole,
-    ) -> Any:
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            side = Qt.AlignmentFlag.AlignLeft
-            if section in NUMBERS:
-                side = Qt.AlignmentFlag.AlignRight
-            return side | Qt.AlignmentFlag.AlignVCenter
-        if role != Qt.ItemDataRole.DisplayRole:
-            return None
+    def titles(self) -> tuple[str, ...]:
         return (
-            *(self.tr("When"), self.tr("Station"), self.tr("Pen"), self.tr("Tip")),
-            *(self.tr("Entry type"), self.tr("Verdict")),
-            *(self.tr("x / mm"), self.tr("y / mm"), self.tr("z / mm")),
-            *(self.tr("U / mm"), self.tr("Operator"), self.tr("Notes")),
-        )[section]
+            self.tr("When"),
+            self.tr("Station"),
+            self.tr("Pen"),
+            self.tr("Tip"),
+            self.tr("Entry type"),
+            self.tr("Verdict"),
+            self.tr("x / mm"),
+            self.tr("y / mm"),
+            self.tr("z / mm"),
+            self.tr("U / mm"),
+            self.tr("Operator"),
+            self.tr("Notes"),
+        )
+
+    @override
+    def side(self, column: int) -> Qt.AlignmentFlag:
+        is_number = column in NUMBERS
+        return Qt.AlignmentFlag.AlignRight if is_number else Qt.AlignmentFlag.AlignLeft
 
 
 class HistoryTable(Translated, RowTable):

@@ -1,18 +1,8 @@
 """The LEDs of a pen as an editable table."""
 
 from collections.abc import Mapping
-from typing import TypeAlias
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QItemSelectionModel,
-    QModelIndex,
-    QPersistentModelIndex,
-    QRectF,
-    QSize,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -30,13 +20,11 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, Tone, colors_of
 from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.row_table import Index, TitledModel
 from lightpen_app.widgets.translated import Translated
-
-Index: TypeAlias = QModelIndex | QPersistentModelIndex
 
 N_COORDINATES = 3
 MISFIT = 1 + len(COLUMNS)  # the last column; the first is the LED's number
-N_COLUMNS = MISFIT + 1
 ROW_HEIGHT = 27
 LEAST_HEIGHT = 22 * GRID  # px; the head and five rows
 SHOWN_DECIMALS = 3
@@ -161,9 +149,10 @@ class LedTable(Translated, QTableView):
         self.setAccessibleName(self.tr("LED coordinates"))
 
 
-class _DraftModel(QAbstractTableModel):
+class _DraftModel(TitledModel):
     """A draft with its errors and the live match of each LED."""
 
+    n_columns = MISFIT + 1
     typed = Signal(object)
 
     def __init__(self, parent: QWidget) -> None:
@@ -200,15 +189,11 @@ class _DraftModel(QAbstractTableModel):
             self._emit_data_changed(0, 0)
 
     def retranslate(self) -> None:
-        self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, N_COLUMNS - 1)
+        self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, MISFIT)
 
     @override
     def rowCount(self, parent: Index = ANYWHERE) -> int:
         return 0 if parent.isValid() else self.draft.n_leds
-
-    @override
-    def columnCount(self, parent: Index = ANYWHERE) -> int:
-        return 0 if parent.isValid() else N_COLUMNS
 
     @override
     def flags(self, index: Index) -> Qt.ItemFlag:
@@ -218,22 +203,23 @@ class _DraftModel(QAbstractTableModel):
         return flags
 
     @override
-    def headerData(
-        self,
-        section: int,
-        orientation: Qt.Orientation,
-        role: int = Qt.ItemDataRole.DisplayRole,
-    ) -> object:
-        if orientation is not Qt.Orientation.Horizontal:
+    def titles(self) -> tuple[str, ...]:
+        coordinates = COLUMNS[:N_COORDINATES]
+        return (
+            self.tr("LED"),
+            *(f"{name} / mm" for name in coordinates),
+            *COLUMNS[N_COORDINATES:],
+            self.tr("RMS / px"),
+        )
+
+    @override
+    def hint(self, column: int) -> str | None:
+        if column != MISFIT:
             return None
-        if role == Qt.ItemDataRole.DisplayRole:
-            return self._header(section)
-        if role == Qt.ItemDataRole.ToolTipRole and section == MISFIT:
-            return self.tr(
-                "Distance between the detected LED and its table position in the "
-                "live image / px"
-            )
-        return None
+        return self.tr(
+            "Distance between the detected LED and its table position in the "
+            "live image / px"
+        )
 
     @override
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
@@ -267,14 +253,6 @@ class _DraftModel(QAbstractTableModel):
         self.set_draft(draft)
         self.typed.emit(draft)
         return True
-
-    def _header(self, section: int) -> str:
-        if section == 0:
-            return self.tr("LED")
-        if section == MISFIT:
-            return self.tr("RMS / px")
-        name = COLUMNS[section - 1]
-        return f"{name} / mm" if section <= N_COORDINATES else name
 
     def _text(self, row: int, column: int) -> str:
         if column == 0:

@@ -3,15 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QItemSelection,
-    QItemSelectionModel,
-    QModelIndex,
-    QPersistentModelIndex,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt, Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
@@ -19,15 +11,16 @@ from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID
-from lightpen_app.widgets.row_table import RowTable
+from lightpen_app.widgets.row_table import Index, RowTable, TitledModel
 from lightpen_app.widgets.translated import Translated
 
-Index = QModelIndex | QPersistentModelIndex
 NUMBER, MISFIT, LEDS, STATE = range(4)
 
 
-class ImageModel(QAbstractTableModel):
+class ImageModel(TitledModel):
     """Number, misfit, LEDs and state of each image."""
+
+    n_columns = STATE + 1
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -52,10 +45,6 @@ class ImageModel(QAbstractTableModel):
         return 0 if parent is not None and parent.isValid() else len(self._rows)
 
     @override
-    def columnCount(self, parent: Index | None = None) -> int:
-        return 0 if parent is not None and parent.isValid() else STATE + 1
-
-    @override
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         if role == Qt.ItemDataRole.DisplayRole:
             return self._text(self._rows[index.row()], index.column())
@@ -66,27 +55,18 @@ class ImageModel(QAbstractTableModel):
         return None
 
     @override
-    def headerData(
-        self,
-        section: int,
-        orientation: Qt.Orientation,
-        role: int = Qt.ItemDataRole.DisplayRole,
-    ) -> Any:
-        if orientation != Qt.Orientation.Horizontal:
-            return None
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            side = Qt.AlignmentFlag.AlignLeft
-            if section != STATE:
-                side = Qt.AlignmentFlag.AlignRight
-            return side | Qt.AlignmentFlag.AlignVCenter
-        if role != Qt.ItemDataRole.DisplayRole:
-            return None
+    def titles(self) -> tuple[str, ...]:
         return (
             self.tr("Image"),
             self.tr("RMS / px"),
             self.tr("LEDs"),
             self.tr("State"),
-        )[section]
+        )
+
+    @override
+    def side(self, column: int) -> Qt.AlignmentFlag:
+        is_text = column == STATE
+        return Qt.AlignmentFlag.AlignLeft if is_text else Qt.AlignmentFlag.AlignRight
 
     def _text(self, row: ImageRow, column: int) -> str:
         if column == NUMBER:
