@@ -125,7 +125,9 @@ class Wizard(QObject):
         self.workbench.folder_watch.counted.connect(self._on_others_counted)
         self.workbench.folder_watch.fault_changed.connect(self._on_folder_fault_changed)
         for model in (
-            *(self.workbench.run, self.workbench.library, self.workbench.selection),
+            self.workbench.run,
+            self.workbench.library,
+            self.workbench.selection,
         ):
             model.changed.connect(self._show_subject)
         self.workbench.streaming.changed.connect(self._on_streaming_changed)

@@ -50,7 +50,7 @@ class ActionBar(Translated, QFrame):
         # Layout
         self._layout = horizontal_layout(self, spacing=2 * GRID)
         vertical_layout(
-            *(self._layout, 1, self._why_not, self._status, 1), spacing=0, stretch=1
+            self._layout, 1, self._why_not, self._status, 1, spacing=0, stretch=1
         )
         fill(self._layout, self._back, self._main)
 

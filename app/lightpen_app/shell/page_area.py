@@ -38,7 +38,7 @@ class NoticeBar(Translated, QFrame):
         # Layout
         margins = (2 * GRID, GRID, GRID, GRID)
         horizontal_layout(
-            *(self, (self._text, 1), self._close), spacing=2 * GRID, margins=margins
+            self, (self._text, 1), self._close, spacing=2 * GRID, margins=margins
         )
 
         # Connections

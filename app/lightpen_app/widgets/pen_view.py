@@ -200,8 +200,14 @@ class PenView(Translated, QWidget):
         """Return the drawing, which is kept while the page about it changes."""
         colors, scale = colors_of(self.palette()), self.devicePixelRatio()
         shows = (
-            *(self._value, self._chosen, *self.turned(), self.hasFocus()),
-            *(self.size().toTuple(), scale, colors, self.toolTip()),
+            self._value,
+            self._chosen,
+            *self.turned(),
+            self.hasFocus(),
+            self.size().toTuple(),
+            scale,
+            colors,
+            self.toolTip(),
         )
         if shows != self._picture_shows:
             self._picture_shows = shows

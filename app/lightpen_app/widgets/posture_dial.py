@@ -177,9 +177,16 @@ class PostureDial(Translated, QWidget):
         value, scale = self._value, self.devicePixelRatio()
         camera, legend = self.tr("camera"), self.tr("images\nneeded")
         shows = (
-            *(self.size().toTuple(), scale, colors, camera, legend, value.heading),
-            *(value.counts.tobytes(), value.needed.tobytes()),
-            *(value.n_upright, value.n_upright_needed),
+            self.size().toTuple(),
+            scale,
+            colors,
+            camera,
+            legend,
+            value.heading,
+            value.counts.tobytes(),
+            value.needed.tobytes(),
+            value.n_upright,
+            value.n_upright_needed,
         )
         if shows == self._ground_shows:
             return self._ground

@@ -146,8 +146,11 @@ class Streaming(QObject):
 def _what_counts(preparation: Preparation) -> tuple[object, ...]:
     """Return the inputs of the current tip."""
     return (
-        *(preparation.names, preparation.origin, preparation.second is None),
-        *(preparation.camera_file, preparation.pen_file),
+        preparation.names,
+        preparation.origin,
+        preparation.second is None,
+        preparation.camera_file,
+        preparation.pen_file,
     )
 
 

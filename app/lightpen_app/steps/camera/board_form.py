@@ -23,9 +23,19 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.translated import Translated
 
 DICTIONARIES = (
-    *("DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_5X5_50", "DICT_5X5_100"),
-    *("DICT_5X5_250", "DICT_6X6_50", "DICT_6X6_100", "DICT_6X6_250"),
-    *("DICT_7X7_50", "DICT_7X7_100", "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11"),
+    "DICT_4X4_50",
+    "DICT_4X4_100",
+    "DICT_4X4_250",
+    "DICT_5X5_50",
+    "DICT_5X5_100",
+    "DICT_5X5_250",
+    "DICT_6X6_50",
+    "DICT_6X6_100",
+    "DICT_6X6_250",
+    "DICT_7X7_50",
+    "DICT_7X7_100",
+    "DICT_ARUCO_ORIGINAL",
+    "DICT_APRILTAG_36h11",
 )
 USUAL = {
     kind: parse_board(f"{kind}:{form}")
@@ -132,8 +142,12 @@ class BoardForm(Translated, QWidget):
             choice.setMinimumContentsLength(8)
         self._picture = BoardPicture()
         fields = (
-            *(self._kind, self._dictionary, self._columns, self._rows),
-            *(self._pitch, self._detail),
+            self._kind,
+            self._dictionary,
+            self._columns,
+            self._rows,
+            self._pitch,
+            self._detail,
         )
         self._labels = [field_label(field) for field in fields]
 
@@ -227,10 +241,12 @@ class BoardForm(Translated, QWidget):
             BoardKind.ASYMMETRIC_CIRCLES: (self.tr("Distance"), self.tr("Diameter")),
         }.get(kind, (square, marker))
         words = (
-            *(self.tr("Board"), self.tr("Dictionary")),
+            self.tr("Board"),
+            self.tr("Dictionary"),
             self.tr("Corners per row") if is_chessboard else self.tr("Columns"),
             self.tr("Corners per column") if is_chessboard else self.tr("Rows"),
-            *(pitch, detail),
+            pitch,
+            detail,
         )
         for label, text in zip(self._labels, words, strict=True):
             label.setText(text)

@@ -53,8 +53,11 @@ class CameraPanels(ResponsiveLayout, QWidget):
         self._panels = vertical_layout(
             side,
             self.swing_message,
-            *(self.source, self.settings, self.intrinsics),
-            *(self.second, self.stray_light),
+            self.source,
+            self.settings,
+            self.intrinsics,
+            self.second,
+            self.stray_light,
             1,
             spacing=2 * GRID,
         )

@@ -140,14 +140,20 @@ class HistoryContent(Translated, QWidget):
 
     def _panels(self) -> tuple[QWidget, ...]:
         return (
-            *(self._trend_panel, self._entry, self._selection),
-            *(self._due, self._archive),
+            self._trend_panel,
+            self._entry,
+            self._selection,
+            self._due,
+            self._archive,
         )
 
     def _retranslate(self) -> None:
         names = (
-            *(self.tr("Trend"), self.tr("Entry"), self.tr("Repeatability")),
-            *(self.tr("Due"), self.tr("Archive")),
+            self.tr("Trend"),
+            self.tr("Entry"),
+            self.tr("Repeatability"),
+            self.tr("Due"),
+            self.tr("Archive"),
         )
         for i, name in enumerate(names):
             self._tabs.setTabText(i, name)
@@ -248,7 +254,9 @@ class HistoryContent(Translated, QWidget):
             "Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with "
             "the old file {4} px."
         ).format(
-            *(new.path.parent, new.path.name, new.camera_path.name),
+            new.path.parent,
+            new.path.name,
+            new.camera_path.name,
             *(number_text(x, 4) for x in (improved.sigma_after, improved.sigma_before)),
         )
         self._selection.set_adjusted(StatusMessage(words, Sign.CHECK, Tone.GOOD))

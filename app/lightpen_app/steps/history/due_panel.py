@@ -121,8 +121,11 @@ class DuePanel(Translated, QWidget):
         )
         self._table.setVisible(bool(self._tips))
         columns = (
-            *(self.tr("Calibrated"), self.tr("Due"), self.tr("Swings since")),
-            *(self.tr("Swings left"), self.tr("State")),
+            self.tr("Calibrated"),
+            self.tr("Due"),
+            self.tr("Swings since"),
+            self.tr("Swings left"),
+            self.tr("State"),
         )
         rows = tuple(map(_name, self._tips))
         cells = tuple(self._cells(tip, now) for tip in self._tips)

@@ -77,7 +77,7 @@ class EntryPanel(Translated, QWidget):
             text.setTextInteractionFlags(flags)
         margins = (0, GRID, 0, 0)
         layout = vertical_layout(
-            *(self, self._changed, *self._texts), spacing=GRID // 2, margins=margins
+            self, self._changed, *self._texts, spacing=GRID // 2, margins=margins
         )
         layout.addSpacing(GRID)
         horizontal_layout(layout, self._note, self._restore, self._paper, 1)

@@ -71,7 +71,9 @@ class FilterBar(Translated, QWidget):
         pen, tip, station = (choice.currentData() or "" for choice in named)
         kind = self._kind.currentData()
         return EntryFilter(
-            *(pen, tip, station),
+            pen,
+            tip,
+            station,
             kinds=(Kind(kind),) if kind else (),
             begin=_midnight(self._begin.value()),
             end=_midnight(None if end is None else end + timedelta(days=1)),
@@ -95,8 +97,12 @@ class FilterBar(Translated, QWidget):
 
     def _retranslate(self) -> None:
         words = (
-            *(self.tr("Pen"), self.tr("Tip"), self.tr("Station")),
-            *(self.tr("Entry type"), self.tr("From"), self.tr("To")),
+            self.tr("Pen"),
+            self.tr("Tip"),
+            self.tr("Station"),
+            self.tr("Entry type"),
+            self.tr("From"),
+            self.tr("To"),
         )
         for label, field, text in zip(self._labels, self._fields, words, strict=True):
             label.setText(text)

@@ -127,7 +127,10 @@ class SelectionPanel(Translated, QWidget):
         """Return the repeatability; None for fewer than two tips."""
         trend, study, entries = self._trend, self._study, self.studied()
         return repeatability_of(
-            *(entries, self._limits, study.tolerance(), study.reference()),
+            entries,
+            self._limits,
+            study.tolerance(),
+            study.reference(),
             trend.touched_with(entries),
         )
 
@@ -171,8 +174,10 @@ class SelectionPanel(Translated, QWidget):
         ]
         self._heads[0].setText(self.tr("{0} and {1}").format(*dates))
         columns = (
-            *(self.tr("Earlier / mm"), self.tr("Later / mm")),
-            *(self.tr("Change / mm"), self.tr("U (k = 2) / mm")),
+            self.tr("Earlier / mm"),
+            self.tr("Later / mm"),
+            self.tr("Change / mm"),
+            self.tr("U (k = 2) / mm"),
         )
         cells = tuple(_compared_row(found, axis) for axis in range(3))
         self._compared.set_value(Figures(columns, AXES, cells))
@@ -208,7 +213,9 @@ class SelectionPanel(Translated, QWidget):
             )
         )
         columns = (
-            *(self.tr("Mean / mm"), self.tr("Std. dev. / mm"), self.tr("Range / mm")),
+            self.tr("Mean / mm"),
+            self.tr("Std. dev. / mm"),
+            self.tr("Range / mm"),
             self.tr("Stated U / mm"),
         )
         cells = tuple(_scattered_row(found, axis) for axis in range(3))

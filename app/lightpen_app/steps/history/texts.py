@@ -102,7 +102,8 @@ def usual_words() -> tuple[str, ...]:
 def rare_words() -> tuple[str, ...]:
     """Return the remarks on a swing without a result."""
     kinds = (
-        *(kind_text(Kind.REFUSED), kind_text(Kind.REFUSED, Grade.PASS)),
+        kind_text(Kind.REFUSED),
+        kind_text(Kind.REFUSED, Grade.PASS),
         kind_text(Kind.ABANDONED),
     )
     return tuple(listed([origin_text(o), kind]) for o in MARKED for kind in kinds)

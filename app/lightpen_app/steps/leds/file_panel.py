@@ -75,7 +75,11 @@ class LedFilePanel(Translated, QWidget):
         layout = vertical_layout(self)
         horizontal_layout(
             layout,
-            *(self._label, (self._path, 1), self._save, self._samples, self._discover),
+            self._label,
+            (self._path, 1),
+            self._save,
+            self._samples,
+            self._discover,
         )
         layout.addWidget(self._units)
         horizontal_layout(

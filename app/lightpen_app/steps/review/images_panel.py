@@ -338,8 +338,13 @@ class ImagesPanel(Translated, QWidget):
     def _on_enlarge_toggled(self, enlarged: bool) -> None:
         """Enlarge the plot to the whole panel, or restore it."""
         for widget in (
-            *(self._table, self._count, self._take_out, self._put_back),
-            *(self._undo, self._view, self._caption),
+            self._table,
+            self._count,
+            self._take_out,
+            self._put_back,
+            self._undo,
+            self._view,
+            self._caption,
         ):
             widget.setVisible(not enlarged)
         self._switch.setVisible(not enlarged and self._is_of_rig())

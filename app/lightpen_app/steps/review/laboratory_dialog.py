@@ -91,8 +91,10 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
             label.setText(text)
             edit.setAccessibleName(text)
         places = (
-            *(self.tr("Laboratory"), self.tr("Customer")),
-            *(self.tr("Branch of the laboratory"), self.tr("Branch of the customer")),
+            self.tr("Laboratory"),
+            self.tr("Customer"),
+            self.tr("Branch of the laboratory"),
+            self.tr("Branch of the customer"),
             self.tr("Elsewhere"),
         )
         for i, text in enumerate(places):

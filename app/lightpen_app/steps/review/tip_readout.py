@@ -126,9 +126,12 @@ class TipReadout(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         words = (
-            *(self.tr("Value\nmm"), self.tr("U\nmm")),
-            *(self.tr("Previous\nmm"), self.tr("Change\n\xb5m")),
-            *(self.tr("Nominal\nmm"), self.tr("Deviation\nmm")),
+            self.tr("Value\nmm"),
+            self.tr("U\nmm"),
+            self.tr("Previous\nmm"),
+            self.tr("Change\n\xb5m"),
+            self.tr("Nominal\nmm"),
+            self.tr("Deviation\nmm"),
         )
         for head, text in zip(self._heads, words, strict=True):
             head.setText(text)

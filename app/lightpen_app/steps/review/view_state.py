@@ -26,8 +26,10 @@ from lightpen_app.widgets.state_banner import State
 # What the sentence of a verdict has in it whose cause is the intrinsics file.
 OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
 OF_FILES = (
-    *(NextStep.CHECK_FILES, NextStep.CHECK_CAMERA),
-    *(NextStep.CHECK_LEDS, NextStep.CHECK_RIG),
+    NextStep.CHECK_FILES,
+    NextStep.CHECK_CAMERA,
+    NextStep.CHECK_LEDS,
+    NextStep.CHECK_RIG,
 )
 
 
@@ -104,11 +106,21 @@ def review_page_state(
 def differs(before: SwingStatus, now: SwingStatus) -> bool:
     """Return whether the review shows something else by another status."""
     return (
-        *(before.solution, before.failure, before.assessment, before.result),
-        *(before.activity, before.is_capturing, before.pressed),
+        before.solution,
+        before.failure,
+        before.assessment,
+        before.result,
+        before.activity,
+        before.is_capturing,
+        before.pressed,
     ) != (
-        *(now.solution, now.failure, now.assessment, now.result),
-        *(now.activity, now.is_capturing, now.pressed),
+        now.solution,
+        now.failure,
+        now.assessment,
+        now.result,
+        now.activity,
+        now.is_capturing,
+        now.pressed,
     )
 
 

@@ -190,8 +190,10 @@ class DayView(Translated, QWidget):
         """Show station, operator and readiness; offer a swing if it is incomplete."""
         self._ready.set_place(place)
         names = (
-            *(self.tr("Camera"), self.tr("LEDs")),
-            *(self.tr("Temperature"), self.tr("Drift reference")),
+            self.tr("Camera"),
+            self.tr("LEDs"),
+            self.tr("Temperature"),
+            self.tr("Drift reference"),
         )
         self._ready.set_items(items, names)
         is_amber = any(item.is_amber for item in items)
@@ -282,8 +284,12 @@ class DayView(Translated, QWidget):
         self._table.setAccessibleName(self.tr("Tips of this station"))
         self._model.setHorizontalHeaderLabels(
             [
-                *(self.tr("Tip"), self.tr("Pen"), self.tr("Due")),
-                *(self.tr("U (k = 2)"), self.tr("Calibrated"), self.tr("Verdict")),
+                self.tr("Tip"),
+                self.tr("Pen"),
+                self.tr("Due"),
+                self.tr("U (k = 2)"),
+                self.tr("Calibrated"),
+                self.tr("Verdict"),
             ]
         )
         self._swing.setText(self.tr("Swing anyway"))

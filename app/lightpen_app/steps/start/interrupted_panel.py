@@ -110,7 +110,7 @@ class VerificationRow(InterruptedItem):
         names = under_way.names
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
         done = self.tr("verification, {0} of {1} tasks").format(
-            *(under_way.n_done, len(under_way.choices.kinds))
+            under_way.n_done, len(under_way.choices.kinds)
         )
         return PARTED.join(filter(None, (*called, done)))
 

@@ -46,10 +46,7 @@ WIDTHS = (11, 16, 12, 11, 15, 20)  # of the columns but the last, in GRID
 NUMBERS = (3, 4)  # columns of them
 LIST_HEIGHT = 47 * GRID  # px, at least: its lead may take two lines
 PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
-KINDS = (
-    *(ItemKind.TIP, ItemKind.PEN, ItemKind.CONE),
-    *(ItemKind.CAMERA, ItemKind.REFERENCE),
-)
+KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE, ItemKind.CAMERA, ItemKind.REFERENCE)
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 LONGEST_REASON = 200  # characters
 
@@ -140,19 +137,19 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._list = QWidget()
         self._list.setMinimumHeight(LIST_HEIGHT)
         margins = (2 * GRID, GRID, 2 * GRID, GRID)
-        vertical_layout(
-            *(self, (self._list, 1), self._panel), spacing=-1, margins=margins
-        )
+        vertical_layout(self, (self._list, 1), self._panel, spacing=-1, margins=margins)
         listed = vertical_layout(self._list, self._lead)
         horizontal_layout(listed, (self._tabs, 1), self._retired, spacing=-1)
         top = Qt.AlignmentFlag.AlignTop
         horizontal_layout(
-            *(listed, (self._table, 1), (self._picture, 0, top)),
+            listed,
+            (self._table, 1),
+            (self._picture, 0, top),
             spacing=2 * GRID,
             stretch=1,
         )
         horizontal_layout(
-            *(listed, self._use, self._add, self._edit, self._retire, 1, self._close)
+            listed, self._use, self._add, self._edit, self._retire, 1, self._close
         )
         parts = (self._what, self._form, self._supervisor, self._fault)
         panel = vertical_layout(self._panel, *parts, margins=margins)
@@ -281,8 +278,13 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
                 due = self._statuses.due(self._pen, item.id) or due
         remark = status_message(standing)
         texts = (
-            *(item.id, remark.text, "" if due is None else f"{due}"),
-            *(ball, change, pens, item.note),
+            item.id,
+            remark.text,
+            "" if due is None else f"{due}",
+            ball,
+            change,
+            pens,
+            item.note,
         )
         row = [QStandardItem(text) for text in texts]
         for column in NUMBERS:
@@ -359,7 +361,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         picture = self._form.picture() if is_typed else ""
         reason = self._reason.text().strip()
         self._asked = RequestedChange(
-            *(item, picture, self._is_new, reason, signature, self._before)
+            item, picture, self._is_new, reason, signature, self._before
         )
         self._refresh()
         self.change_asked.emit(self._asked)
@@ -421,9 +423,13 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
             self._tabs.setTabText(index, names[kind])
         self._model.setHorizontalHeaderLabels(
             [
-                *(self.tr("ID"), self.tr("State"), self.tr("Expiry date")),
-                *(self.tr("Ball / mm"), self.tr("Change / mm")),
-                *(self.tr("Calibrated on pens"), self.tr("Comment")),
+                self.tr("ID"),
+                self.tr("State"),
+                self.tr("Expiry date"),
+                self.tr("Ball / mm"),
+                self.tr("Change / mm"),
+                self.tr("Calibrated on pens"),
+                self.tr("Comment"),
             ]
         )
         for column in NUMBERS:

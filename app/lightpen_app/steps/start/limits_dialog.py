@@ -225,7 +225,7 @@ class LimitsControl(QObject):
         station = self._selection.preparation.names.station
         self._saving = job = Job(
             lambda _: save_limits(
-                *(folder, station, limits, signature, new_password, now(), before)
+                folder, station, limits, signature, new_password, now(), before
             ),
             self,
         )

@@ -47,9 +47,7 @@ class Introduction(FittedWindow, QDialog):
         scroll = PageScroll()
         scroll.setWidget(pictures)
         margins = 3 * GRID
-        vertical_layout(
-            *(self, (scroll, 1), buttons), spacing=2 * GRID, margins=margins
-        )
+        vertical_layout(self, (scroll, 1), buttons, spacing=2 * GRID, margins=margins)
         height = pictures.heightForWidth(WIDTH - 2 * margins)
         self.resize(WIDTH, height + buttons.sizeHint().height() + 3 * margins)
 

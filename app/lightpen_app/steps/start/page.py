@@ -57,10 +57,10 @@ class StartPage(ResponsiveLayout, Page):
             workbench, self._interrupted, lambda: self._entries.settle(), self
         )
         self._last = LastResultPresenter(
-            *(self._selection, self._run, self._tips, self._result, self._large)
+            self._selection, self._run, self._tips, self._result, self._large
         )
         self._entries = EntryPresenter(
-            *(self._selection, self._library, setup.names, setup.limits), setup.assumed
+            self._selection, self._library, setup.names, setup.limits, setup.assumed
         )
         self._control = DayControl(workbench, self._library, self._day)
 

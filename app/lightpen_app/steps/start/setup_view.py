@@ -55,7 +55,11 @@ class SetupView(Translated, QWidget):
         rows = vertical_layout(self, spacing=3 * GRID)
         self._columns = horizontal_layout(rows, spacing=3 * GRID)
         self._left = vertical_layout(
-            *(self._columns, self.names, self.limits, self.assumed, 1),
+            self._columns,
+            self.names,
+            self.limits,
+            self.assumed,
+            1,
             spacing=2 * GRID,
             stretch=5,
         )

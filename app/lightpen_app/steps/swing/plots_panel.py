@@ -110,7 +110,8 @@ class SwingPlots(Translated, QWidget):
         floors = np.where(np.isfinite(finite), trace.floors, np.nan)
         self._uncertainty.set_data(
             trace.n_images.astype(np.float64),
-            *(MICROMETRES * finite, MICROMETRES * floors),
+            MICROMETRES * finite,
+            MICROMETRES * floors,
         )
 
     def _show_limit(self) -> None:

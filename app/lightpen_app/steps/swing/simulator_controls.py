@@ -39,8 +39,12 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         self._follow = PushButton(checkable=True)
         self._follow.setProperty("inviting", True)
         slots = (
-            *(self._on_seat_clicked, self._on_swing_clicked, self._on_hold_clicked),
-            *(self._on_lift_clicked, self._on_leave_clicked, self._on_slip_clicked),
+            self._on_seat_clicked,
+            self._on_swing_clicked,
+            self._on_hold_clicked,
+            self._on_lift_clicked,
+            self._on_leave_clicked,
+            self._on_slip_clicked,
             self._on_cover_clicked,
         )
         self._buttons = tuple(QToolButton() for _ in slots)

@@ -41,8 +41,11 @@ from lightpen_app.widgets.state_banner import State
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
 PRESSED = (  # shown where the tip is to be pressed into the cone
-    *(Code.SEAT_TIP, Code.SWING_TO_SEAT, Code.HOLD_STILL),
-    *(Code.STARTS_IN, Code.FOLLOW_ARROW),
+    Code.SEAT_TIP,
+    Code.SWING_TO_SEAT,
+    Code.HOLD_STILL,
+    Code.STARTS_IN,
+    Code.FOLLOW_ARROW,
 )
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
