@@ -174,6 +174,20 @@ def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> N
     assert '"parent_sha256": "aaaa' in (tmp_path / "new.json").read_text()
 
 
+def test_pooled_swings_put_the_camera_file_right(swing: Swing) -> None:
+    true = paper_camera()
+    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
+    off = replace(true, fx=1.001 * true.fx, fy=1.001 * true.fy)
+
+    found = improve_pen(swings, off, PEN_FILE).camera
+
+    assert found.covariance is not None
+    sigma = np.sqrt(np.diag(found.covariance))[:2]
+    error = np.array([found.fx - true.fx, found.fy - true.fy])
+    assert (np.abs(error) < 3 * sigma).all()
+    assert np.abs(error).max() < 0.5 * (off.fx - true.fx)
+
+
 def test_a_length_gives_the_new_file_its_scale(swing: Swing) -> None:
     swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
     scale = Scale(1.0003, 1e-5, 1e-2)

@@ -171,10 +171,9 @@ def drift_of_images(
     focal_length : float
         px.
     """
-    n_images = len(images.lights)
-    if n_images < MIN_BLOCKS * BLOCK:
+    if not images.lights:
         return None
-    lamps = lamps_among(np.zeros((n_images, 0, 2)), images.lights)
+    lamps = lamps_among(np.zeros((len(images.lights), 0, 2)), images.lights)
     scale = float(np.median(images.distances)) / focal_length
     return drift_of_lamps(lamps, scale, limits)
 

@@ -22,6 +22,7 @@ from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Plan, free_plan
 from lightpen.measuring.qif import qif_text
 from lightpen.measuring.surfaces import FeatureKind
+from lightpen.messages import Message
 from lightpen.model.posture import FACING
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.plate import plate_plan
@@ -163,6 +164,9 @@ def test_tables_have_a_decision_for_each_characteristic(measured: Station) -> No
     characteristics, features = PART.tables(measured.found, measured.setup.conditions)
 
     assert len(features.rows) == 10
+    assert measured.found.part.alignment is not None
+    assert isinstance(features.title, Message)
+    assert features.title.code == "part.features-in-part"
     assert {str(row.remark) for row in characteristics.rows} <= {"OK", "NOT PROVEN"}
     entries = PART.entries(measured.found, measured.setup.instrument)
     assert len(entries["touches"]) == n_points(plate_plan())

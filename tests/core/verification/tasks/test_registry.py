@@ -3,7 +3,7 @@
 from dataclasses import fields
 
 import pytest
-from msgspec import json
+from msgspec import json, structs
 
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.session.choices import VerificationChoices
@@ -41,6 +41,19 @@ def test_options_are_read_back_as_they_were(task: AnyTask) -> None:
 @tasks
 def test_limits_are_those_of_a_verification(task: AnyTask) -> None:
     assert {*task.limits} <= {item.name for item in fields(VerificationLimits)}
+
+
+@tasks
+def test_a_result_stays_valid_with_other_counts_but_not_with_another_artefact(
+    task: AnyTask,
+) -> None:
+    usual = task.options()
+    assert task.is_same_artefact(usual, task.options())
+    for option in task.fields:
+        if isinstance(option, NumberOption):
+            value = getattr(usual, option.name)
+            other = structs.replace(usual, **{option.name: value + 1})
+            assert task.is_same_artefact(usual, other) is not option.is_of_artefact
 
 
 @tasks
