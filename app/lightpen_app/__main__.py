@@ -16,7 +16,7 @@ class Launchers:
     """
 
     def show_window(self, swing: Path | None) -> int:
-        """Open the window; with what leads to a recorded swing, show that."""
+        """Open the window, at a recorded swing if a path leads to one."""
         use_plain_import()
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run

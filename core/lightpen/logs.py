@@ -207,7 +207,7 @@ class _LogFile(RotatingFileHandler):
 
     @override
     def handleError(self, record: logging.LogRecord) -> None:
-        """Say once that the file cannot be written; no line of it ends the program."""
+        """Report once that the file cannot be written; logging ends no program."""
         if not self._is_failing:
             self._is_failing = True
             reason = sys.exc_info()[1]

@@ -95,7 +95,7 @@ def print_font(size: float, *, bold: bool = False) -> QFont:
 
 
 def heading(text: str) -> Block:
-    """Return the heading of a section, over a line; it stays with what follows."""
+    """Return the heading of a section, over a line; kept with the next block."""
     size = PrintSize.HEADING
     height = LEADING * size
 
@@ -108,7 +108,7 @@ def heading(text: str) -> Block:
 
 
 def subheading(text: str) -> Block:
-    """Return the heading of a part of a section; it stays with what follows."""
+    """Return the heading of a subsection; kept with the next block."""
     return replace(paragraph(text, bold=True), space=110, keeps=True)
 
 

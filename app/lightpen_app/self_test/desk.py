@@ -198,7 +198,7 @@ class Desk:
         return versions()
 
     def platform(self) -> str:
-        """Return through what Qt draws."""
+        """Return the name of Qt's platform plugin."""
         return QGuiApplication.platformName()
 
     def tested_fonts(self) -> str:

@@ -58,5 +58,5 @@ class About(FittedWindow, QDialog):
         buttons.rejected.connect(self.reject)
 
     def text(self) -> str:
-        """Return the versions as they are shown."""
+        """Return the text that lists the versions."""
         return self._versions.text()

@@ -153,7 +153,7 @@ class PageArea(QFrame):
         self._stack.setCurrentWidget(page)
 
     def set_heading(self, title: str, lead: str, tone: Tone = Tone.QUIET) -> None:
-        """Say which page it is, and what to do on it."""
+        """Show the title of the page and its instruction."""
         self._title.setText(title)
         self._lead.setText(lead)
         set_tone(self._lead, tone)

@@ -59,7 +59,7 @@ def subject_of(
 
 
 class Sidebar(Translated, QFrame):
-    """The steps, with buttons for what has a function key.
+    """The steps, with buttons for the functions of the function keys.
 
     Signals
     -------
@@ -182,7 +182,7 @@ class Sidebar(Translated, QFrame):
         self.subject_changed.emit(PARTED.join(line), bool(standing.text))
 
     def set_room(self, room: SizeClass) -> None:
-        """Take less of a window that has little."""
+        """Become narrower in a small window."""
         self._room = room
         narrow = room.is_narrow
         self.setFixedWidth(NARROW_WIDTH if narrow else WIDTH)

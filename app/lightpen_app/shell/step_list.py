@@ -237,7 +237,7 @@ class StepList(Translated, QWidget):
         return next(found, None)
 
     def set_narrow(self, narrow: bool) -> None:
-        """Show the steps where there is little width, or where there is enough."""
+        """Show the steps narrow or wide."""
         self._is_narrow = narrow
         for button in self._buttons:
             button.set_narrow(narrow)

@@ -117,7 +117,7 @@ class Page(Translated, QWidget):
         return False
 
     def why_closed(self) -> str:
-        """Return why the step cannot be entered yet, or nothing."""
+        """Return why the step is locked; empty if it is not."""
         return ""
 
     def main_action(self) -> MainAction:
@@ -152,7 +152,7 @@ class Page(Translated, QWidget):
         """Stop everything that only a visible page does."""
 
     def unsaved(self) -> str:
-        """Return the question to ask before the window closes, or nothing."""
+        """Return the question before the window closes; empty if nothing is unsaved."""
         return ""
 
     def shut_down(self) -> None:

@@ -10,7 +10,7 @@ from lightpen_app.work.live_view import LiveView
 
 
 class SimulatorControls(Translated, QFrame):
-    """Base of what commands the simulated operator; hidden with a real pen.
+    """Base of the controls of the simulated operator; hidden with a real pen.
 
     A subclass calls `_follow_connection` once it has its buttons.
 

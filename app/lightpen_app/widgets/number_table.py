@@ -63,7 +63,7 @@ class NumberTable(QTableWidget):
         self.set_large(False)
 
     def set_large(self, large: bool) -> None:
-        """Show the figures larger, where there is the room, or no longer."""
+        """Show the figures larger, for a large window, or as usual."""
         # Before the heights: none is less than the letters are high.
         for each in (self, self.horizontalHeader(), self.verticalHeader()):
             set_size(each, TextSize.LEAD if large else TextSize.BODY)

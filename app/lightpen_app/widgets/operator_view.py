@@ -188,7 +188,7 @@ class OperatorView(Translated, QWidget):
         return self._count.size_px()
 
     def open_beside(self, window: QWidget) -> None:
-        """Fill a screen on which the given window is not, if there is one."""
+        """Fill a screen other than that of the given window, if there is one."""
         other = other_screen(window.screen(), QGuiApplication.screens())
         self.setScreen(other)
         self.setGeometry(QRect(other.geometry()))

@@ -76,7 +76,7 @@ class PageScroll(QScrollArea):
 
 
 class DialogScroll(PageScroll):
-    """The fields of a dialog, as high as they are where the screen has the room."""
+    """The fields of a dialog, scrolled only if the screen is too small."""
 
     @override
     def sizeHint(self) -> QSize:

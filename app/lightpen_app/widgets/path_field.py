@@ -100,7 +100,7 @@ class PathField(QWidget):
         return self._edit
 
     def set_faulty(self, faulty: bool) -> None:
-        """Mark the path as one that leads to nothing."""
+        """Mark the path as not existing."""
         self._is_faulty = faulty
         set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
 

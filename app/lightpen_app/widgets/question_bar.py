@@ -73,7 +73,7 @@ class QuestionBar(Translated, AskingBar):
         self.ask()
 
     def refresh(self) -> None:
-        """Ask by the words as they are now; where there are none, no more."""
+        """Update the question; an empty text hides it."""
         asked = self._words()
         if not asked.text:
             self.hide()
@@ -83,7 +83,7 @@ class QuestionBar(Translated, AskingBar):
         self._decline.setText(asked.no)
 
     def ask(self) -> None:
-        """Show the question; the answer that changes nothing has the focus."""
+        """Show the question, with the focus on the answer that changes nothing."""
         self.show()
         give_focus(self._decline)
 

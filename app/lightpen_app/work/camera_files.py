@@ -48,7 +48,7 @@ class FilesOfCameras(QObject):
         selection.changed.connect(self._on_selected)
 
     def shut_down(self) -> None:
-        """Open nothing more."""
+        """Cancel opening."""
         if self._job is not None:
             self._job.cancel()
 

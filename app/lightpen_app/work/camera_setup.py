@@ -21,7 +21,7 @@ _logger = logging.getLogger(__name__)
 
 
 class CameraSetup(QObject):
-    """Opens the source that is chosen, and looks for others.
+    """Opens the selected source, and searches cameras.
 
     A camera that is open is closed while others are looked for: some libraries end the
     stream of one then.

@@ -62,7 +62,7 @@ class Mailbox(QObject):
         self._value: object | None = None
 
     def put(self, value: object) -> None:
-        """Leave a value, from any thread, instead of the one that waits."""
+        """Put a value, from any thread, in place of the one waiting."""
         with self._lock:
             waited = self._value is not None
             self._value = value
@@ -324,7 +324,7 @@ class LiveView(QObject):
         return self._operator
 
     def set_region(self, region: RegionOfInterest) -> None:
-        """Look for something else in the images, of this camera and later ones."""
+        """Set the region of interest in the images of this camera and later ones."""
         self._region = region
         if self._live is not None:
             self._live.set_region(region)
@@ -344,7 +344,7 @@ class LiveView(QObject):
             self._live.set_watched(watched)
 
     def hurry(self) -> None:
-        """Ask for every image for a while, though nothing moves."""
+        """Request every image for a while, even if nothing moves."""
         if self._live is not None:
             self._live.hurry()
 
@@ -359,7 +359,7 @@ class LiveView(QObject):
             self._live.worker(self._chosen).set_gain(gain_db)
 
     def show_pen(self) -> None:
-        """Let the simulated operator bring the pen, so that there is something to see.
+        """Have the simulated operator bring the pen into view.
 
         Only while nothing else is asked of him.
         """

@@ -96,7 +96,7 @@ class PenFiles(QObject):
         self._library.change(self, store)
 
     def shut_down(self) -> None:
-        """Open nothing more."""
+        """Cancel opening."""
         if self._job is not None:
             self._job.cancel()
 

@@ -127,7 +127,7 @@ class Selection(QObject):
         self.changed.emit(self._preparation)
 
     def set_supervision(self, supervision: Supervision) -> None:
-        """Use what supervisors have set, from now on."""
+        """Use the limits set by supervisors from now on."""
         self._supervision = supervision
         before, limits = self._preparation, self.limits
         self._preparation = replace(before, limits=limits.swing)

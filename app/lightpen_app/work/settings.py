@@ -229,7 +229,7 @@ class Settings(QObject):
         self._save("windows", {window.objectName(): place})
 
     def await_saved(self, timeout_s: float) -> bool:
-        """Wait until all is on the disk, and return whether nothing waits for it."""
+        """Wait until all is written; return whether it is."""
         thread = self._thread
         if thread is not None:
             thread.join(timeout_s)
@@ -247,7 +247,7 @@ class Settings(QObject):
         self._write_soon()
 
     def _write_soon(self) -> None:
-        """Write what waits for it, if anything does."""
+        """Write pending settings, if any."""
         with self._lock:
             if self._is_writing or not self._changes:
                 return

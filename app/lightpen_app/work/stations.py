@@ -50,7 +50,7 @@ class CameraFiles:
 
 @dataclass(frozen=True)
 class FilePaths:
-    """Paths of the files in use, empty where none is; units of a pen file without."""
+    """Paths of the files in use, empty for none; units if the pen file states none."""
 
     camera: str = ""
     pen: str = ""

@@ -155,7 +155,7 @@ def _what_counts(preparation: Preparation) -> tuple[object, ...]:
 
 
 def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None:
-    """Return the current tip; None where there is none to be measured with."""
+    """Return the current tip; None if none may be measured with."""
     if preparation.camera_file is None or preparation.pen_file is None:
         return None
     try:

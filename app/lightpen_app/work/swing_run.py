@@ -20,7 +20,7 @@ from lightpen_app.work.run_view import RunView
 
 
 class SwingRun(RunView[SwingStatus, SwingEvent]):
-    """Shows the GUI what its `runner` does with a swing.
+    """Status and events of a swing as Qt signals; commands go to its `runner`.
 
     `progressed` reports solving; the verdict is an event, too.
 

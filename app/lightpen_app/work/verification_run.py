@@ -16,7 +16,7 @@ from lightpen_app.work.run_view import RunView
 
 
 class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
-    """Shows the GUI what its `runner` does to verify a tip.
+    """Status and events of a verification as Qt signals; commands go to its `runner`.
 
     `progressed` reports recorded images that are read.
 

@@ -14,7 +14,7 @@ class Desktop(Protocol):
     """Starts what has a window or a place on a desktop, which gives an exit status."""
 
     def show_window(self, swing: Path | None) -> int:
-        """Open the window; with what leads to a recorded swing, show that."""
+        """Open the window, at a recorded swing if a path leads to one."""
 
     def play_demo(self) -> int:
         """Play a calibration with a simulated operator."""

@@ -25,7 +25,7 @@ from lightpen.verification.storage.verification_files import (
 
 
 def add_entering(parser: argparse.ArgumentParser) -> None:
-    """Add whether, where and with what besides a verification is entered."""
+    """Add the options on the archive entry of a verification."""
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
         "--data",

@@ -58,7 +58,7 @@ class MachineSettings:
 
 @dataclass(frozen=True)
 class Update:
-    """A newer version, and what an administrator says of it."""
+    """A newer version, with the text of an administrator."""
 
     version: str
     text: str = ""
@@ -83,7 +83,7 @@ def read_update(file: Path) -> Update | None:
 
 
 def _numbers(version: str) -> tuple[int, ...]:
-    """Return the numbers of a release, or those that its candidate leads to."""
+    """Return the numbers of a release; those of a candidate are of its release."""
     release = re.match(r"\d+(?:\.\d+)*", version)
     if release is None:
         raise ValueError(version)

@@ -309,7 +309,7 @@ class Live:
             self._scene = image.spots
 
     def _is_passed(self) -> bool:
-        """Tell whether a recording was replayed to its end, and nothing is captured."""
+        """Return whether a recording was replayed to its end without a capture."""
         caps = self._workers[0].caps
         if self._measures or caps is None or caps.n_images is None:
             return False

@@ -54,7 +54,7 @@ class Side(StrEnum):
 
 
 class Construction(StrEnum):
-    """Features that follow from others."""
+    """Features constructed from others."""
 
     MIDPOINT = "midpoint"
     PROJECTION = "projection"  # of a point on a plane or an axis
@@ -153,7 +153,7 @@ class PlannedFeature(_Entry, frozen=True):
 
 
 class PlannedConstruction(_Entry, frozen=True):
-    """A feature that follows from others."""
+    """A feature constructed from others."""
 
     name: Name
     construct: Construction
@@ -308,7 +308,7 @@ def write_plan(plan: Plan, path: Path) -> None:
 
 
 def _problems(plan: Plan) -> Iterator[str]:
-    """Yield what contradicts itself, in English as the rest of the format."""
+    """Yield the contradictions of a plan, in English as the rest of the format."""
     names = [each.name for each in plan.features]
     names += [each.name for each in plan.constructions]
     for name in names:

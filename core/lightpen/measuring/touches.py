@@ -69,7 +69,7 @@ class PartTouches:
 
     @property
     def independent_inputs(self) -> FloatArray:
-        """The same if the touches shared nothing, for comparison."""
+        """The same with independent errors of the touches, for comparison."""
         blocks = np.kron(np.eye(len(self.points_cam)), np.ones((3, 3)))
         inputs = self.inputs
         inputs[:-1, :-1] *= blocks

@@ -135,7 +135,7 @@ def _frame_error(pen: Pen) -> Message | None:
 
 
 def _all_open(broken: Rule | None = None) -> tuple[RuleCheck, ...]:
-    """Return checks of which at most one is decided, as the others build on it."""
+    """Return checks with one broken rule; those that depend on it are open."""
     outcomes = dict.fromkeys(Rule, RuleStatus.OPEN)
     if broken is not Rule.LEDS:
         outcomes[Rule.LEDS] = RuleStatus.MET

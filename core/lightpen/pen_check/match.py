@@ -376,7 +376,7 @@ def _findings(pen: Pen, located: _Located) -> tuple[Finding, ...]:
 
 
 def _exchanged(leds: FloatArray, one: Shift, other: Shift) -> str:
-    """Return the coordinates that two LEDs have of each other, such as "y".
+    """Return the coordinates that are swapped between two LEDs, such as "y".
 
     Of two LEDs that differ in two coordinates, exchanging either gives the same two
     places: "x/y".

@@ -38,7 +38,7 @@ class SerialQueue:
         self._begin()
 
     def ask(self, act: Act) -> None:
-        """Have something done, from any thread; nothing is done after `end`."""
+        """Queue a function, from any thread; nothing is run after `end`."""
         self._acts.put(act)
 
     def ask_and_wait(self, act: Act) -> None:

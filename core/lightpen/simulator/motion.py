@@ -109,6 +109,6 @@ def lean_vectors(
 
 
 def postures_of(leans: FloatArray) -> Postures:
-    """Return the postures of such vectors, (F, 3), rad."""
+    """Return the postures (F, 3), rad, of vectors as returned by `lean_vectors`."""
     sideways, away, turns = leans.T
     return Postures(np.hypot(sideways, away), np.arctan2(away, sideways), turns)

@@ -217,7 +217,7 @@ def _scattered(patches: list[Patch], optics: Optics) -> list[Patch]:
 
 @lru_cache(maxsize=32)
 def _disc_kernel(radius: float) -> LightArray:
-    """Return an even disc, each pixel weighing as the area of it that is covered."""
+    """Return a uniform disc; the weight of a pixel is its covered area."""
     half = int(np.ceil(radius))
     n_fine = (2 * half + 1) * DEFOCUS_SAMPLES
     fine = (np.arange(n_fine) + 0.5) / DEFOCUS_SAMPLES - half - 0.5

@@ -95,7 +95,7 @@ def write_scene(
 def write_rig_scene(
     scene: Scene, rig: Rig, folder: Path, report: Callable[[float], None] | None = None
 ) -> FloatArray:
-    """Write what several cameras see of a swing: a folder of images for each.
+    """Write the images of a swing by several cameras, one folder each.
 
     Beside these a camera file for each, ``rig.json``, ``leds.csv``, ``truth.json``.
 

@@ -278,7 +278,7 @@ class SwingRecorder:
         self._writer.conclude(DISCARDED)
 
     def close(self) -> None:
-        """Close the record as it is."""
+        """Close the files of the record."""
         self._writer.close()
 
 

@@ -74,7 +74,7 @@ class CaptureState:
 
 
 class BoardCapture(QObject):
-    """Looks for a board in one image after another, off the thread of the GUI.
+    """Detects a board in one image after another, off the GUI thread.
 
     Signals
     -------

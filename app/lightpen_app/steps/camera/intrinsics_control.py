@@ -44,7 +44,7 @@ class IntrinsicsControl(QObject):
         panel.calibration_requested.connect(self._on_calibration_requested)
 
     def shut_down(self) -> None:
-        """Close the window, and read no more."""
+        """Close the window and cancel reading."""
         if self._board is not None:
             self._board.close()
         self._drop_reading()

@@ -122,7 +122,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self.set_problem("")
 
     def set_problem(self, sentence: str) -> None:
-        """Say why the file that was chosen is not used, or nothing."""
+        """Show why the selected file is not used; empty if it is."""
         self._path.set_faulty(bool(sentence))
         self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
         self._refresh()

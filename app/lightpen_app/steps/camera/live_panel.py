@@ -93,7 +93,7 @@ class LivePanel(Translated, QWidget):
         return self._state.value()
 
     def figures(self) -> str:
-        """Return spots and frame rate, as far as there is room."""
+        """Return the number of spots and the frame rate, shortened to the width."""
         return self._figures.text()
 
     def view(self) -> ImageView:

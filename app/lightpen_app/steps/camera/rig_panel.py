@@ -95,7 +95,7 @@ class RigPanel(Translated, QGroupBox):
         self._refresh()
 
     def set_problem(self, why: str) -> None:
-        """Say why the file that was chosen is not used, or nothing."""
+        """Show why the selected file is not used; empty if it is."""
         self._path.set_faulty(bool(why))
         self._problem.set_value(StatusMessage(why, Sign.CROSS, Tone.BAD))
         self._refresh()

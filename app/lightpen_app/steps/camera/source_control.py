@@ -16,7 +16,7 @@ from lightpen_app.work.selection import Selection
 
 
 class SourceSearch(QObject):
-    """Looks for cameras for the panel that asked last, and for installed libraries."""
+    """Searches cameras for the panel that asked last, and installed libraries."""
 
     def __init__(self, camera: CameraSetup, *panels: SourcePanel) -> None:
         super().__init__(panels[0])

@@ -143,7 +143,7 @@ class SourcePanel(Translated, QGroupBox):
 
     @property
     def is_searching(self) -> bool:
-        """Whether cameras of the source that is chosen are being looked for."""
+        """Whether cameras of the selected source are being searched."""
         return self._is_searching
 
     def set_searching(self, is_searching: bool) -> None:
@@ -160,7 +160,7 @@ class SourcePanel(Translated, QGroupBox):
             self._choose(replace(self._value, place=found[0].place))
 
     def set_search_problem(self, why: str) -> None:
-        """Say why no cameras can be looked for."""
+        """Show why cameras cannot be searched."""
         self._outcome = partial(StatusMessage, why, Sign.CROSS, Tone.BAD)
         self._refresh()
 

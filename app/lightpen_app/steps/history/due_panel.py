@@ -90,7 +90,7 @@ class DuePanel(Translated, QWidget):
         self._refresh()
 
     def figures(self) -> Figures:
-        """Return the tips as they are shown."""
+        """Return the texts of the table."""
         return self._table.value()
 
     def _on_edited(self) -> None:

@@ -123,7 +123,7 @@ def _choice() -> ChoiceField:
 
 
 def _list(choice: ChoiceField, names: Sequence[str]) -> None:
-    """List names behind the choice of all; one that is chosen stays so."""
+    """List names after the choice *all*; the selected one stays selected."""
     chosen = choice.currentData()
     blocked = choice.blockSignals(True)
     while choice.count() > 1:

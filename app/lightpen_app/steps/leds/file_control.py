@@ -76,7 +76,7 @@ class LedFileControl(QObject):
         self._unless_lost(self._discard)
 
     def drop_job(self) -> None:
-        """Tell nothing more of a file that is being read or written."""
+        """Ignore the outcome of a file being read or written."""
         if self._job is not None:
             self._job.cancel()
 
@@ -199,7 +199,7 @@ class LedFileControl(QObject):
     def _start(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
     ) -> None:
-        """Read or write a file; an earlier one that is under way is not waited for."""
+        """Read or write a file, and ignore the outcome of an earlier one."""
         self.drop_job()
         self._job = job = Job(function, self)
 

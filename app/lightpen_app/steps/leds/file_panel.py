@@ -105,7 +105,7 @@ class LedFilePanel(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> str:
-        """Return the path of the file that is open, not one that is only typed."""
+        """Return the path of the open file, not that being typed."""
         return self._value
 
     def set_value(self, path: str) -> None:
@@ -123,7 +123,7 @@ class LedFilePanel(Translated, QWidget):
         self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
 
     def set_exchange(self, pair: tuple[int, int] | None) -> None:
-        """Offer to exchange two LEDs, by number, or nothing."""
+        """Offer to swap two LEDs, by number; None hides the offer."""
         self._pair = pair
         self._exchange.setVisible(pair is not None)
         if pair is not None:

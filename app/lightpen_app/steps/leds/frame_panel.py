@@ -78,7 +78,7 @@ class FramePanel(Translated, QGroupBox):
         return self._value
 
     def set_value(self, value: FrameCheck | None) -> None:
-        """List how another pen fares; None lists nothing."""
+        """List the checks of another pen; None clears the list."""
         self._value = value
         self._refresh()
 

@@ -61,7 +61,7 @@ class PenWatch(QObject):
         return self._last if is_same else None
 
     def add(self, spots: Spots) -> None:
-        """Take in what an image shows."""
+        """Add the detection in an image."""
         self._views = add_view(self._views, spots)
 
     def start(self) -> None:
@@ -139,7 +139,7 @@ class MatchControl(QObject):
         live.other_changed.connect(self._on_connection_changed)
 
     def start(self) -> None:
-        """Look for the pen of the table from now on."""
+        """Detect the pen of the table from now on."""
         self._is_shown = True
         self._panel.clear()
         self.watch.start()
@@ -154,7 +154,7 @@ class MatchControl(QObject):
             self._live.set_region(self._selection.preparation.region)
 
     def doubt(self) -> str:
-        """Return why the table may be of another pen than is seen, or nothing."""
+        """Return why the table may be that of another pen; empty if it fits."""
         camera, pen = self._selection.preparation.camera, self._leds.state.check.sought
         match = self.watch.last_match(camera, pen)
         return self._panel.doubt_of(match)
@@ -181,7 +181,7 @@ class MatchControl(QObject):
         self._region()
 
     def _region(self) -> None:
-        """Look for the pen of the table, also before it is saved."""
+        """Set the region of interest for the pen of the table, saved or not."""
         if not self._is_shown:
             return
         state, preparation = self._leds.state, self._selection.preparation

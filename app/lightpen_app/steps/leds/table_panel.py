@@ -119,7 +119,7 @@ class LedTablePanel(Translated, QGroupBox):
         self._refresh()
 
     def set_flaw(self, sentence: str) -> None:
-        """Say which cell is wrong, or nothing."""
+        """Show which cell is wrong; empty if none is."""
         self._flaw.set_value(StatusMessage(sentence, Sign.WARNING, Tone.BAD))
 
     def flaw(self) -> str:

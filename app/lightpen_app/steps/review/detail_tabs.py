@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class DetailTabs(QTabWidget):
-    """Shows the solution of a swing in the tab that is seen; the others wait for it.
+    """Shows the solution of a swing in the visible tab; hidden tabs are filled lazily.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class DetailTabs(QTabWidget):
         return self._images.content_so_far()
 
     def fill(self) -> None:
-        """Show the solution in the tab that is seen; residuals where there is none."""
+        """Show the solution in the visible tab, or residuals without a solution."""
         has_failed = self._run.status.failure is not None
         residuals = self._tab_of[self._residuals]
         for tab in self._tab_of.values():

@@ -15,7 +15,7 @@ MOST = 10 * GRID  # px of height; more is scrolled
 
 
 class StatusMessageList(PageScroll):
-    """Shows remarks; hidden while there is none."""
+    """Shows messages; hidden while there are none."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

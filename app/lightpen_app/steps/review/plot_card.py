@@ -20,14 +20,14 @@ from lightpen_app.work.save_place import SavePlace
 
 
 class NamedPicture(NamedTuple):
-    """A plot as a PNG file, and what its name ends with."""
+    """A plot as PNG, with the end of its file name."""
 
     name: str
     data: bytes
 
 
 class PlotCard(Translated, QFrame):
-    """Frames a plot and offers what can be done with it.
+    """A framed plot with a menu: enlarge, copy, save.
 
     Parameters
     ----------

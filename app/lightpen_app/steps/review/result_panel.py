@@ -100,7 +100,7 @@ class ResultPanel(Translated, QFrame):
         self._retranslate()
 
     def set_large(self, large: bool) -> None:
-        """Show its figures larger, and the postures, where there is the room."""
+        """Show larger figures, and the postures, in a large window."""
         self._readout.set_large(large)
         self._table.set_large(large)
         for label in (self._heading, self._comparison):

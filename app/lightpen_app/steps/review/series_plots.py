@@ -181,7 +181,7 @@ class LinePlot(NamedPlot):
 
 
 class PosturePlot(SquarePlot):
-    """Where the pen leant in each image, seen from above with the camera below."""
+    """Tilt of the pen in each image, seen from above with the camera below."""
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         self._dots: pg.ScatterPlotItem | None = None

@@ -80,7 +80,7 @@ class TipReadout(Translated, QWidget):
         self._retranslate()
 
     def set_large(self, large: bool) -> None:
-        """Show the figures larger, where there is the room, or no longer."""
+        """Show the figures larger, for a large window, or as usual."""
         for label in (*self._names, *self._numbers):
             set_size(label, TextSize.TITLE if large else TextSize.BODY)
         for label in self._uncertainties:

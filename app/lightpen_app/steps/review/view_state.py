@@ -241,7 +241,7 @@ def remarks(status: SwingStatus, named: Names) -> tuple[StatusMessage, ...]:
 
 
 def next_step_text(status: SwingStatus) -> str:
-    """Return the sentence of what comes next."""
+    """Return the next step as a sentence."""
     translate = QCoreApplication.translate
     if status.result is not None:
         return translate(
@@ -266,7 +266,7 @@ def next_step_text(status: SwingStatus) -> str:
 
 
 def why_not_now(status: SwingStatus) -> str:
-    """Return why nothing can be done with the tip at this moment."""
+    """Return why no command is possible now; empty if one is."""
     translate = QCoreApplication.translate
     if status.failure is None and (status.solution is None or status.verdict is None):
         return translate("ReviewPage", "Swing the pen first.")

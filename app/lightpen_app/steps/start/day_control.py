@@ -69,11 +69,11 @@ class DayControl(QObject):
         self._refreshing.start()
 
     def stop(self) -> None:
-        """Leave the page as it is."""
+        """Stop updating the page."""
         self._refreshing.stop()
 
     def refresh(self) -> None:
-        """Show tips and readiness as they are now."""
+        """Update tips and readiness."""
         now, statuses = self._selection.preparation, self._workbench.library.statuses
         names = now.names
         self._view.set_tips(

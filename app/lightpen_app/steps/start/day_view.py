@@ -202,7 +202,7 @@ class DayView(Translated, QWidget):
     def set_tips(
         self, rows: Sequence[TipRow], chosen: tuple[str, str], details: str
     ) -> None:
-        """Show other tips, with the one that is chosen, pen and tip."""
+        """Show other tips; ``chosen`` is the selected pen and tip."""
         self._details.setText(details)
         if tuple(rows) == self._rows and chosen == self._chosen:
             return

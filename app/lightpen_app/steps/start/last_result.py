@@ -51,11 +51,11 @@ class LastResultPresenter(QObject):
         self.show_status()
 
     def look_up(self) -> None:
-        """Look for the current result."""
+        """Read the current result."""
         self._look_up(lambda result: None)
 
     def look_up_tip(self) -> None:
-        """Look for it, and fill in ball and nominal centre of a tip just named."""
+        """Read the current result; enter ball and nominal centre of a new tip."""
         self._look_up(self._fill_in)
 
     def show_trend(self) -> None:

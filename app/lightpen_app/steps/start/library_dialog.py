@@ -76,7 +76,7 @@ class RequestedChange:
 
 
 class LibraryDialog(FittedWindow, Translated, QDialog):
-    """Shows what there is; adds, changes and retires.
+    """Lists the items of the library; adds, changes and retires them.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
     @override
     def reject(self) -> None:
-        """Close the form that is open; only without one, the dialog."""
+        """Close the open form, or the dialog if no form is open."""
         if self._panel.isVisible():
             self._stop_editing()
         else:
@@ -329,7 +329,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
             self._start_editing(item, item.id, is_new=False)
 
     def _on_retire_clicked(self) -> None:
-        """Retire an item or bring it back: a reason is requested, nothing else."""
+        """Retire an item or return it to use, with a reason."""
         item = self.current()
         if item is None:
             return

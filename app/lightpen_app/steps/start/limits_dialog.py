@@ -214,7 +214,7 @@ class LimitsControl(QObject):
         self._dialog.open()
 
     def shut_down(self) -> None:
-        """Save nothing more."""
+        """Cancel saving."""
         if self._saving is not None:
             self._saving.cancel()
 

@@ -105,7 +105,7 @@ class NewcomerPanel(Translated, QGroupBox):
             layout.addWidget(self._play, 2, 1)
 
     def set_why_not(self, why_not: str) -> None:
-        """Say why nothing can be tried out now, or let it."""
+        """Show why the trial cannot start; empty if it can."""
         self._try.set_why_not(why_not)
 
     def _on_explain_clicked(self) -> None:

@@ -68,7 +68,7 @@ class ReadinessLine(QFrame):
         self._place.setText(place)
 
     def set_items(self, items: Sequence[ReadinessItem], names: Sequence[str]) -> None:
-        """Show other items; those that are not ready by their names and reasons."""
+        """Show other items; those not ready with name and reason."""
         if tuple(items) == self._items:
             return
         self._items = tuple(items)

@@ -156,7 +156,7 @@ class LastResultPanel(Translated, QGroupBox):
         return self._value
 
     def set_value(self, value: LastResult) -> None:
-        """Show another result, or that there is none."""
+        """Show another result, or why there is none."""
         self._value = value
         self._question.hide()
         self._retranslate()

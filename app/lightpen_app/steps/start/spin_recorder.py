@@ -42,7 +42,7 @@ class SpinRecorder(QObject):
         )
 
     def stop(self) -> None:
-        """Look at no more images."""
+        """Ignore further images."""
         if self._is_on:
             self._is_on = False
             self._live.image_shown.disconnect(self._on_image_shown)

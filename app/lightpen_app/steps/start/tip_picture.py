@@ -32,7 +32,7 @@ class TipPicture(Translated, QLabel):
         self._retranslate()
 
     def set_value(self, read: ReadPicture | None) -> None:
-        """Show another picture, or that there is none."""
+        """Show another picture; None for none."""
         if self._job is not None:
             self._job.cancel()
             self._job = None

@@ -32,7 +32,7 @@ UPRIGHT = Posture(0.0, 0.0, 0.0)
 
 
 class LeaningDial(PostureDial):
-    """A dial on which a pen can be leant, where there is a simulated one.
+    """A dial on which a simulated pen is tilted.
 
     The mouse leans it to where it is dragged. The wheel, or a drag with Shift, turns it
     about its own axis; so does a drag of the bar. The arrow keys lean it, comma and
@@ -54,7 +54,7 @@ class LeaningDial(PostureDial):
         self._turns_at: float | None = None  # where a drag that turns began, px
 
     def set_interactive(self, interactive: bool) -> None:
-        """Let the user lean the pen, or only look."""
+        """Set whether the user can tilt the pen."""
         if interactive == self._is_interactive:
             return
         self._is_interactive = interactive

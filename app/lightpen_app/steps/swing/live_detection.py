@@ -25,7 +25,7 @@ class LiveDetectionView(QObject):
         self._unfit: deque[bool] = deque(maxlen=N_LAST)
 
     def take(self, shown: DisplayedImage) -> None:
-        """Look at one more image."""
+        """Process one more image."""
         self._seen = shown.seen
         self._unfit.append(self._is_unfit(shown.seen))
         frame = shown.seen.frame

@@ -117,7 +117,7 @@ class FiguresView(Translated, QWidget):
         self._retranslate()
 
     def set_large(self, large: bool) -> None:
-        """Show the figures larger, where there is the room, or no longer."""
+        """Show the figures larger, for a large window, or as usual."""
         self._table.set_large(large)
 
     @override
@@ -175,7 +175,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
         self._use_room()
 
     def set_value(self, setup: SessionSetup | None, state: SessionState | None) -> None:
-        """Show a session, or that there is none."""
+        """Show a session; None for none."""
         tables: tuple[ResultTable, ...] = ()
         is_found = state is not None and self._task.kind in state.found
         if is_found is not self._is_found:

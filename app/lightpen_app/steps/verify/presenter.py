@@ -213,7 +213,7 @@ class VerifyPresenter(QObject):
         return Instruction(self._short(setup, state), worded(instruction(setup, state)))
 
     def _refused(self) -> str:
-        """Return in a few words that nothing can be probed."""
+        """Return the short text for a refusal."""
         return self.tr("Nothing to verify")
 
     def _verdict(self, found: VerificationAssessment) -> str:
@@ -227,7 +227,7 @@ class VerifyPresenter(QObject):
         return self.tr("Scale and form verified")
 
     def _short(self, setup: SessionSetup, state: SessionState) -> str:
-        """Return in a few words what to do."""
+        """Return the instruction in a few words."""
         task, touching = state.task(setup), state.touching
         if is_held(state):
             return self.tr("Hold still")

@@ -52,7 +52,7 @@ class ProbingSimulatorControls(SimulatorControls):
         self._follow_connection()
 
     def stop(self) -> None:
-        """Leave the operator to others."""
+        """Release the simulated operator."""
         self._touch.setChecked(False)
 
     @override

@@ -91,7 +91,7 @@ def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
 
 
 def is_sealed_otherwise(archive: Path, ends: tuple[ChainHead, ...], seal: Seal) -> bool:
-    """Return whether a file is not as it was sealed, though nothing was entered."""
+    """Return whether a file differs from its seal although nothing was entered."""
     if is_open(archive):
         return False
     return seal.heads == sealed_heads(ends) and seal.sha256 != sha256(archive)

@@ -59,7 +59,7 @@ def entry_signature(head: ChainHead, event: Event, sha256: str) -> str:
 
 
 def key_in(signature: str) -> str:
-    """Return the public key in the signature of an entry; empty without one."""
+    """Return the public key in the signature of an entry; empty if unsigned."""
     return signature[:_KEY_LENGTH] if len(signature) == _LENGTH else ""
 
 

@@ -60,7 +60,7 @@ class ArchiveCheckResult:
 def check_archive(
     database: Database, data: Path | None = None, report: Report = lambda fraction: None
 ) -> ArchiveCheckResult:
-    """Look at every entry, every record and every file that an archive refers to.
+    """Check every entry, every record and every file that an archive refers to.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def check_archive(
 
 
 def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
-    """Look at an archive in a file, and at the files that it refers to.
+    """Check an archive in a file, and the files that it refers to.
 
     Of a file that a program began to write meanwhile nothing is known but what a check
     beside that program shows, which is made then.

@@ -35,7 +35,7 @@ def with_recomputed(
     n_tips: int | None = SAMPLE,
     report: Callable[[float], None] = lambda fraction: None,
 ) -> ArchiveCheckResult:
-    """Compute accepted tips of a data folder again; return the check with what differs.
+    """Recompute accepted tips of a data folder; return the check with the differences.
 
     Parameters
     ----------

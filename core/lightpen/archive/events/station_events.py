@@ -39,13 +39,13 @@ FOLDERS = (
 
 
 def station_files(data: Path) -> Iterator[Path]:
-    """Yield the files of such events, for each kind the oldest first."""
+    """Yield the files of limits, cameras and verifications, each kind in order."""
     for folder in FOLDERS:
         yield from reversed(numbered_files(data / folder))
 
 
 def is_station_file(file: Path) -> bool:
-    """Return whether a file belongs to such an event."""
+    """Return whether a file is one of `station_files`."""
     return file.parent.name in FOLDERS
 
 

@@ -1,1 +1,1 @@
-"""The logbook of a station: what it enters, and what follows for its tips."""
+"""The logbook of a station: it enters events, and updates the status of tips."""

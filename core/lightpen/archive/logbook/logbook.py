@@ -101,7 +101,7 @@ class ReplicationState:
 
 
 class Logbook:
-    """Enters what happens in a data folder; any thread may ask it to.
+    """Enters the events of a data folder in its archive; thread-safe.
 
     Several programs may have one of the same folder.
 
@@ -273,7 +273,7 @@ class Logbook:
         return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), fault)
 
     def share_library(self, server: Database) -> None:
-        """Take over what other stations changed later in their libraries.
+        """Take over newer changes of the libraries of other stations.
 
         Where a supervisor must sign, only tell how much waits. A library that cannot
         be read, or is not as it was entered, is reported by all who need it.

@@ -118,7 +118,7 @@ def take_over(
     server: Database | None = None,
     signature: Signature | None = None,
 ) -> tuple[TakenOver, ...]:
-    """Take over what other stations changed later than this one.
+    """Take over the changes of other stations that are newer than those of this one.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class ServerCheckResult:
 
 
 def check_server(database: Database, server: Database) -> ServerCheckResult:
-    """Look at every entry and record on a server, and compare both sides.
+    """Check every entry and record on a server, and compare both sides.
 
     A server may show a station its own chain alone.
     """

@@ -50,7 +50,7 @@ class FetchResult:
 def fetch(
     database: Database, data: Path, server: Database, chain: str = ""
 ) -> FetchResult:
-    """Add what a data folder lacks of its chain on a server, and the files of that.
+    """Add the entries that a data folder lacks from its chain on a server, with files.
 
     Parameters
     ----------

@@ -228,7 +228,7 @@ def _begin(connection: Connection) -> None:
 
 
 def known_version(database: Database) -> str | None:
-    """Return of which version a database is, None of one that holds nothing yet.
+    """Return the version of a database; None if it is empty.
 
     Raises
     ------

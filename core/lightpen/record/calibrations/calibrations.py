@@ -134,7 +134,7 @@ class CalibrationFile:
 
     @property
     def is_of_rig(self) -> bool:
-        """Whether several cameras looked; the frames are then of all of them."""
+        """Whether several cameras were used; the frames are then those of all."""
         return self.calibration.rig is not None
 
     @property

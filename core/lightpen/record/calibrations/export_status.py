@@ -67,7 +67,7 @@ def _serials(header: Header) -> tuple[str, ...]:
 
 
 def status_of(file: CalibrationFile) -> tuple[str, ...]:
-    """Return why a tip is not simply valid; nothing of one that is."""
+    """Return the status words of a tip, empty if it is valid."""
     own = []
     if file.origin is Origin.SIMULATED:
         own.append(Origin.SIMULATED.upper())

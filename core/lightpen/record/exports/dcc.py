@@ -160,7 +160,7 @@ def _add_file(equipment: Element, what: str, name: str, sha256: str) -> None:
 
 
 def _add_traced(equipment: Element, traced: TracedItem) -> None:
-    """Add what was measured with, and its certificate."""
+    """Add an item of the measuring equipment with its certificate."""
     part, item = _sub(equipment, "measuringEquipment"), traced.item
     _text(part, "name", traced.kind.value)
     if item is not None and item.certificate:

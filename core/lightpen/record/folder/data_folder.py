@@ -20,7 +20,7 @@ from lightpen.record.swings.reading import IMAGES, OPENER
 
 
 def check_writable(data: Path) -> None:
-    """Write to a folder, which is made if it is not there, and leave nothing in it."""
+    """Check by a temporary file that a folder can be written; create it if missing."""
     try:
         data.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=data) as file:
@@ -65,7 +65,7 @@ class Presence:
         return 0
 
     def leave(self) -> None:
-        """Let the others know that this window is gone."""
+        """Remove this window from the list of open windows."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             os.close(descriptor)

@@ -1,4 +1,4 @@
-"""Changes of what guards a data folder: password, limits and station key, one a file.
+"""Changes of password, limits and station key of a data folder, one file each.
 
 Each file has the hash of the one before and the signatures of the station and of the
 supervisor who made the change, see `lightpen.record.library.signing`. The first

@@ -66,7 +66,7 @@ class _Approval(Struct):
 
 
 def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
-    """Set a supervisor's password; where there is one, by that one only.
+    """Set the supervisor password; changing it needs the present one.
 
     Raises
     ------

@@ -113,7 +113,7 @@ class Item(Struct, frozen=True, kw_only=True):
 
 
 class LedFile(Struct, frozen=True):
-    """The LED file of a pen: its path and hash, and the units of one without."""
+    """The LED file of a pen: path, hash, and the units if it states none."""
 
     path: str
     sha256: Digest
@@ -246,7 +246,7 @@ class LibraryChange(Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Library:
-    """All items as they are now, retired ones as well.
+    """The present state of all items, retired ones included.
 
     Attributes
     ----------

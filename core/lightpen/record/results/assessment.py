@@ -130,7 +130,7 @@ def _change(solution: Solution, last: Result) -> Change:
 
 
 def overdue_items(library: Library, names: Names, day: date) -> Iterator[Message]:
-    """Tell what should have been looked after before the day of the swing."""
+    """Return the items that were overdue on the day of the swing."""
     for item in (
         library.pens.get(names.pen),
         library.tips.get(names.tip),

@@ -67,7 +67,7 @@ class OutLine(Struct, tag_field="kind", tag="out"):
 
 
 class ExcludedLine(Struct, tag_field="kind", tag="taken out"):
-    """These images take no part, by reason, and all others do."""
+    """Excluded images by reason; all others are included."""
 
     reasons: dict[str, tuple[int, ...]]
 

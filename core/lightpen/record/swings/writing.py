@@ -250,7 +250,7 @@ class RecordWriter:
         self._write_line(OutLine(tuple(numbers), str(reason)))
 
     def set_taken_out(self, taken_out: Mapping[int, str]) -> None:
-        """Leave these images out of the calibration, for a reason each, and no others.
+        """Exclude exactly these images from the calibration, each with a reason.
 
         It is one line, so that a kill leaves all of an edit or nothing.
         """

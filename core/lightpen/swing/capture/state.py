@@ -282,7 +282,7 @@ class SwingState:
 
 
 def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
-    """Return a swing of which nothing has been seen; the time is in s."""
+    """Return the state at the start of a swing; ``time`` in s."""
     is_recording = setup.is_recording
     return SwingState(
         phase=Phase.CAPTURING if is_recording else Phase.WAIT,

@@ -227,14 +227,14 @@ def _pooled(
 
 
 def _common_to_swings(bundle: Bundle) -> IntArray:
-    """Return the indices of what swings share; effects differ from swing to swing."""
+    """Return the indices of the unknowns that swings share; effects differ."""
     at = bundle.layout
     shared = (*at.cameras, at.extrinsics, at.diameter, at.scale, at.leds)
     return np.asarray(np.r_[shared], dtype=np.int64)
 
 
 def _of_images(bundle: Bundle) -> tuple[FloatArray, FloatArray]:
-    """Return information and right side of what swings share, by one of them."""
+    """Return information matrix and right side of the shared unknowns of a swing."""
     both = bundle.information + bundle.prior_information
     right = both @ bundle.values
     common = _common_to_swings(bundle)

@@ -276,7 +276,7 @@ class SessionKeeping:
         self._done = {}
 
     def write(self) -> None:
-        """Write what waits for it.
+        """Write pending records.
 
         Raises
         ------

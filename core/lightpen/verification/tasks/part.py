@@ -348,7 +348,7 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
 
 
 def _notes(found: Part, conditions: Conditions) -> Iterator[Message]:
-    """Yield how positions are tied and what known forms refine."""
+    """Yield notes on datum points of a moved part and on features of known form."""
     for position, motion in found.part.ties.items():
         residual = float(motion.residuals.max())
         yield message("part.moved", position=position, residual=residual)

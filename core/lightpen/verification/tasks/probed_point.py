@@ -228,7 +228,7 @@ def joint_covariance(
 def point_entries(
     points: Sequence[ProbedPoint], instrument: Instrument
 ) -> list[dict[str, Any]]:
-    """Return points as they are recorded."""
+    """Return the entries of points in a record."""
     return [
         {
             "images": list(point.names),
@@ -243,7 +243,7 @@ def point_entries(
 
 
 def rejected_entries(rejected: Sequence[RejectedFrame]) -> list[dict[str, str]]:
-    """Return images that take no part as they are recorded."""
+    """Return the entries of rejected images in a record."""
     return [{"file": each.name, "reason": str(each.reason)} for each in rejected]
 
 

@@ -423,7 +423,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         )
 
     def headline(self, progress: TaskProgress, *, is_next: bool) -> Message:
-        """Return in few words what to do.
+        """Return the instruction in a few words.
 
         Parameters
         ----------

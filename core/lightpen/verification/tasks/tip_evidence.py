@@ -248,7 +248,7 @@ def points_evidence(
 
 
 def tip_entries(found: TipEvidence) -> dict[str, Any]:
-    """Return the evidence of points on the tip as it is recorded."""
+    """Return the entries of the evidence of points on the tip in a record."""
     return {
         "tip_change_mm": found.change,
         "tip_change_expanded_uncertainty_mm": found.uncertainty,

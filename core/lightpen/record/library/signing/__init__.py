@@ -1,1 +1,1 @@
-"""Signatures of what a data folder holds: station key, supervisor key, signed texts."""
+"""Signatures in a data folder: station key, supervisor key, signed texts."""
