@@ -33,6 +33,8 @@ SHOWING_MS = 50  # from a new state to what is shown; the states between make on
 PLOTTING_MS = 40  # from one plot to the next
 PAUSES = {SideAction.PAUSE, SideAction.RESUME}
 COMMANDS = {
+    SideAction.PAUSE: SwingWorkflow.pause,
+    SideAction.RESUME: SwingWorkflow.resume,
     SideAction.STOP_COMPUTING: SwingWorkflow.cancel,
     SideAction.COMPUTE: SwingWorkflow.solve,
     SideAction.CAPTURE_MORE: SwingWorkflow.capture_more,
@@ -220,9 +222,6 @@ class SwingPage(Page):
 
     def _on_act_clicked(self) -> None:
         side = self._shown.side
-        if side in PAUSES:
-            self.toggle_pause()
-            return
         if side is SideAction.OPEN_CAMERA:
             self._camera.open()
         self._runner.ask(COMMANDS.get(side, SwingWorkflow.try_again))
