@@ -96,9 +96,10 @@ def swing(folder):
     if offered:
         resumed = read_resumable(offered[0].folder)
         tell("resumed", resumed.record.folder.name, resumed.state.n_kept)
-        run.runner.go_on(resumed)
+        run.runner.ask(lambda workflow: workflow.go_on(resumed))
     else:
-        run.runner.begin(workbench.selection.preparation)
+        chosen = workbench.selection.preparation
+        run.runner.ask(lambda workflow: workflow.begin(chosen))
     application.exec()
 
 for line in sys.stdin:

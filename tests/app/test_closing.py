@@ -93,7 +93,8 @@ def tell(folder, asks):
 def swing(workbench):
     folder = workbench.run.records_folder / "interrupted"
     shutil.copytree(sys.argv[1], folder)
-    workbench.run.runner.go_on(read_resumable(folder))
+    resumable = read_resumable(folder)
+    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
     await_swing(workbench, folder)
 
 def await_swing(workbench, folder):
