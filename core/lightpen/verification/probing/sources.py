@@ -221,6 +221,7 @@ def require_leds_fit(name: str, touches: Sequence[ProbedPoint]) -> None:
     Raises
     ------
     CalibrationError
+        The median residual of the touches is larger than that of this pen can be.
     """
     rms = float(np.median([touch.rms for touch in touches]))
     if rms > MAX_RMS:

@@ -91,7 +91,7 @@ def with_move(
     Raises
     ------
     CalibrationError
-        There are none.
+        Fewer than three features with a centre are probed.
     """
     centres: dict[str, FloatArray] = {}
     for planned, points in zip(course(options), runs, strict=False):

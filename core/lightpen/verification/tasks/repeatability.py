@@ -183,7 +183,7 @@ def measure_repeatability(
     Raises
     ------
     CalibrationError
-        There are fewer than two.
+        There are fewer than two tips.
     """
     if len(tips) < MIN_TIPS:
         raise CalibrationError("repeatability.too-few", n_tips=len(tips))

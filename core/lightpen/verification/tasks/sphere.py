@@ -242,7 +242,7 @@ def fit_sphere(points_cam: FloatArray) -> SphereFit:
     Raises
     ------
     CalibrationError
-        They determine none.
+        The points lie in a plane or determine no sphere.
     """
     try:
         found = fit_feature(FeatureKind.SPHERE, points_cam)
