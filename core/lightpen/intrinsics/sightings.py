@@ -2,7 +2,7 @@
 
 OpenCV finds the board [1]_, in a reduced image first if there is one. Corners are then
 located by the gradients around them in the original image at its full bit depth [2]_,
-circles by their edges, like LEDs.
+and by a fit of the brightness, circles by their edges, like LEDs.
 
 References
 ----------
@@ -25,6 +25,7 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.edge_fit import fit_edge
 from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
+from lightpen.intrinsics.corner_fit import fit_corners
 from lightpen.intrinsics.squares import (
     CornerCount,
     count_from,
@@ -41,6 +42,8 @@ MARKED_WHOLE = 12_000_000  # px; in larger images markers are searched smaller
 ENLARGED = 1_300_000  # px; in smaller images markers may be too small to be read
 REFINED = 0.4  # of the distance of neighbours: no other edge is that near
 MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
+LEAST_FITTED = 3  # px: smaller corners have too few pixels for their edges
+RIDGE = 1e-9
 REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 60, 1e-4)
 FEWEST = 6  # points by which a pose is known, and that it is no other thing
 UNEVEN = 0.5  # of a step, by which the next may differ; tilt and lens make up to 0.2
@@ -304,8 +307,21 @@ def _refined(image: Image, points: FloatArray, board: Board) -> FloatArray:
         (-1, -1),
         REFINING,
     )
-    refined[inside] = moved[:, 0]
+    corners = moved[:, 0].astype(np.float64)
+    if board.kind is not BoardKind.MARKERS and half > LEAST_FITTED:
+        edges = _edges_at(corners, board.points[inside, :2] / board.pitch)
+        corners = fit_corners(image, corners, edges, half)
+    refined[inside] = corners
     return refined
+
+
+def _edges_at(points: FloatArray, on_board: FloatArray) -> FloatArray:
+    """Return the directions of the board's x and y, (N, 2, 2), by the points around."""
+    apart = np.square(on_board[:, None] - on_board).sum(axis=-1)
+    weights = np.exp(-0.5 * apart)[:, None]
+    board = np.column_stack([on_board, np.ones(len(points))])
+    normal = (weights * board.T) @ board + RIDGE * np.eye(3)
+    return np.asarray(np.linalg.solve(normal, (weights * board.T) @ points)[:, :2])
 
 
 def _least_distance(points: FloatArray, board: Board) -> float:

@@ -28,9 +28,9 @@ STRAIGHT = replace(SMALL, distortion=np.zeros(5))
 TILT = rotation_from_vector(np.array([0.35, -0.3, 0.1]))
 # Rms error, px: of 8 bit with shot noise. A marker's corner is rounded by the blur.
 LIMITS = {
-    "chessboard:9x6:20": 0.03,
-    "charuco:7x5:20:14:DICT_4X4_50": 0.06,
-    "charuco-legacy:7x6:20:14:DICT_4X4_50": 0.06,
+    "chessboard:9x6:20": 0.008,
+    "charuco:7x5:20:14:DICT_4X4_50": 0.012,
+    "charuco-legacy:7x6:20:14:DICT_4X4_50": 0.012,
     "markers:4x3:30:8:DICT_4X4_50": 0.3,
     "circles:7x5:20:12": 0.03,
     "asymmetric-circles:4x9:15:14": 0.03,
@@ -99,6 +99,17 @@ def test_no_circle_of_a_grid_is_seen_off_its_place(word: str) -> None:
     assert seen is not None
     off = [np.abs(seen[order] - there).max() for order in board.orders]
     assert min(off) < 0.015
+
+
+@pytest.mark.parametrize("is_saturated", [False, True])
+def test_corners_are_placed_by_all_that_their_edges_show(*, is_saturated: bool) -> None:
+    board = parse_board("chessboard:9x6:20")
+    light = light_of(board, 0.6)
+    uneven = np.linspace(0.4, 1.3, light.shape[1])
+    light = np.minimum(2 * light, 1.0) if is_saturated else uneven * light
+    image = expose_board(light, Sensor(), np.random.default_rng(1))
+
+    assert error_of(find_points(image, board), board) < 0.012
 
 
 def test_twelve_bits_tell_no_less_than_eight() -> None:
