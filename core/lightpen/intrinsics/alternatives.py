@@ -116,7 +116,10 @@ def explain(
         error = _groups_error(views, groups)
         consider(groups.rms, cost_of_camera + cost_of_groups, error)
     skewed = _skewed(views, tolerances, near)
-    if skewed is not None:
+    height, longer = views.image_sizes[0][1], max(views.image_sizes[0])
+    # Less is also a lens's field, unless there is a board to be blamed for it.
+    least = 0.0 if released is not None else 2 * USELESS * longer / height
+    if skewed is not None and abs(skewed[0]) > least:
         skew, rms = skewed
         consider(
             rms,

@@ -67,6 +67,7 @@ LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CLUSTERED = 2.0  # times the variance that views of one camera scatter by
 UNEVEN_LENS = 10.0  # times the noise: a residual field that is no lens'
+LEAST_NOISE = 0.01  # px: beside less, usual fields and blur look large
 UNEVEN_VIEWS = 2.0  # times the noise: a smooth error of views that is no blur
 
 
@@ -253,13 +254,14 @@ class _Found:
     def is_suspicious(self) -> bool:
         """Whether something else than one camera may be before the board."""
         components = self.effects.components
+        noise = max(components.noise, LEAST_NOISE)
         return bool(
             self.denied.any()
             or self.left_out
             or self.choice.remark is not None
             or self.effects.clustering > CLUSTERED
-            or components.view > UNEVEN_VIEWS * components.noise
-            or components.lenses[0] > UNEVEN_LENS * components.noise
+            or components.view > UNEVEN_VIEWS * noise
+            or components.lenses[0] > UNEVEN_LENS * noise
         )
 
 

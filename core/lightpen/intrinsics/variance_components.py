@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import board_residuals, moved_state
 from lightpen.intrinsics.board_fit import N_POSE, BoardFit
 from lightpen.intrinsics.effects import Design, VarianceComponents, design_of
@@ -222,12 +223,17 @@ def _inverse(normal: FloatArray) -> tuple[FloatArray, float]:
     """Return the inverse of normal equations, and the logarithm of the determinant.
 
     By Cholesky's decomposition, in a third of the time of `numpy.linalg`.
+
+    Raises
+    ------
+    CalibrationError
+        Something is left open.
     """
     from scipy.linalg.lapack import dpotrf, dpotri
 
     factor, info = dpotrf(normal, lower=1)
     if info != 0:
-        raise np.linalg.LinAlgError("The normal matrix is not positive definite.")
+        raise CalibrationError("intrinsics.open")
     inverse = np.tril(dpotri(factor, lower=1)[0])
     diagonal = np.diag(np.diag(inverse))
     logarithm = 2 * float(np.log(np.diag(factor)).sum())

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
 from lightpen.intrinsics.distortion import fit_camera
 from lightpen.intrinsics.effects import design_of, smooth_functions
 from lightpen.intrinsics.start import start_camera
-from lightpen.intrinsics.variance_components import MixedFit, fit_effects
+from lightpen.intrinsics.variance_components import MixedFit, _inverse, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
@@ -153,6 +154,11 @@ def test_the_normal_equations_are_those_of_the_whole_design(
 
     np.testing.assert_allclose(design.columns.sum(axis=0), design.normal[:, :n])
     np.testing.assert_allclose(design.normal, design.normal.T)
+
+
+def test_what_effects_leave_open_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="do not determine the camera"):
+        _inverse(np.diag([1.0, 0.0]))
 
 
 def test_a_change_of_the_camera_is_in_the_scores_of_the_views_after_it(
