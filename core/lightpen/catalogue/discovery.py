@@ -21,6 +21,7 @@ MESSAGES = {
     "discover.length-of-others": "The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
     "discover.length-not-sketched": "The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.",
     "discover.cones-contradict": "The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.",
+    "discover.cones-not-settled": "The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.",
     "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.",
     "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.",
     "discover.other-size": "The images of swing {number} are of another size than those of the first. Give swings of one camera.",

@@ -115,7 +115,8 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         "--led-diameter",
         type=above_zero,
         metavar="MM",
-        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
+        help=f"diameter of the LED discs ({DISC_DIAMETER:g}); with --centers uncertain "
+        "by half",
     )
     parser.add_argument(
         "--camera", type=Path, metavar="FILE", help="camera file, if there is one"
@@ -183,7 +184,7 @@ def _discover(options: argparse.Namespace) -> None:
             read(place, partial(_report_part, report, each * k, each))
             for k, place in enumerate(places)
         ]
-        request = Request(lengths, _diameter(options, sketch), camera, sketch)
+        request = _request(options, lengths, camera, sketch)
         if separation is not None and options.touched:
             touches = partial(touches_at, options.touched)
             request = replace(request, touched=TouchedLength(touches, separation))
@@ -247,10 +248,18 @@ def _sketch(path: Path | None) -> Pen | None:
     return None if path is None else read_unchecked_pen(path, "mm")
 
 
-def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
+def _request(
+    options: argparse.Namespace,
+    lengths: tuple[MeasuredLength, ...],
+    camera: Camera | None,
+    sketch: Pen | None,
+) -> Request:
+    diameter, sigma = DISC_DIAMETER, None
     if options.led_diameter is not None:
-        return float(finite(str(options.led_diameter)))
-    return DISC_DIAMETER if sketch is None else sketch.diameter
+        diameter = float(finite(str(options.led_diameter)))
+    elif sketch is not None:
+        diameter, sigma = sketch.diameter, sketch.diameter_sigma
+    return Request(lengths, diameter, camera, sketch, diameter_sigma=sigma)
 
 
 def _check_outputs(options: argparse.Namespace) -> None:

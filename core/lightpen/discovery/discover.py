@@ -38,12 +38,15 @@ from lightpen.discovery.sightings import Report, Sightings
 from lightpen.discovery.starts import any_covariance, scaled_to
 from lightpen.discovery.touched_length import with_touched_length
 from lightpen.discovery.tracks import find_lamps, follow, without_lamps
+from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
+VAGUE_DISC = 0.5  # of the stated diameter, its standard deviation with centres alone
+NOT_SETTLED = ("bundle.not-settled", "joint.not-settled")
 SLIPPED = 0.03  # of the images, that are left out after a slip
 
 
@@ -87,6 +90,9 @@ def discover(
     CalibrationError
         The images do not determine them; the text says what to do.
     """
+    if sightings.areas is None and request.diameter_sigma is None:
+        # Centres hardly show the discs' size: a radius may be taken for it.
+        request = replace(request, diameter_sigma=VAGUE_DISC * request.diameter)
     swing = _labelled_swing(sightings, request, report)
     swing = replace(swing, found=numbered(swing.found, request))
     report(0.5)
@@ -126,7 +132,15 @@ def _adjusted(
     )
     camera = _camera_to_adjust(start, request)
     pen = with_lengths_known(start.pen, lengths)
-    calibration = calibrate(camera, pen, observations, second=second)
+    try:
+        calibration = calibrate(camera, pen, observations, second=second)
+    except CalibrationError as error:
+        if second is None or error.message.code not in NOT_SETTLED:
+            raise
+        distance = second.separation.distance
+        raise CalibrationError(
+            "discover.cones-not-settled", distance=distance
+        ) from error
     fits = calibration.used[swing.found.images]
     if not is_cleared and np.mean(~fits) > SLIPPED:
         cleared = replace(swing, found=_of_images(swing.found, fits))
@@ -190,7 +204,10 @@ def _with_second(
         apart = float(np.linalg.norm(cone - start.cone_rig))
         factor = separation.distance / max(apart, LEAST_LENGTH_SIGMA)
     start = scaled_to(start, factor)
-    start = replace(start, pen=replace(start.pen, diameter=request.diameter))
+    diameter, sigma = request.diameter, request.diameter_sigma
+    start = replace(
+        start, pen=replace(start.pen, diameter=diameter, diameter_sigma=sigma)
+    )
     there = replace(start, cone_rig=factor * cone, rotations=state.rotations @ R.T)
     swing = replace(
         swing, found=replace(swing.found, spots=swing.found.spots[:, order])

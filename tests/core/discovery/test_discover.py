@@ -124,6 +124,17 @@ def test_an_uncertain_length_makes_the_tip_uncertain_in_proportion() -> None:
 
 
 @pytest.mark.slow
+def test_a_diameter_stated_twice_too_large_is_within_the_uncertainty() -> None:
+    station = random_station(4, n_images=120)
+    request = replace(station.request, diameter=2 * station.pen.diameter)
+
+    found = discover(station.sightings, request)
+
+    off = np.abs(errors_of(found, station).tip)
+    assert (off < 1.5 * found.expanded_uncertainty).all()
+
+
+@pytest.mark.slow
 def test_without_a_length_the_result_is_relative() -> None:
     found = discover(STATION.sightings, replace(STATION.request, lengths=()))
 
