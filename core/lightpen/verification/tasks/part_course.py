@@ -91,7 +91,7 @@ def with_move(
     Raises
     ------
     CalibrationError
-        Fewer than three features with a centre are probed.
+        No three features with a centre that are probed span a triangle.
     """
     centres: dict[str, FloatArray] = {}
     for planned, points in zip(course(options), runs, strict=False):
