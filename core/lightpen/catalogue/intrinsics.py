@@ -41,7 +41,7 @@ MESSAGES = {
     "coverage.corners": "No view covers these image corners: {corners}. Add such views.",
     "coverage.tilts": "Fewer than {least} views have the board tilted {sides}. Add such views.",
     "coverage.sizes": "All views are from the same distance. Add views with the board nearer.",
-    "intrinsics.five": "5 distortion coefficients, cross-validated error {held_out:.4f} px; {others} not significantly better.",
+    "intrinsics.five": "5 distortion coefficients are enough: they predict views that were left out to {held_out:.4f} px ({others}).",
     "intrinsics.four": "4 distortion coefficients (without k3, which a Kalibr file does not hold). Cross-validated error: {held_out:.4f} px.",
     "intrinsics.drawn-in": "The views do not cover the image corners, where the estimated distortion would fold the image. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Add views with the board in each corner, or keep the pen out of the corners.",
     "intrinsics.five-only": "5 distortion coefficients: the views do not determine 8. Cross-validated error: {held_out:.4f} px.",
