@@ -28,6 +28,7 @@ their sizes. They are unknowns of every fit, with a prior of their usual size.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle.linearised import CameraView
 from lightpen.estimation.statistics.variance_components import P_NONE
 from lightpen.model.camera import Camera
+from lightpen.model.information import known_by
 from lightpen.model.lens_field import correlation
 from lightpen.model.quantiles import chi_square_quantile
 
@@ -123,10 +125,20 @@ class Effect:
         """The same effect held at 0."""
         return replace(self, stated=0.0, is_exact=True)
 
-    @property
+    @cached_property
     def prior(self) -> FloatArray:
         """Covariance of the unknowns by the stated standard deviation, (k, k)."""
         return np.asarray(self.stated**2 * np.mean(self.shapes, axis=0))
+
+    @cached_property
+    def roots(self) -> tuple[FloatArray, ...]:
+        """A square root of each shape, (k, k)."""
+        return tuple(map(_root_of, self.shapes))
+
+    @cached_property
+    def prior_information(self) -> FloatArray:
+        """Its inverse, (k, k)."""
+        return known_by(self.prior)
 
 
 class EffectComponent(NamedTuple):
@@ -180,7 +192,7 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
     if effect.is_exact:
         return held(effect)
     sigmas = LARGEST[effect.name] * np.geomspace(SMALLEST, 1.0, N_SCALES)
-    spectra = [_Spectrum.of(S, right, shape) for shape in effect.shapes]
+    spectra = [_Spectrum.of(S, right, root) for root in effect.roots]
     all_costs = np.array([each.costs(sigmas) for each in spectra])
     s, i = np.unravel_index(int(np.argmin(all_costs)), all_costs.shape)
     gain = -float(all_costs[s, i])
@@ -221,8 +233,13 @@ def gain_of(S: FloatArray, right: FloatArray, prior: FloatArray) -> float:
     prior : (k, k) array
         Their covariance.
     """
-    spectrum = _Spectrum.of(S, right, prior)
+    spectrum = _Spectrum.of(S, right, _root_of(prior))
     return -float(spectrum.costs(np.ones(1))[0])
+
+
+def _root_of(covariance: FloatArray) -> FloatArray:
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 class _Spectrum(NamedTuple):
@@ -240,10 +257,8 @@ class _Spectrum(NamedTuple):
     right: FloatArray
 
     @classmethod
-    def of(cls, S: FloatArray, right: FloatArray, shape: FloatArray) -> "_Spectrum":
-        """Return the spectrum of unknowns of which the shape is the covariance."""
-        values, vectors = np.linalg.eigh(shape)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
+    def of(cls, S: FloatArray, right: FloatArray, root: FloatArray) -> "_Spectrum":
+        """Return the spectrum of unknowns whose covariance has this square root."""
         seen, turned = np.linalg.eigh(root.T @ S @ root)
         root = root @ turned
         return cls(root, np.maximum(seen, 0.0), root.T @ right)

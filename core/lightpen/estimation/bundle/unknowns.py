@@ -219,8 +219,14 @@ class Unknowns:
         ):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
-        for place, effect in zip(at.effects, components.effects, strict=True):
-            prior[place, place] = known_by(effect.covariance)
+        for place, effect, found in zip(
+            at.effects, self.effects, components.effects, strict=True
+        ):
+            prior[place, place] = (
+                effect.prior_information
+                if found.covariance is effect.prior
+                else known_by(found.covariance)
+            )
         variances, oval = self.seat_variances(components), components.oval.sigma
         prior[at.whole_seat, at.whole_seat] = (
             inverse(np.diag(variances) + oval**2 * self.oval @ self.oval.T)

@@ -89,6 +89,8 @@ class UncertaintyPrediction:
         With their columns in these images.
     effects : tuple of SearchedEffect
         What these images leave open of lens and timing.
+    lasting : tuple of UncertaintyContribution
+        What endless images of this kind leave open, errors of centres apart.
     """
 
     state: BundleState
@@ -96,6 +98,7 @@ class UncertaintyPrediction:
     n_whole: int
     mechanics: tuple[Effect, ...]
     effects: tuple[SearchedEffect, ...] = ()
+    lasting: tuple[UncertaintyContribution, ...] = ()
 
     def predicted(
         self, joint: JointFit, sigma: float, assumed: Assumptions
@@ -109,41 +112,40 @@ class UncertaintyPrediction:
         sigma : float
             Noise of one image coordinate, px.
         """
-        priors, equations, bundle = self._adjusted(joint, sigma, assumed)
-        shift = _shift_from(bundle, priors, equations)
+        priors, bundle = self._adjusted(joint, sigma, assumed)
+        shift = _shift_from(bundle, priors)
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
         now = contributions_of(bundle, priors, n_images, noise, shift, self.effects)
-        endless = _with_endless_images(bundle)
-        nothing = np.zeros((6, 6))
-        at_last = contributions_of(endless, priors, n_images, nothing, nothing[0])
-        stays = [each for each in at_last if each.name not in IMAGES_SHRINK]
         share = min(n_images / POSTURES, 1.0)  # of what no longer averages out then
-        stays += [
+        centers = [
             replace(each, covariance=share * each.covariance)
             for each in now
             if each.name is ContributionName.CENTERS
         ]
-        return PredictedUncertainty(_weakest(now), _weakest(stays))
+        return PredictedUncertainty(_weakest(now), _weakest([*self.lasting, *centers]))
 
     def _with_effects(
         self, pixels: FloatArray, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> "UncertaintyPrediction":
-        """Search images, pixels (N, C, L, 2), for the effects of a station."""
-        _, _, bundle = self._adjusted(joint, sigma, assumed)
+        """Search images, pixels (N, C, L, 2), for lens, timing and what lasts."""
+        priors, bundle = self._adjusted(joint, sigma, assumed)
         found = search_effects(bundle, pixels, np.zeros_like(bundle.values))
         held = tuple(replace(each, is_candidate=False) for each in found)
-        return replace(self, effects=held)
+        endless, nothing = _with_endless_images(bundle), np.zeros((6, 6))
+        at_last = contributions_of(endless, priors, self.n_whole, nothing, nothing[0])
+        lasting = tuple(each for each in at_last if each.name not in IMAGES_SHRINK)
+        return replace(self, effects=held, lasting=lasting)
 
     def _adjusted(
         self, joint: JointFit, sigma: float, assumed: Assumptions
-    ) -> tuple[Priors, NormalEquations, Bundle]:
+    ) -> tuple[Priors, Bundle]:
         state = self.state
         priors = priors_of(state.rig, state.pen, assumed)
         modes = seat_modes_of(state.rotations)
         unknowns = Unknowns.of(state, priors, modes, self.mechanics)
         equations = _weighed(self.equations, sigma)
-        return priors, equations, _linear_bundle(unknowns, equations, joint, sigma)
+        return priors, _linear_bundle(unknowns, equations, joint, sigma)
 
 
 def predict_uncertainty(
@@ -179,7 +181,7 @@ def predict_uncertainty(
     return UncertaintyPrediction(
         replace(before.state, rotations=joint.rotations),
         _joined(before.equations, _moved(fresh, state, before.state)),
-        *(n_whole, before.mechanics, before.effects),
+        *(n_whole, before.mechanics, before.effects, before.lasting),
     )
 
 
@@ -316,15 +318,14 @@ def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
     )
 
 
-def _shift_from(
-    bundle: Bundle, priors: Priors, equations: NormalEquations
-) -> FloatArray:
+def _shift_from(bundle: Bundle, priors: Priors) -> FloatArray:
     """Return (tip, cone) of the estimate less those of this fit, (6,), mm."""
     shrunk, likely = shrunk_priors(bundle, priors), likely_effects(bundle)
     if shrunk is priors and likely == bundle.unknowns.effects:
         return np.zeros(6)
     unknowns = replace(bundle.unknowns, priors=shrunk, effects=likely)
-    information, right = unknowns.system(equations)
+    information = bundle.information
+    right = (information + bundle.prior_information) @ bundle.values
     of_effects = zip(likely, bundle.components.effects, strict=True)
     components = bundle.components._replace(
         effects=tuple(held(one) if one.is_exact else own for one, own in of_effects)
