@@ -17,6 +17,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.component_search import find_components
+from lightpen.estimation.bundle.components import NO_COMPONENTS
 from lightpen.estimation.bundle.consistency_findings import (
     ContradictedInputs,
     Contradiction,
@@ -146,7 +148,11 @@ def adjust(
     correlation, same = fitted.correlation, bundle.unknowns
     again = partial(fit, inflation=inflation, noise=same.noise)
     if fitted.candidates != same.effects:
-        whole = again(fitted.priors, effects=fitted.candidates)
+        whole = (
+            with_effects(bundle, fitted.candidates)
+            if correlation.components is None
+            else again(fitted.priors, effects=fitted.candidates)
+        )
         correlation = measure_correlation(whole, pixels)
     shrunk = shrunk_priors(bundle, fitted.priors)
     if shrunk is not fitted.priors:
@@ -178,21 +184,24 @@ def _fit_consistent(
         state.pen.leds,
         priors.compliance,
     )
-    bundle = fit(priors, effects=candidates)
+    held = tuple(each.at_zero for each in candidates)
+    bundle = fit(priors, effects=held)
     of_centers = None
     if sigmas is not None:
         of_centers = find_center_noise(bundle.residuals, bundle.used, sigmas)
     if of_centers is not None:
         fit = partial(fit, noise=of_centers)
-        bundle = fit(priors, effects=candidates)
-    effects = search_effects(bundle, pixels)
+        bundle = fit(priors, effects=held)
+    whole = with_effects(bundle, candidates)
+    effects = search_effects(whole, pixels, bundle.values)
     found = tuple(each.effect for each in effects if each.is_candidate)
     if found:
         candidates += found
-        bundle = fit(priors, effects=candidates)
-    likely = likely_effects(bundle)
+        bundle = fit(priors, effects=held + found)
+        whole = with_effects(bundle, candidates)
+    likely = likely_effects(whole)
     fit = partial(fit, effects=likely)
-    if likely != candidates:
+    if likely != bundle.unknowns.effects:
         bundle = fit(priors)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
@@ -235,6 +244,33 @@ def _with_led_noise(
         weights, fit = noise, partial(fit, noise=known * noise)
         bundle = fit(priors)
     return fit, bundle
+
+
+def with_effects(bundle: Bundle, effects: tuple[Effect, ...]) -> Bundle:
+    """Return a fit with other priors of its effects, by one linear step.
+
+    The residuals stay those of the fit.
+    """
+    unknowns = replace(bundle.unknowns, effects=effects)
+    information = bundle.information + bundle.measured_information
+    right = (information + bundle.prior_information) @ bundle.values
+    # Anew, as other components may have taken the effects up.
+    components = NO_COMPONENTS._replace(jitter=bundle.components.jitter)
+    components = components.with_no_effects(effects)
+    components = find_components(unknowns, information, right, components)
+    prior = unknowns.prior_information(components)
+    covariance = inverse(information + prior)
+    values = covariance @ right
+    return replace(
+        bundle,
+        unknowns=unknowns,
+        state=unknowns.moved(bundle.state, values, np.zeros(3)),
+        values=values,
+        components=components,
+        budget_components=components,
+        prior_information=prior,
+        covariance=covariance,
+    )
 
 
 def likely_effects(bundle: Bundle) -> tuple[Effect, ...]:

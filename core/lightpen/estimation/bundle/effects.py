@@ -120,7 +120,7 @@ class Effect:
         """Whether it is an unknown of every fit, with a prior of its usual size."""
         return self.name in MECHANICS
 
-    @property
+    @cached_property
     def at_zero(self) -> "Effect":
         """The same effect held at 0."""
         return replace(self, stated=0.0, is_exact=True)
