@@ -55,6 +55,7 @@ PRELOADED = ("numpy", "scipy.special", "scipy.linalg", "scipy.optimize", "cv2", 
 OPTIONS = (
     *("-q", "--slow", "-p", "no:cacheprovider", "-p", "no:pytest-qt"),
     *("-o", "addopts=--import-mode=importlib"),
+    *("-o", "python_files=test_*.py"),  # pytest imports press_test.py itself otherwise
     *("-W", "ignore::pytest.PytestConfigWarning"),  # of the options of pytest-qt
 )
 OTHER_OPERATORS: Mapping[type[ast.AST], type[ast.AST]] = {

@@ -124,4 +124,4 @@ def _axis_deviation(turns: FloatArray, tilts: FloatArray) -> float:
     correlation = min(max(shifted, 0.0), MOST_ALIKE)
     covariance = variance * np.linalg.pinv(design.T @ design)[:2, :2]
     covariance *= (1 + correlation) / (1 - correlation)
-    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    return float(np.sqrt(np.linalg.eigvalsh(covariance).max()))

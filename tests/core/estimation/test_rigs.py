@@ -116,6 +116,13 @@ def test_three_cameras_give_one_tip() -> None:
     result = calibrated(seen(swing, 0.0, rig), rig)
 
     np.testing.assert_allclose(result.joint.tip_pen, swing.tip_pen, atol=1e-5)
+    inputs = Inputs(FILE, FILE, (FILE,), None, RigInputs(FILE, (FILE, FILE, FILE)))
+    record = calibration_record(result, inputs, "joint", SwingLimits())
+    first, *others = entries_of(record)["rig"]["cameras"]
+    assert "change_from_file" not in first["cam_from_rig"]
+    changes = [each["cam_from_rig"]["change_from_file"] for each in others]
+    fitted = result.bundle.values[result.bundle.layout.extrinsics]
+    np.testing.assert_allclose(changes, fitted.reshape(2, 6), atol=1e-6)
 
 
 def test_a_second_camera_tells_the_depth_of_each_moment() -> None:

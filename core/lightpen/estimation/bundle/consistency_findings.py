@@ -57,8 +57,8 @@ class Contradiction:
     estimated: float
     estimated_uncertainty: float
     deviations: float
-    camera: str = ""
-    of_rig: bool = False
+    camera: str
+    of_rig: bool
     of_pen: bool = False
 
     @property

@@ -20,6 +20,7 @@ from lightpen.estimation.pivot.pivot import (
 )
 from lightpen.estimation.statistics.correlation import correlated_covariance
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
+from lightpen.model.information import EXACT
 from lightpen.model.quantiles import chi_quantile
 
 LEAST_SHARE = 0.1  # of the poses; fewer are outliers
@@ -35,7 +36,6 @@ SIGNIFICANT = (
 MAX_ROUNDS = 30
 SINGULAR = 1e-12  # of the trace; sides of too similar poses give any finite answer
 MAX_LOOKED_AT = 500  # poses, to begin with
-EXACT = 1e-6  # mm; what is closer is the same
 
 
 @dataclass(frozen=True, eq=False)

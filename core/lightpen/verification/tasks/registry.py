@@ -20,7 +20,6 @@ TASKS: tuple[AnyTask, ...] = (
     *(FIXED_POINT, CIRCLE, LENGTH, PLANE, SPHERE, ARTICULATION, DRIFT),
 )
 ALL_TASKS: tuple[AnyTask, ...] = (*TASKS, PART)  # with that of the step Measure
-PAPER = (FIXED_POINT, CIRCLE, LENGTH)  # the paper's three
 
 _BY_KIND = {task.kind: task for task in ALL_TASKS}
 

@@ -46,7 +46,8 @@ def test_a_swing_that_agrees_with_the_file_is_reported(
 def test_what_a_swing_denies_of_the_file_is_reported(
     panel: IntrinsicsPanel, solution: Solution
 ) -> None:
-    denied = Contradiction(FOCAL_LENGTH, "px", 2319.0, 0.5, 2326.0, 0.4, 21.0)
+    values = (2319.0, 0.5, 2326.0, 0.4)
+    denied = Contradiction(FOCAL_LENGTH, "px", *values, 21.0, "", of_rig=False)
     calibration = replace(solution.calibration, contradictions=(denied,))
     panel.set_swing(replace(solution, calibration=calibration))
 

@@ -256,6 +256,8 @@ def test_what_the_images_want_is_reported_no_finer_than_they_know_it() -> None:
         estimated=10.0611,
         estimated_uncertainty=0.11,
         deviations=18.0,
+        camera="",
+        of_rig=False,
         of_pen=True,
     )
     words = "diameter of the discs 10.06 \u00b1 0.11 mm from the images, 9 \u00b1 "

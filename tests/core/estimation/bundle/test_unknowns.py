@@ -12,6 +12,7 @@ from lightpen.estimation.bundle.seat_modes import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import fit_joint
+from lightpen.estimation.statistics.variance_components import Component
 from lightpen.estimation.uncertainty.budget import SHARES_OF_EFFECTS, ContributionName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
@@ -299,6 +300,25 @@ def test_a_seat_that_is_truer_than_is_assumed_is_no_finding() -> None:
     seat = result.bundle.components.seat
     assert not any(form.is_significant for form in seat)
     assert {form.sigma for form in seat} == {0.0}
+
+
+def test_an_oval_seat_adds_its_covariance_to_that_of_the_modes() -> None:
+    bundle = calibrated(PEN, 0.03, 3, FEW).bundle
+    unknowns, place = bundle.unknowns, bundle.layout.whole_seat
+    true, oval = (
+        bundle.components._replace(oval=Component(sigma, sigma))
+        for sigma in (0.0, 0.02)
+    )
+
+    added = np.subtract(
+        *(
+            np.linalg.inv(unknowns.prior_information(components)[place, place])
+            for components in (oval, true)
+        )
+    )
+
+    by_oval = 0.02 * unknowns.oval
+    np.testing.assert_allclose(added, by_oval @ by_oval.T, atol=1e-9)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.8, 1.6, 2.4])

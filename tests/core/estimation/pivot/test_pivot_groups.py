@@ -50,6 +50,7 @@ def test_a_cone_that_moved_halfway_is_found() -> None:
     assert groups is not None
     assert not groups.has_two_tips
     assert groups.pivot_distance == pytest.approx(2.0, abs=0.5)
+    assert groups.tip_distance < 0.5
 
 
 @pytest.mark.parametrize("distance", [10.0, 15.0])

@@ -124,15 +124,18 @@ def variance_of(budget: Budget, name: ContributionName) -> FloatArray:
 
 def test_blocks_of_independent_noise_scatter_as_that_noise_does() -> None:
     adjustment = adjusted(calibrated(0.05 * noise(0, n_images=40)))
-    ratios = []
+    ratios, raised = [], []
     for seed in range(10):
         joint = fit(0.05 * noise(seed))
         for first in range(0, 99, 9):  # three blocks each
-            some = of_images(joint, slice(first, first + 9))
-            ratios.append(combine(adjustment, some).block_ratio)
+            budget = combine(adjustment, of_images(joint, slice(first, first + 9)))
+            ratios.append(budget.block_ratio)
+            raised.append(budget.correlation_factor > 1)
 
     # 110 draws of 12 degrees of freedom fix the mean to 4 %.
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
+    # Chi-square of 12 degrees of freedom is beyond 26.217 once in a hundred.
+    np.testing.assert_array_equal(raised, np.array(ratios) > 26.217 / 12)
 
 
 @pytest.mark.slow
