@@ -65,7 +65,7 @@ def find_led_noise(
     squares = np.sum(np.where(used[..., None], residuals, 0.0) ** 2, axis=(0, 3))
     counts = 2.0 * used.sum(axis=0)
     weighed = float(np.sum(squares / weights**2))
-    freedom = min(weighed / (sigma**2 * max(counts.sum(), 1.0)), 1.0)
+    freedom = min(weighed / (sigma**2 * counts.sum()), 1.0)
     free = counts * freedom
     known = free >= MIN_FREE
     if known.sum() < 2:

@@ -352,9 +352,13 @@ def test_what_is_closed_is_an_abandoned_verification_in_the_archive(
     copy = tmp_path_factory.mktemp("killed") / "data"
     shutil.copytree(in_force, copy)
     second = verifying(copy)
-    abandon_interrupted(copy, interrupted_in(copy), NOON)
+    interrupted = interrupted_in(copy)
+    left_over = interrupted.path.read_bytes()
+    abandon_interrupted(copy, interrupted, NOON)
+    interrupted.path.write_bytes(left_over)  # as if killed before it was deleted
 
     assert find_interrupted(copy) == ()
+    assert not interrupted.path.exists()
     (conclusion,) = second.conclusions
     assert conclusion["outcome"] == "abandoned"
     assert (conclusion["operator"], conclusion["tip"]) == ("Ann", "T-10")
