@@ -100,6 +100,11 @@ class UncertaintyPrediction:
     effects: tuple[SearchedEffect, ...] = ()
     lasting: tuple[UncertaintyContribution, ...] = ()
 
+    @property
+    def n_images(self) -> int:
+        """Number of images."""
+        return len(self.state.rotations)
+
     def predicted(
         self, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> PredictedUncertainty:
@@ -176,7 +181,7 @@ def predict_uncertainty(
         mechanics, equations = _linearised(state, pixels, joint, assumed, n_images, 0)
         whole = UncertaintyPrediction(state, equations, n_images, mechanics)
         return whole._with_effects(pixels, joint, sigma, assumed)
-    n_before, n_whole = len(before.state.rotations), before.n_whole
+    n_before, n_whole = before.n_images, before.n_whole
     _, fresh = _linearised(state, pixels, joint, assumed, n_whole, n_before)
     return UncertaintyPrediction(
         replace(before.state, rotations=joint.rotations),

@@ -26,6 +26,7 @@ from lightpen.swing.capture.seat import Seat, fit_seat, tip_distances
 MIN_JOINT = 8  # images of the first joint fit
 LEAVING = 0.01  # chance that an image is left out though the tip rests
 MAX_PASSES = 3  # of looking for slipped images
+RENEWED = 0.02  # of the images; after so many more U is predicted anew
 NO_NOISE = 1e-4  # px, less than any camera has
 
 
@@ -177,7 +178,9 @@ def keep(
     if kept.joint is None:
         return _refit(rig, pen, longer, longer.rotations)
     starts = np.concatenate([kept.joint.rotations, detection.rotation[None]])
-    longer = replace(longer, seat=kept.seat, prediction=kept.prediction)
+    longer = replace(
+        longer, seat=kept.seat, prediction=kept.prediction, predicted=kept.predicted
+    )
     return _refit(rig, pen, longer, starts, is_near=True)
 
 
@@ -222,6 +225,7 @@ def _refit(
     is_near: bool = False,
 ) -> AcceptedImages:
     """Return the images with a new fit that starts at rotations (N, 3, 3)."""
+    before = kept.predicted
     kept = replace(kept, joint=None, predicted=UNKNOWN_UNCERTAINTY)
     fixed = len(kept) >= MIN_JOINT and posture_spread(starts)[0][0] >= MIN_SPREAD
     seat = kept.seat
@@ -245,6 +249,13 @@ def _refit(
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
     sigma = max(joint.sigma, NO_NOISE)
+    known = kept.prediction
+    if (
+        known is not None
+        and np.isfinite(before.uncertainty)
+        and len(kept) < known.n_images + RENEWED * len(kept)
+    ):
+        return replace(kept, seat=fitted, joint=joint, predicted=before)
     prediction = predict_uncertainty(
         rig, pen, kept.pixels, joint, sigma, kept.assumed, kept.prediction
     )
