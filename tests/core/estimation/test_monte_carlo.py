@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.disc_diameter import DiameterReading
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.monte_carlo import (
     MonteCarlo,
+    Trials,
     run_monte_carlo,
     run_trial,
     trials_of,
@@ -111,6 +113,25 @@ def test_trials_of_a_seat_that_jitters_differ_by_it(calibration: Calibration) ->
     assert len(differences) >= 3
     # 25 images with 0.02 mm of jitter move the tip by some hundredths.
     assert 0.003 < np.std(differences) < 0.1
+
+
+def test_domes_that_all_stand_out_alike_move_the_tip_along_the_normals(
+    calibration: Calibration,
+) -> None:
+    trials = trials_of(calibration)
+
+    def trials_with(shift: float) -> Trials:
+        reading = DiameterReading(trials.pen.diameter, 0.01, shift)
+        return replace(trials, priors=replace(trials.priors, reading=reading))
+
+    flat, domed = trials_with(0.0), trials_with(0.1)
+    found = [(run_trial(flat, n), run_trial(domed, n)) for n in range(4)]
+
+    moves = np.array([b - a for a, b in found if a is not None and b is not None])
+    assert len(moves) >= 3
+    np.testing.assert_array_equal(trials.pen.normals, [[0, 0, 1]] * 10)
+    np.testing.assert_allclose(moves[:, :2], 0, atol=1e-9)
+    assert 0.03 < np.sqrt(np.mean(moves[:, 2] ** 2)) < 0.3
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,11 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.bundle.consistency_findings import DIAMETER, Contradiction
+from lightpen.estimation.bundle.consistency_findings import (
+    DIAMETER,
+    Contradiction,
+    _of_camera,
+)
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
@@ -262,3 +266,11 @@ def test_what_the_images_want_is_reported_no_finer_than_they_know_it() -> None:
     )
     words = "diameter of the discs 10.06 \u00b1 0.11 mm from the images, 9 \u00b1 "
     assert words in str(found.message)
+
+
+def test_each_number_of_a_camera_can_be_changed_alone() -> None:
+    numbers = _of_camera(CAMERA, CAMERA)
+
+    changes = [[one.by @ other.along for other in numbers] for one in numbers]
+    # The lens is round to half a thousandth.
+    np.testing.assert_allclose(changes, np.eye(9), atol=1e-3)

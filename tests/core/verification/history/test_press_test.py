@@ -1,5 +1,6 @@
 """The press test: a stylus that gives way is found, and a stiff one is left alone."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -85,3 +86,25 @@ def test_a_cone_that_was_moved_is_distinguished_from_a_stylus() -> None:
 
     assert found.assessment.reason.code == "press-test.cone-moved"
     assert found.change[3] == pytest.approx(0.05, abs=0.01)
+
+
+def test_instruments_that_disagree_count_by_half_their_difference() -> None:
+    usual, firm = swung(0, 1), swung(0, 3)
+    one, rig = usual.instrument, firm.instrument.rig
+    longer = rig.cameras[0].intrinsics * np.r_[1.01, 1.01, np.ones(7)]
+    camera = rig.cameras[0].with_intrinsics(longer)
+    other = replace(firm.instrument, rig=replace(rig, cameras=(camera,)))
+
+    by_one = press_test(usual, replace(firm, instrument=one))
+    by_other = press_test(
+        replace(usual, instrument=other), replace(firm, instrument=other)
+    )
+    by_both = press_test(usual, replace(firm, instrument=other))
+
+    changes = np.array([by_one.change, by_other.change])[:, :3]
+    np.testing.assert_allclose(by_both.change[:3], changes.mean(axis=0))
+    half = np.ptp(changes, axis=0) / 2
+    assert half.max() > 0.005
+    np.testing.assert_allclose(
+        by_both.uncertainty[:3], np.hypot(by_one.uncertainty[:3], 2 * half)
+    )

@@ -19,7 +19,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.file_format import FileFormat
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import taught_plan
-from lightpen.measuring.plan import Plan, free_plan
+from lightpen.measuring.plan import Nominal, Plan, PlannedFeature, free_plan
 from lightpen.measuring.qif import qif_text
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
@@ -42,6 +42,7 @@ from lightpen.verification.tasks.part_course import (
     PartOptions,
     course,
     feature_so_far,
+    planned_places,
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
 
@@ -254,6 +255,17 @@ def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> No
         for point in progress.points
     ]
     assert min(away) > 10
+
+
+def test_a_line_is_planned_from_left_to_right_at_the_front_of_the_part() -> None:
+    edge = Nominal(origin=(10.0, 0.0, 0.0), axis=(-1.0, 0.0, 0.0), length=40.0)
+    places = planned_places(PlannedFeature("edge", FeatureKind.LINE, nominal=edge))
+
+    along = [float(each.point[0]) for each in places]
+    assert along == sorted(along)
+    assert along[-1] - along[0] > 20
+    for each in places:
+        np.testing.assert_array_equal(each.normal, [0.0, -1.0, 0.0])
 
 
 def test_an_undone_point_can_be_probed_again(instrument: Instrument) -> None:
