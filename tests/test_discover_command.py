@@ -1,6 +1,7 @@
 """``lightpen discover`` as it is called."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from tests.simulated_stations import leaning, random_station, seen_station
 
 from lightpen.cli import main
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.simulator.swings import swing_from_postures
@@ -97,6 +99,44 @@ def test_a_length_between_the_wrong_leds_is_reported(
     assert main(arguments(centers, *length)) == 1
 
     assert "disc diameter of" in capsys.readouterr().err
+    assert not any((centers.parent / name).exists() for name in OUTPUTS)
+
+
+@pytest.mark.slow
+def test_a_camera_file_that_is_off_is_reported(
+    centers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    camera, length = STATION.camera, ("--length", "longest", f"{STATION.longest}")
+    file = centers.parent / "stated.yaml"
+    given = (*length, "--camera", str(file))
+
+    write_camera(camera, file)
+    assert main(arguments(centers, *given)) == 0
+    assert "camera file is off" not in capsys.readouterr().out
+
+    off = replace(camera, fx=1.05 * camera.fx, fy=1.05 * camera.fy)
+    write_camera(off, file)
+    assert main(arguments(centers, *given)) == 0
+    assert "camera file is off" in capsys.readouterr().out
+
+    for name in OUTPUTS:
+        (centers.parent / name).unlink(missing_ok=True)
+    write_camera(replace(off, covariance=1e-8 * np.eye(len(off.intrinsics))), file)
+    assert main(arguments(centers, *given)) == 1
+    assert "does not fit the camera file" in capsys.readouterr().err
+    assert not any((centers.parent / name).exists() for name in OUTPUTS)
+
+
+def test_centres_in_millimetres_are_named(
+    centers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = np.loadtxt(centers, delimiter=",", skiprows=1)
+    rows[:, 1:] *= 0.00345
+    np.savetxt(centers, rows, "%d,%.6f,%.6f", header="frame,x_px,y_px", comments="")
+
+    assert main(arguments(centers, "--length", "longest", "180")) != 0
+
+    assert "centres in pixels" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
 
 

@@ -19,6 +19,7 @@ MESSAGES = {
     "discover.same-led": "The length is between LED {number} and itself. Give the numbers of two LEDs.",
     "discover.lengths-contradict": "The lengths contradict each other: LEDs {first} and {second} are stated {stated:.3f} mm apart; the other lengths give {implied:.3f} mm. Check the numbers of the LEDs, and measure again.",
     "discover.length-of-others": "The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
+    "discover.no-disc": "The centres give a disc diameter of {found:.2f} mm; stated is {stated:g} mm. Check the stated diameter and that the centres are those of the LED discs, or give the images.",
     "discover.length-not-sketched": "The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.",
     "discover.cones-contradict": "The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.",
     "discover.cones-not-settled": "The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.",
@@ -31,4 +32,7 @@ MESSAGES = {
     "discover.relative": "No length is given: all lengths are in hundredths of the largest distance between two LEDs.",
     "discover.length-limits": "The length limits U: a standard uncertainty of {sigma:.3f} mm would reduce U from {now:.0f} to {then:.0f} µm.",
     "discover.centers-outside": "Most centres are outside the image: they extend to ({x:.0f}, {y:.0f}) px; the images have {width} x {height} px. Check the size of the images.",
+    "discover.centers-small": "The centres of all images lie within {extent:.1f} px; the images have {width} x {height} px. Give the centres in pixels, and check the size of the images.",
+    "discover.camera-off": "The camera file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.",
+    "discover.other-camera": "The swing does not fit the camera file: the fit did not converge. Check that the file is of this camera, zoom and focus, or find the camera without a file.",
 }

@@ -135,7 +135,11 @@ def _adjusted(
     try:
         calibration = calibrate(camera, pen, observations, second=second)
     except CalibrationError as error:
-        if second is None or error.message.code not in NOT_SETTLED:
+        if error.message.code not in NOT_SETTLED:
+            raise
+        if request.camera is not None:
+            raise CalibrationError("discover.other-camera") from error
+        if second is None:
             raise
         distance = second.separation.distance
         raise CalibrationError(

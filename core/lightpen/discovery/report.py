@@ -11,9 +11,11 @@ from lightpen.formats.json_records import plain, record_heading
 from lightpen.intrinsics.distortion import choice_record
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
+from lightpen.model.assumptions import USUAL
 
 PINHOLE = ("fx", "fy", "cx", "cy")
 TO_MICROMETRES = 1000.0
+OTHER_CAMERA = 3.0  # standard deviations, of the focal length from that of the file
 
 
 def discovery_record(discovery: Discovery) -> dict[str, Any]:
@@ -170,17 +172,17 @@ def swings_text(together: Together) -> str:
 
 def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
     """Return the limits of the uncertainty, and notes on the result."""
+    remarks = _remarks_on_camera(discovery)
     if discovery.is_relative:
-        return (message("discover.relative"),)
+        return (*remarks, message("discover.relative"))
     if not discovery.lengths:
-        return ()
+        return tuple(remarks)
     at = discovery.parameters
     tip = discovery.tip_pen - discovery.pen.leds.mean(axis=0)
     far = int(np.argmax(np.abs(tip)))
     U = float(discovery.expanded_uncertainty[far])
     known = min(discovery.lengths, key=lambda each: each.sigma / each.length)
     by_length = COVERAGE_FACTOR * known.sigma / known.length * abs(float(tip[far]))
-    remarks = []
     if by_length > 0.5 * U and at.number:
         better = known.sigma / 4
         rest = max(U**2 - by_length**2 * (1 - 1 / 16), 0.0) ** 0.5
@@ -190,3 +192,20 @@ def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
             )
         )
     return tuple(remarks)
+
+
+def _remarks_on_camera(discovery: Discovery) -> list[Message]:
+    """Return what is to be said of the file of the camera, if there was one."""
+    if discovery.lens_choice is not None:
+        return []
+    stated = discovery.calibration.bundle.unknowns.start.rig.cameras[0]
+    sigma = USUAL.focal_length * stated.fx
+    if stated.covariance is not None:
+        sigma = float(np.sqrt(stated.covariance[0, 0]))
+    found = discovery.camera.fx
+    if abs(found - stated.fx) <= OTHER_CAMERA * np.hypot(
+        sigma, float(discovery.intrinsics_sigma[0])
+    ):
+        return []
+    off = 100 * (stated.fx / found - 1)
+    return [message("discover.camera-off", stated=stated.fx, found=found, off=off)]

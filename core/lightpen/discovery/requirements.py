@@ -75,14 +75,20 @@ def require_length(
 ) -> None:
     """Refuse a length that contradicts the diameter of the discs, or two cones.
 
+    So is a diameter below zero, which centres alone may give.
+
     Raises
     ------
     CalibrationError
         It does.
     """
+    pen, bundle = calibration.bundle.state.pen, calibration.bundle
+    if pen.diameter <= 0:
+        raise CalibrationError(
+            "discover.no-disc", found=pen.diameter, stated=request.diameter
+        )
     if not request.lengths:
         return
-    pen, bundle = calibration.bundle.state.pen, calibration.bundle
     if request.diameter_sigma is not None:  # wide: no contradiction is searched
         place = bundle.layout.diameter
         sigma = float(np.sqrt(bundle.covariance[place, place][0, 0]))

@@ -14,6 +14,7 @@ from lightpen.formats.images import ImageSource, look_at_all
 
 SEARCH_MEMORY_A_PIXEL = 5  # bytes, as of `lightpen.detection.observations`
 UNFIT = SpotFlaw.MERGED | SpotFlaw.CUT | SpotFlaw.BLURRED
+LEAST_EXTENT = 0.02  # of the image's longer side, by all centres; less are not in px
 
 Report = Callable[[float], None]
 
@@ -57,7 +58,7 @@ def sightings_of_centers(
     Raises
     ------
     FileError
-        Most centres are outside an image of this size.
+        Most centres are outside an image of this size, or close together.
     """
     every = np.concatenate([np.zeros((0, 2)), *centers])
     outside = np.any((every < -0.5) | (every > size), axis=1)
@@ -65,6 +66,11 @@ def sightings_of_centers(
         x, y = every.max(axis=0)
         raise FileError(
             "discover.centers-outside", x=x, y=y, width=size[0], height=size[1]
+        )
+    extent = np.ptp(every, axis=0).max() if len(every) else np.inf
+    if extent < LEAST_EXTENT * max(size):
+        raise FileError(
+            "discover.centers-small", extent=extent, width=size[0], height=size[1]
         )
     return Sightings(frames, centers, size)
 

@@ -42,6 +42,7 @@ CORRELATED = 4.0  # points of a view that tell as much as an independent one
 MAX_PASSES = 8  # of turning one view
 ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
+LEAST_EFFECT = 0.01  # px rms, that it removes; less is also a lens's field
 HALVED = 0.5  # the same, of views that no single camera fits
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
 # Larger differences than these, beyond SIGMAS, mean two cameras and not two settings:
@@ -119,18 +120,18 @@ def explain(
     height, longer = views.image_sizes[0][1], max(views.image_sizes[0])
     # Less is also a lens's field, unless there is a board to be blamed for it.
     least = 0.0 if released is not None else 2 * USELESS * longer / height
-    if skewed is not None and abs(skewed[0]) > least:
+    if skewed is not None:
         skew, rms = skewed
-        consider(
-            rms,
-            np.log(n),
-            CalibrationError("intrinsics.skewed", degrees=float(np.degrees(skew))),
+        skewed_error = CalibrationError(
+            "intrinsics.skewed", degrees=float(np.degrees(skew))
         )
+        consider(rms, np.log(n), skewed_error if abs(skew) > least else None)
     if released is not None:
         rms = _rms_by(views, released, near)
         consider(rms, N_SHAPE * np.log(n), None)
     best = min(found, key=lambda each: each[0], default=(np.inf, np.inf, None))
-    is_better = best[0] < n_digits and best[1] < lessened * nothing
+    enough = min(lessened * nothing, np.sqrt(max(nothing**2 - LEAST_EFFECT**2, 0.0)))
+    is_better = best[0] < n_digits and best[1] < enough
     return best[2] if is_better else useless
 
 
@@ -288,6 +289,8 @@ def _turned(
     least = _rms_by(turned(which), tolerances, near)
     tried = np.arange(min(views.n_views, MOST_SINGLE))
     for turn in range(MAX_PASSES):
+        if not tried.size:
+            break
         trials = [which ^ (np.arange(views.n_views) == v) for v in tried]
         sizes = [_rms_by(turned(trial), tolerances, near) for trial in trials]
         best = int(np.argmin(sizes))

@@ -8,6 +8,7 @@ import pytest
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.intrinsics import alternatives
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.camera_change import find_change
 from lightpen.intrinsics.distortion import fit_camera
@@ -209,15 +210,45 @@ def test_rotated_images_are_named_also_with_uneven_squares(
 def test_sheared_images_are_not_taken_for_a_sheared_board(
     make_views: MakeViews,
 ) -> None:
-    views = make_views(n_views=20)
-    pixels = views.pixels.copy()
-    pixels[..., 0] += 0.003 * (pixels[..., 1] - 240)
-
     with pytest.raises(CalibrationError, match="not perpendicular") as caught:
-        calibrated(replace(views, pixels=pixels))
+        calibrated(sheared(make_views(n_views=20), 0.003))
     degrees = caught.value.message.values["degrees"]
     assert isinstance(degrees, float)
     assert np.radians(degrees) == pytest.approx(0.003, abs=BoardTolerances().squareness)
+
+
+def sheared(views: Views, slope: float) -> Views:
+    pixels = views.pixels.copy()
+    pixels[..., 0] += slope * (pixels[..., 1] - 240)
+    return replace(views, pixels=pixels)
+
+
+def test_nothing_is_blamed_for_less_than_a_lens_may_do(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    views = sheared(make_views(n_views=8, noise=0.004), 0.0008)
+    fitted = fit_camera(views, BoardTolerances(), camera)
+
+    assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
+
+
+def test_a_skew_that_a_lens_may_have_is_not_blamed(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    views = sheared(make_views(n_views=16), 0.0024)
+    fitted = fit_camera(views, BoardTolerances(), camera)
+
+    assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
+
+
+def test_all_views_may_be_tried_as_rotated(
+    make_views: MakeViews, camera: Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(alternatives, "ENOUGH", 1.5)  # each seems worth it
+    views = make_views(n_views=8)
+    fitted = fit_camera(views, BoardTolerances(), camera)
+
+    assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
 
 
 @pytest.mark.slow
