@@ -19,6 +19,7 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import Grade, judge
+from lightpen.estimation.rigs.synchrony import PenRotations, measure_lag, relative_turn
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.hashes import InputFile, Inputs, RigInputs
 from lightpen.formats.observation_files import Centers
@@ -298,6 +299,30 @@ def test_a_single_image_of_another_moment_is_left_out_and_reported() -> None:
     assert "the other cameras at 2 of 30 instants" in str(warnings_of(result)[0])
     error = np.abs(result.joint.tip_pen - SWING.tip_pen)
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()
+
+
+def test_a_lag_is_found_and_scatters_by_its_standard_deviation() -> None:
+    def turned(at: FloatArray) -> FloatArray:
+        return rotation_from_vector(np.outer(np.sin(at / 5), [0.4, 0.1, 0.0]))
+
+    moments, lags = np.arange(60.0), []
+    for seed in range(50):
+        noise = 0.01 * np.random.default_rng(seed).standard_normal((60, 3))
+        seen_by = [
+            PenRotations(rotations, np.full(60, 3e-4), np.ones(60, bool))
+            for rotations in (
+                turned(moments),
+                turned(moments + 0.2) @ rotation_from_vector(noise),
+            )
+        ]
+        lag = measure_lag(seen_by[0], seen_by[1], relative_turn(*seen_by))
+        assert lag is not None
+        lags.append((lag.value, lag.sigma))
+    values, sigmas = np.array(lags).T
+
+    assert np.mean(values) == pytest.approx(0.2, abs=0.02)
+    # 50 draws fix a standard deviation to 10 %.
+    assert np.std(values) == pytest.approx(np.mean(sigmas), rel=0.3)
 
 
 @pytest.mark.slow
