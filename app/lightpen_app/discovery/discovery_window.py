@@ -37,7 +37,7 @@ from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 SIDE_WIDTH = 52 * GRID
-LEAST_PICTURE = 34 * GRID  # px, of the pen and of the dial
+PICTURE_HEIGHT = 32 * GRID  # px, of the pen and of the dial
 LONGEST, LARGEST_U, LARGEST_DISC = 2000.0, 10.0, 100.0  # mm
 USUAL_U = 0.04  # mm, of a caliper
 SIMULATED_U = 0.002  # mm, of the length of the simulated pen
@@ -92,7 +92,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             name.setBuddy(edit)
         fill(side, self._facts, 1)
         for picture in (self._dial, self._pen):
-            picture.setMinimumHeight(LEAST_PICTURE)
+            picture.setFixedHeight(PICTURE_HEIGHT)
         scroll = PageScroll()
         scroll.setWidget(panel)
         column = QWidget()

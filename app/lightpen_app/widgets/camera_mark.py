@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QTransform
 
-from lightpen_app.look.theme import GRID, TextSize, font
+from lightpen_app.look.theme import GRID, font
 
 TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the circle, degrees
 FLAGS = int(Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextDontClip)
@@ -39,9 +39,20 @@ class CameraPosition:
 
 
 def draw_camera(
-    painter: QPainter, room: QRectF, stand: CameraPosition, words: str, color: QColor
+    painter: QPainter,
+    room: QRectF,
+    stand: CameraPosition,
+    words: str,
+    size: float,
+    color: QColor,
 ) -> None:
-    """Draw a camera that faces a dial, with a label inside a rectangle."""
+    """Draw a camera that faces a dial, with a label inside a rectangle.
+
+    Parameters
+    ----------
+    size : float
+        Font size, px.
+    """
     radius = stand.radius
     body = 0.055 * radius
     painter.save()
@@ -55,7 +66,6 @@ def draw_camera(
     painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
     painter.restore()
 
-    size = max(0.09 * radius, TextSize.SMALL)
     painter.save()
     painter.setPen(color)
     painter.setFont(font(size))

@@ -19,9 +19,11 @@ DISTANCES_M = (1, 2, 3, 4, 6)
 DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
 # Of the height, at most:
 INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.2
-NOTICE_SHARE, SMALL_SHARE, GAP_SHARE = 0.12, 0.03, 0.008
+NOTICE_SHARE, SMALL_SHARE, GAP_SHARE = 0.12, 0.04, 0.008
 BESIDE_NOTICE = 0.55  # of their share that instruction and hint have below a notice
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
+LEGEND_SHARE = 0.04  # of the height, at most, for the letters of the dial
+LEAST_LETTERS = 0.46  # of those that the distance asks for: 8 mm high at 3 m
 USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
 CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not show its size
 
@@ -223,13 +225,15 @@ class OperatorView(Translated, QWidget):
         self._side.setSpacing(min(3 * GRID, round(self.height() * GAP_SHARE)))
         self._instruction.set_largest(letters * 1.2)
         self._hint.set_largest(letters * 0.6)
-        self._notice.set_largest(letters * 0.45)
+        self._notice.set_largest(letters * LEAST_LETTERS)
         for quiet in (self._subject, self._time_left, self._keys):
-            quiet.set_largest(letters * 0.4)
+            quiet.set_largest(letters * LEAST_LETTERS)
+        least = min(letters * LEAST_LETTERS, self.height() * LEGEND_SHARE)
+        self._dial.set_least_letters(least)
         is_digit = len(self._value.count) == 1
         self._count.set_largest(letters * (2.4 if is_digit else 1.2))
         has_room = self._value.dial is None
-        self._banner.set_word_size(letters * (1.6 if has_room else 0.8))
+        self._banner.set_word_size(letters * (1.6 if has_room else 1.0))
         # Else the dial, which wants to be square, would take the room of the words, and
         # of these one that of another.
         room = 1.0 if self._notice.isHidden() else BESIDE_NOTICE

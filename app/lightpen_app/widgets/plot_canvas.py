@@ -8,6 +8,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from typing_extensions import override
 
+from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID
 
 LABELLED = (1, 2, 5)  # of each decade
@@ -20,7 +21,8 @@ DrawSpecs: TypeAlias = tuple[tuple[object, ...], list[object], list[TextSpec]]
 class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     """An axis with decades as 10, 20, 50, 100 instead of 1e+02.
 
-    Of numbers that would overlap only as many are drawn as there is room for.
+    Of numbers that would overlap only as many are drawn as there is room for, those of
+    a linear axis with the same number of decimals.
     """
 
     @override
@@ -35,7 +37,7 @@ class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         for each in words:
             if each[2] and not any(each[0].intersects(other[0]) for other in free):
                 free.append(each)
-        return line, ticks, free
+        return line, ticks, free if self.logMode else _with_equal_decimals(free)
 
     @override
     def logTickStrings(
@@ -44,6 +46,14 @@ class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         numbers = (10 ** float(value) for value in values)
         leading = ((number, float(f"{number:e}"[:3])) for number in numbers)
         return [f"{number:g}" if digit in LABELLED else "" for number, digit in leading]
+
+
+def _with_equal_decimals(words: list[TextSpec]) -> list[TextSpec]:
+    """Return numbers with as many decimals as that with the most of them."""
+    if any("e" in text for _, _, text in words):
+        return words
+    n = max((len(text.partition(".")[2]) for _, _, text in words), default=0)
+    return [(place, flags, number_text(float(text), n)) for place, flags, text in words]
 
 
 class LabelAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types

@@ -27,7 +27,8 @@ GAP = math.radians(1.6)  # half the gap between sectors
 RING_EDGES = (0.24, 0.62, 1.0)  # of upright, leaning, leaning far; rim = 1
 RIM_SHARE = 0.435  # of the side, from the middle to the rim
 BAR_SHARE = 0.12  # of the side, for the bar of the turn
-LEAST_BAR = 36  # px; its words are no smaller than can be read
+LEAST_BAR = 2.8  # of the least letters
+LEGEND_SHARE, NUMBER_SHARE = 0.09, 0.17  # of the rim, for letters
 SECTOR = 2 * math.pi / N_DIRECTIONS
 
 
@@ -117,6 +118,7 @@ class PostureDial(Translated, QWidget):
         self._value = DialValue()
         self._ground = QPixmap()
         self._ground_shows: tuple[object, ...] = ()
+        self._least_letters: float = TextSize.SMALL
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
@@ -131,17 +133,23 @@ class PostureDial(Translated, QWidget):
         self._value = value
         self._describe()
 
+    def set_least_letters(self, size: float) -> None:
+        """Set the least font size of the legends, px."""
+        self._least_letters = size
+        self.updateGeometry()
+        self.update()
+
     @override
     def sizeHint(self) -> QSize:
         return QSize(480, self.heightForWidth(480))
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(176, self.heightForWidth(176))
+        return QSize(176, round(176 + LEAST_BAR * TextSize.SMALL))
 
     @override
     def heightForWidth(self, width: int) -> int:
-        return round(width + _bar_height(width))
+        return round(width + self._bar_height(width))
 
     @override
     def _retranslate(self) -> None:
@@ -182,6 +190,7 @@ class PostureDial(Translated, QWidget):
             colors,
             camera,
             legend,
+            self._least_letters,
             value.heading,
             value.counts.tobytes(),
             value.needed.tobytes(),
@@ -196,20 +205,25 @@ class PostureDial(Translated, QWidget):
         painter = QPainter(ground)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, rim, bar = self._places()
+        size = max(LEGEND_SHARE * rim, self._least_letters)
         draw_camera(
             painter,
             QRectF(0, 0, self.width(), bar.top()),
             CameraPosition(middle, rim, value.heading - math.pi / 2),
             camera,
+            size,
             QColor(colors.muted),
         )
         for place in _fields():
             self._draw_field(painter, middle, rim, place, colors)
         if value.n_full < value.n_fields:
             painter.setPen(QColor(colors.muted))
-            painter.setFont(font(max(0.09 * rim, TextSize.SMALL)))
-            left = max(middle.x() - 1.15 * rim, 0.0)  # of the rim
-            corner = QRectF(left, middle.y() - rim, rim, rim)
+            painter.setFont(font(size))
+            words = painter.fontMetrics().size(0, legend)
+            top = max(1 - words.height() / rim, 0.0)  # rim = 1; the legend ends there
+            right = middle.x() - math.sqrt(1 - top**2) * rim
+            left = min(middle.x() - 1.15 * rim, right - words.width())
+            corner = QRectF(max(left, 0.0), middle.y() - rim, rim, rim)
             painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, legend)
         painter.end()
         self._ground, self._ground_shows = ground, shows
@@ -218,14 +232,20 @@ class PostureDial(Translated, QWidget):
     def _places(self) -> tuple[QPointF, float, QRectF]:
         """Return the middle of the dial, its radius, and the bar of the turn, px."""
         width, height = self.width(), self.height()
-        side = max(min(width, height / (1 + BAR_SHARE), height - LEAST_BAR), 0.0)
-        bar_height = _bar_height(side)
+        side = max(
+            min(width, height / (1 + BAR_SHARE), height - self._bar_height(0.0)), 0.0
+        )
+        bar_height = self._bar_height(side)
         left = (width - side) / 2
         top = (height - side - bar_height) / 2
         middle = QPointF(left + side / 2, top + side / 2)
         rim = RIM_SHARE * side
         bar = QRectF(middle.x() - rim, top + side, 2 * rim, bar_height)
         return middle, rim, bar
+
+    def _bar_height(self, side: float) -> float:
+        """Return the height of the bar of the turn below a dial, px."""
+        return max(BAR_SHARE * side, LEAST_BAR * self._least_letters)
 
     def _images(self, place: _Field) -> tuple[int, int]:
         """Return the accepted and required images of a field."""
@@ -258,6 +278,7 @@ class PostureDial(Translated, QWidget):
         x, y = _center(place, self._value.heading)
         center = middle + QPointF(x, -y) * rim
         size = (0.13 if place.ring else 0.15) * rim
+        size = max(size, min(self._least_letters, NUMBER_SHARE * rim))
         box = QRectF(center.x() - size, center.y() - size, 2 * size, 2 * size)
         if done:
             inset = 0.45 * size
@@ -295,7 +316,7 @@ class PostureDial(Translated, QWidget):
         value = self._value
         if value.turns is None and value.turns_needed is None:
             return
-        size = max(0.24 * box.height(), TextSize.SMALL)
+        size = max(0.24 * box.height(), self._least_letters)
         x_of = partial(_turn_x, box)
         line = QRectF(0, box.top() + 0.12 * box.height(), 0, 0.26 * box.height())
         painter.setPen(Qt.PenStyle.NoPen)
@@ -378,11 +399,6 @@ def _outline(
 
 def _square(middle: QPointF, radius: float) -> QRectF:
     return QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
-
-
-def _bar_height(side: float) -> float:
-    """Return the height of the bar of the turn below a dial, px."""
-    return max(BAR_SHARE * side, LEAST_BAR)
 
 
 def _turn_x(box: QRectF, turn: float) -> float:

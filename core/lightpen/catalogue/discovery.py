@@ -24,7 +24,7 @@ MESSAGES = {
     "discover.cones-contradict": "The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.",
     "discover.cones-not-settled": "The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.",
     "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.",
-    "discover.no-length": "A pen file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.",
+    "discover.no-length": "An LED file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.",
     "discover.other-size": "The images of swing {number} are of another size than those of the first. Give swings of one camera.",
     "discover.other-pen": "Swing {number} does not show the LEDs of the first. Give swings of one pen with all its LEDs in view.",
     "discover.other-lens": "Swing {number} shows too little of the lens to be adjusted with the others. Omit it, or move the pen over more of the image.",

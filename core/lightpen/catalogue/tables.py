@@ -26,7 +26,7 @@ MESSAGES = {
     "table.no-column": "{name} has no column {column}; {what} need the columns {wanted}. Its header is {header}. Rename the columns.",
     "table.two-columns": "Columns {first} and {second} of {name} both contain {column}. Remove one of them.",
     "centers.too-many-frames": "{name} has {n_frames} frames; at most {most} are read. Check that this is the right file, or split it.",
-    "centers.unknown-led": "there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the pen file is of this pen, and that LEDs are numbered from 1.",
+    "centers.unknown-led": "there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the LED file is of this pen, and that LEDs are numbered from 1.",
     "centers.far": "({x:g}, {y:g}) px lies outside every image. Correct or remove the line.",
     "centers.twice": "LED {led} of frame {frame} is already given on line {line}. Keep the right one.",
     "poses.far": "the translation is more than {most:g} m. Check its units: millimetres are needed.",

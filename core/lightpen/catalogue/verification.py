@@ -34,7 +34,7 @@ MESSAGES = {
     "witness.still": "The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).",
     "witness.moved": "The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.",
     "session.same-posture": "This posture was recorded before. Keep the tip in the cone and change the pen tilt.",
-    "session.same-place": "This place of the ring was probed before. Probe it elsewhere.",
+    "session.same-place": "This place was probed before. Probe elsewhere.",
     "session.same-end": "This end was probed before. Probe the other one.",
     "session.touch-ends": "Probe one end of the length, then the other, and hold still on each: {n_touches} of 2.",
     "session.at-rest": "The pen rests. Pick it up: a point counts once the pen has moved.",

@@ -131,7 +131,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
     rough.add_argument(
         "--pen", type=Path, metavar="FILE", help="the same as --pen-sketch"
     )
-    for name, what in (("pen", "pen file"), ("camera", "camera file")):
+    for name, what in (("pen", "LED file"), ("camera", "camera file")):
         suffix = "json" if name == "pen" else "yaml"
         parser.add_argument(
             f"--out-{name}",

@@ -61,7 +61,7 @@ from lightpen.verification.tasks.tip_evidence import block_diagonal
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify`` and its tasks."""
-    kinds = parser.add_subparsers(required=True, metavar="WHAT")
+    kinds = parser.add_subparsers(required=True, metavar="TASK")
     for task in TASKS:
         _add_task(kinds.add_parser(task.command, help=task.summary), task)
     _add_touches(

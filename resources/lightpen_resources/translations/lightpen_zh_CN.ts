@@ -3449,6 +3449,10 @@
 <context>
     <name>PlanPanel</name>
     <message>
+        <source>Simulated plate</source>
+        <translation>模拟平板</translation>
+    </message>
+    <message>
         <source>Open plan...</source>
         <translation>打开测量计划...</translation>
     </message>
@@ -5733,6 +5737,10 @@ mm</translation>
         <translation>4 个畸变系数（不含 Kalibr 文件不能保存的 k3）。交叉验证误差：{held_out:.4f} px。</translation>
     </message>
     <message>
+        <source>5 distortion coefficients are enough: they predict views that were left out to {held_out:.4f} px ({others}).</source>
+        <translation>5 个畸变系数已足够：它们对留出视图的预测误差为 {held_out:.4f} px（{others}）。</translation>
+    </message>
+    <message>
         <source>A fixed cone is the drift reference: its moves from visit to visit count in U of what is probed in between.</source>
         <translation>以固定不动的锥孔作为漂移参考点：它在相邻两次触测之间的位移计入其间所测结果的 U。</translation>
     </message>
@@ -6721,6 +6729,10 @@ mm</translation>
         <translation>平板的这一处已触测过。请触测别处。</translation>
     </message>
     <message>
+        <source>This place was probed before. Probe elsewhere.</source>
+        <translation>此处已触测过。请触测别处。</translation>
+    </message>
+    <message>
         <source>Timestamps with a signature that was not verified: {n}. The certificate of the time stamping authority is not set.</source>
         <translation>{n} 个时间戳的签名未经验证：未设置时间戳机构的证书。</translation>
     </message>
@@ -6923,6 +6935,10 @@ mm</translation>
     <message>
         <source>the file has decimal points and decimal commas; the other form is on line {line}. Use one form throughout.</source>
         <translation>文件同时含有小数点和小数逗号；另一种形式在第 {line} 行。请统一使用一种形式。</translation>
+    </message>
+    <message>
+        <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the LED file is of this pen, and that LEDs are numbered from 1.</source>
+        <translation>没有 LED {led}；光笔有 LED 1 至 {n_leds}。请检查 LED 文件是否属于这支光笔，以及 LED 是否从 1 开始编号。</translation>
     </message>
     <message>
         <source>tip and U for Q-DAS (.dfq)</source>
@@ -7151,10 +7167,6 @@ mm</translation>
     <message>
         <source>3D Slicer</source>
         <translation>3D Slicer</translation>
-    </message>
-    <message>
-        <source>5 distortion coefficients, cross-validated error {held_out:.4f} px; {others} not significantly better.</source>
-        <translation>5 个畸变系数，交叉验证误差 {held_out:.4f} px；{others}没有显著改善。</translation>
     </message>
     <message>
         <source>8 distortion coefficients (rational model). Cross-validated error: {held_out:.4f} px.</source>
@@ -7493,10 +7505,6 @@ mm</translation>
         <translation>已有同名文件。请重试。</translation>
     </message>
     <message>
-        <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the pen file is of this pen, and that LEDs are numbered from 1.</source>
-        <translation>没有 LED {led}；光笔有 LED 1 至 {n_leds}。请检查 LED 文件是否属于这支光笔，LED 是否从 1 开始编号。</translation>
-    </message>
-    <message>
         <source>tip</source>
         <translation>测头</translation>
     </message>
@@ -7769,10 +7777,6 @@ mm</translation>
         <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
     </message>
     <message>
-        <source>A pen file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.</source>
-        <translation>光笔文件需要一个已知长度。请测量两个 LED 的间距并给出，或触测校准长度的两端，或在已知距离处的第二个锥孔中摆动。</translation>
-    </message>
-    <message>
         <source>A point {distance:.1f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
         <translation>与其他各点相距 {distance:.1f} mm 的测点不计入：测头不在锥孔中。请把测头放入锥孔并保持不动。</translation>
     </message>
@@ -7795,6 +7799,10 @@ mm</translation>
     <message>
         <source>All views are from the same distance. Add views with the board nearer.</source>
         <translation>所有视图的距离都相同。请补充标定板更近的视图。</translation>
+    </message>
+    <message>
+        <source>An LED file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.</source>
+        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，触测已检定长度的两端，或在已知距离的第二个锥孔中摆动。</translation>
     </message>
     <message>
         <source>An internal error occurred, and the verification is paused. Results so far are kept; continue, or start over.</source>
@@ -8849,6 +8857,10 @@ mm</translation>
         <translation>联合拟合在 {n_steps} 次迭代内未收敛。请检查两个文件是否属于这支光笔和这台相机。</translation>
     </message>
     <message>
+        <source>The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.</source>
+        <translation>两个锥孔的联合拟合未收敛。请检查锥孔间距 {distance:g} mm、已知长度，以及两次摆动之间相机未被移动。</translation>
+    </message>
+    <message>
         <source>The lamp at {x:.0f}, {y:.0f} px moved by {shift:.2f} px during the swing, but the pen did not. No correction is made. Fix or cover the lamp.</source>
         <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
@@ -9371,10 +9383,6 @@ mm</translation>
     <message>
         <source>This end was probed before. Probe the other one.</source>
         <translation>这一端已触测过。请触测另一端。</translation>
-    </message>
-    <message>
-        <source>This place of the ring was probed before. Probe it elsewhere.</source>
-        <translation>圆环的这一处已触测过。请触测别处。</translation>
     </message>
     <message>
         <source>This place of the sphere was probed before. Probe it elsewhere.</source>

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QImage, QPainter
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -22,6 +22,7 @@ from lightpen_app.steps.review.residual_plots import (
     MisfitPlot,
 )
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.widgets.plot_canvas import Canvas
 from lightpen_app.widgets.plots import Axes, Curve, Plot, TracePlot
 
 IMAGES = np.arange(1.0, 6.0)
@@ -368,3 +369,21 @@ def test_one_plot_is_enlarged_over_its_neighbours(qtbot: QtBot) -> None:
 
     QTest.mouseDClick(cards[1], Qt.MouseButton.LeftButton)
     assert [card.isVisible() for card in cards] == [True, True, True]
+
+
+def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:
+    plot = TracePlot(Axes("x / mm", "swing"), [Curve("x")])
+    show(qtbot, plot)
+    canvas = plot.findChild(Canvas)
+    assert canvas is not None
+    axis = canvas.getPlotItem().getAxis("left")
+    for values in (VALUES, -1.31 - 0.001 * IMAGES, 1000.0 * IMAGES, 1e-5 * IMAGES):
+        plot.set_data(IMAGES, values)
+        plot.grab()
+
+        image = QImage(1, 1, QImage.Format.Format_RGB32)
+        with QPainter(image) as painter:
+            _, _, words = axis.generateDrawSpecs(painter)
+
+        assert len(words) > 1
+        assert len({len(text.partition(".")[2]) for *_, text in words}) == 1, words

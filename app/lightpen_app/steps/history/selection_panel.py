@@ -154,7 +154,10 @@ class SelectionPanel(Translated, QWidget):
             self.tr("LED file and camera file by all selected swings of a pen")
         )
         too_few = self.tr("Select {0} or more calibrations.").format(MIN_POOLED + 1)
-        self._adjust.set_why_not(too_few if len(self._selected) <= MIN_POOLED else "")
+        why_not = too_few if len(self._selected) <= MIN_POOLED else ""
+        self._adjust.set_why_not(why_not)
+        if why_not or self._adjusted.value().sign is Sign.RING:
+            self._adjusted.set_value(StatusMessage(why_not, Sign.RING, Tone.QUIET))
         self._report.setText(self.tr("Repeatability report..."))
         needed = self.tr("Repeatability needs two calibrations of one tip.")
         self._report.set_why_not("" if self.repeatability() else needed)

@@ -32,7 +32,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     """Shows a solved swing: result and details."""
 
     narrow_below = 112 * GRID  # px; then it has the result in a tab
-    vast_from = QSize(240 * GRID, 140 * GRID)  # px; then the result is larger
+    vast_from = QSize(190 * GRID, 100 * GRID)  # px; then the result is larger
 
     def __init__(
         self, run: SwingRun, place: SavePlace, parent: QWidget | None = None

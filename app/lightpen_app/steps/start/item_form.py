@@ -229,6 +229,10 @@ class ItemForm(Translated, QWidget):
                 field.setValue(part)
         self._retranslate()
 
+    def focus_first(self) -> None:
+        """Put the keyboard into the first field that can be changed."""
+        (self._due if self._id.isReadOnly() else self._id).setFocus()
+
     def has_id(self) -> bool:
         """Return whether an id is typed."""
         return bool(self._id.text().strip())

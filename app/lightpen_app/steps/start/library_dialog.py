@@ -155,7 +155,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         panel = vertical_layout(self._panel, *parts, margins=margins)
         horizontal_layout(panel, (self._reason, 1), self._leave, self._save)
         self.setMinimumWidth(100 * GRID)
-        self.resize(130 * GRID, 70 * GRID)
+        self.resize(136 * GRID, 70 * GRID)
 
         # Connections
         self._tabs.currentChanged.connect(self._on_kind_changed)
@@ -298,6 +298,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._form.set_value(item, is_new=is_new)
         self._form.show()
         self._open_panel()
+        self._form.focus_first()
 
     def _open_panel(self) -> None:
         self._asked = None
@@ -308,7 +309,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._list.hide()  # both are too high for a low screen
         self._panel.show()
         self._refresh()
-        self.adjustSize()
+        self.resize(self.width(), self.sizeHint().height())
 
     def _stop_editing(self) -> None:
         self._item = self._asked = None
@@ -316,7 +317,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._panel.hide()
         self._list.show()
         self._refresh()
-        self.adjustSize()
+        self.resize(self.width(), self.sizeHint().height())
 
     def _on_kind_changed(self) -> None:
         self._stop_editing()

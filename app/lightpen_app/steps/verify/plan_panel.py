@@ -86,7 +86,9 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         """Show a measurement."""
         self._status = status
         plan = self._plan()
-        self._name.setText("" if plan is None else plan.name)
+        name = "" if plan is None else plan.name
+        is_simulated = name == plate_plan().name
+        self._name.setText(self.tr("Simulated plate") if is_simulated else name)
         planned = self._planned()
         for each in (self._kind_label, self._kind, self._scan, self._moved):
             each.setVisible(planned is not None)

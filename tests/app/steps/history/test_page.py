@@ -506,9 +506,11 @@ def test_several_swings_are_adjusted_together(desk: Desk, tmp_path: Path) -> Non
     panel = desk.child(SelectionPanel)
     desk.select(0, 1, 2)
     assert not desk.button("Adjust together").isEnabled()
-    desk.select(0, 1, 2, 3)
-    desk.click("Adjust together")
     remark = panel.findChildren(SignLabel)[-1]
+    assert remark.value().text == "Select 4 or more calibrations."
+    desk.select(0, 1, 2, 3)
+    assert not remark.value().text
+    desk.click("Adjust together")
     desk.until(lambda: "Residuals of the swing held out" in remark.value().text)
 
     (camera,) = folder.rglob("led files/*.yaml")

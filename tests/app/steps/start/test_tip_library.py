@@ -42,6 +42,7 @@ from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.row_table import RowTable
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -639,3 +640,23 @@ def test_an_unknown_barcode_is_asked_about_no_more_once_its_tip_is_there(
     desk.add(TIP)
 
     assert question.words() == ""
+
+
+def test_a_new_item_is_typed_at_once_and_no_column_is_cut(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.names.library_requested.emit(ItemKind.TIP)
+    table = desk.dialog.findChild(RowTable)
+    assert table is not None
+    desk.settle()
+    assert table.horizontalScrollBar().maximum() == 0
+
+    with desk.qtbot.waitActive(desk.dialog):
+        desk.dialog.activateWindow()
+    desk.click("Add...")
+    QTest.keyClicks(desk.dialog.focusWidget(), "T-11")
+    assert desk.text_of("ID (as on label)") == "T-11"
+
+    QTest.keyClick(desk.dialog.focusWidget(), Qt.Key.Key_Escape)
+    desk.settle()
+    assert desk.dialog.isVisible()
+    assert table.horizontalScrollBar().maximum() == 0
