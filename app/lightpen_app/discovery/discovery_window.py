@@ -209,6 +209,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
                 "Frame of the pen: click the LED at the origin, then one along y."
             )
             self._how.setText(words if found and found.has_free_frame else "")
+        self._how.setVisible(bool(self._how.text()))
         self._facts.setText(self._found_text(found) if is_final else "")
         overlay = BoardOverlay()
         if found is not None:

@@ -1,6 +1,7 @@
 """The live images of a camera as signals of Qt."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from threading import Lock, Thread
 from time import monotonic
@@ -389,10 +390,12 @@ class LiveView(QObject):
         try:
             live.stop()
         except DeviceLost as error:
-            self._closing_failed.emit(worded(error.message))
+            with suppress(RuntimeError):  # the program has ended meanwhile
+                self._closing_failed.emit(worded(error.message))
         else:
             listener.discard()
-            listener.deleteLater()
+            with suppress(RuntimeError):  # deleted with this
+                listener.deleteLater()
 
     def _set_connection(self, camera: int, connection: Connection) -> None:
         state = self._states[camera]

@@ -5696,7 +5696,7 @@ mm</translation>
     </message>
     <message>
         <source>RMS / px</source>
-        <translation>均方根 / px</translation>
+        <translation>均方根/px</translation>
     </message>
 </context>
 <context>

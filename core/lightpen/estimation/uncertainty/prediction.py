@@ -182,11 +182,15 @@ def predict_uncertainty(
         whole = UncertaintyPrediction(state, equations, n_images, mechanics)
         return whole._with_effects(pixels, joint, sigma, assumed)
     n_before, n_whole = before.n_images, before.n_whole
-    _, fresh = _linearised(state, pixels, joint, assumed, n_whole, n_before)
+    added, fresh = _linearised(state, pixels, joint, assumed, n_whole, n_before)
+    mechanics = tuple(
+        replace(old, columns=np.concatenate([old.columns, new.columns]))
+        for old, new in zip(before.mechanics, added, strict=True)
+    )
     return UncertaintyPrediction(
         replace(before.state, rotations=joint.rotations),
         _joined(before.equations, _moved(fresh, state, before.state)),
-        *(n_whole, before.mechanics, before.effects, before.lasting),
+        *(n_whole, mechanics, before.effects, before.lasting),
     )
 
 

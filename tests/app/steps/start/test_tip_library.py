@@ -34,6 +34,7 @@ from lightpen.record.library.tip_library import (
 )
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
+from lightpen_app.look.theme import GRID
 from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
 from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.form import NamesForm
@@ -42,7 +43,6 @@ from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.row_table import RowTable
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -642,13 +642,12 @@ def test_an_unknown_barcode_is_asked_about_no_more_once_its_tip_is_there(
     assert question.words() == ""
 
 
-def test_a_new_item_is_typed_at_once_and_no_column_is_cut(desk: Desk) -> None:
+def test_a_new_item_is_typed_at_once_and_the_dialog_stays_as_wide(desk: Desk) -> None:
     desk.add(TIP)
     desk.names.library_requested.emit(ItemKind.TIP)
-    table = desk.dialog.findChild(RowTable)
-    assert table is not None
     desk.settle()
-    assert table.horizontalScrollBar().maximum() == 0
+    width = desk.dialog.width()
+    assert width == min(136 * GRID, desk.dialog.screen().size().width() - GRID)
 
     with desk.qtbot.waitActive(desk.dialog):
         desk.dialog.activateWindow()
@@ -659,4 +658,4 @@ def test_a_new_item_is_typed_at_once_and_no_column_is_cut(desk: Desk) -> None:
     QTest.keyClick(desk.dialog.focusWidget(), Qt.Key.Key_Escape)
     desk.settle()
     assert desk.dialog.isVisible()
-    assert table.horizontalScrollBar().maximum() == 0
+    assert desk.dialog.width() == width

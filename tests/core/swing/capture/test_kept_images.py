@@ -12,6 +12,7 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
     Swing,
@@ -38,14 +39,14 @@ def centers(swing: Swing) -> np.ndarray:
     return simulate_centers(CAMERA, PEN, swing.rotations, swing.translations, 0.05, rng)
 
 
-def grown(swing: Swing) -> AcceptedImages:
+def grown(swing: Swing, pen: Pen = PEN) -> AcceptedImages:
     """Keep the images of a swing one by one, 0.1 s apart."""
     kept = none_kept(1, PEN.n_leds)
     for i, pixels in enumerate(centers(swing)):
         detection = detect_from_centers(
             *(CAMERA, PEN, pixels, swing.rotations[i], swing.translations[i])
         )
-        kept = keep(RIG, PEN, kept, detection, i + 1, 0.1 * i)
+        kept = keep(RIG, pen, kept, detection, i + 1, 0.1 * i)
     return kept
 
 
@@ -116,6 +117,13 @@ def test_kept_one_by_one_or_all_at_once_gives_the_same_tip() -> None:
     # The effects of the station are searched for anew as the images grow by a quarter.
     np.testing.assert_allclose(kept.uncertainty, together.uncertainty, rtol=0.01)
     np.testing.assert_allclose(kept.misfits, together.misfits, rtol=1e-3)
+
+
+def test_uncertain_normals_count_from_image_to_image() -> None:
+    swing = swing_poses(30, np.random.default_rng(0))
+    kept = grown(swing, replace(PEN, normal_covariance=0.3**2 * np.eye(3)))
+
+    assert grown(swing).uncertainty < kept.uncertainty < np.inf
 
 
 def test_nothing_is_certain_before_the_postures_allow_a_joint_fit() -> None:
