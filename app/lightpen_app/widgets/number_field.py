@@ -8,11 +8,11 @@ from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.keys import PAGE_KEYS
 
 LONGEST = 9  # digits before the point
 NUMBER = re.compile(rf"[+-]?\d{{1,{LONGEST}}}(\.\d*)?")
 INSET = 13  # px; a style sheet cannot pad the text of a spin box
-PAGE_KEYS = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 class NumberField(QDoubleSpinBox):

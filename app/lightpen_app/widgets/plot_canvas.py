@@ -12,6 +12,7 @@ from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID
 
 LABELLED = (1, 2, 5)  # of each decade
+LEAST_LABELLED = 2  # else all are
 
 # As pyqtgraph hands them to `drawPicture`: line, ticks, and place, flags and text.
 TextSpec: TypeAlias = tuple[QRectF, Qt.AlignmentFlag, str]
@@ -45,7 +46,9 @@ class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     ) -> list[str]:
         numbers = (10 ** float(value) for value in values)
         leading = ((number, float(f"{number:e}"[:3])) for number in numbers)
-        return [f"{number:g}" if digit in LABELLED else "" for number, digit in leading]
+        words = [(f"{number:g}", digit in LABELLED) for number, digit in leading]
+        are_few = sum(is_labelled for _, is_labelled in words) < LEAST_LABELLED
+        return [word if is_labelled or are_few else "" for word, is_labelled in words]
 
 
 def _with_equal_decimals(words: list[TextSpec]) -> list[TextSpec]:

@@ -387,3 +387,19 @@ def test_the_numbers_of_an_axis_have_as_many_decimals(qtbot: QtBot) -> None:
 
         assert len(words) > 1
         assert len({len(text.partition(".")[2]) for *_, text in words}) == 1, words
+
+
+def test_an_axis_within_a_decade_has_more_than_one_number(qtbot: QtBot) -> None:
+    plot = TracePlot(Axes("U", "swing"), [Curve("U")], y_log=True)
+    show(qtbot, plot)
+    canvas = plot.findChild(Canvas)
+    assert canvas is not None
+    plot.set_data(IMAGES, 11.0 + 7.0 * IMAGES)
+    plot.grab()
+
+    image = QImage(1, 1, QImage.Format.Format_RGB32)
+    with QPainter(image) as painter:
+        axis = canvas.getPlotItem().getAxis("left")
+        _, _, words = axis.generateDrawSpecs(painter)
+
+    assert len(words) > 1, words

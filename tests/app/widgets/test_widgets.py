@@ -181,6 +181,19 @@ def test_a_number_that_is_being_typed_stays_until_another_one_is_shown(
     assert field.text() == "3.000 mm"
 
 
+@pytest.mark.parametrize("key", [Qt.Key.Key_PageUp, Qt.Key.Key_PageDown])
+def test_the_keys_of_the_steps_change_no_choice(qtbot: QtBot, key: Qt.Key) -> None:
+    field = ChoiceField()
+    qtbot.addWidget(field)
+    field.addItems(["mm", "m", "inch"])
+    field.setCurrentIndex(1)
+    field.show()
+
+    QTest.keyClick(field, key)
+
+    assert field.currentIndex() == 1
+
+
 def test_the_wheel_over_a_choice_changes_nothing(qtbot: QtBot) -> None:
     field = ChoiceField()
     qtbot.addWidget(field)

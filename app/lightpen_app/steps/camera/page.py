@@ -212,7 +212,9 @@ class CameraPage(Page):
         self._view.stray_light.set_live(is_live)
         self._view.stray_light.set_has_operator(self._live.operator is not None)
         caps = self._live.caps if is_live else None
-        self._view.intrinsics.set_serial(self._live.serial if is_live else "")
+        source = self._selection.preparation.source
+        is_camera = is_live and source.kind != SourceKind.RECORDED  # else a folder
+        self._view.intrinsics.set_serial(self._live.serial if is_camera else "")
         self._view.exposure.set_camera(caps, self._live.settings)
         self._view.settings.set_camera(caps, self._live.settings)
 

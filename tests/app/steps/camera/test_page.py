@@ -589,6 +589,8 @@ def test_a_recorded_swing_is_played(
 
     live.wait("10 of 10 LEDs")
     assert live.page.is_complete()
+    assert small_scene.camera.serial  # a folder has none that could differ
+    assert "belongs to camera" not in live.words
 
 
 def test_files_of_the_simulated_pen_are_not_combined_with_a_recording(
