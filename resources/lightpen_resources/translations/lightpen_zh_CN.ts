@@ -8625,6 +8625,10 @@ mm</translation>
         <translation>内参文件属于相机 {stated}，而当前使用的相机是 {used}。请提供该相机的文件。</translation>
     </message>
     <message>
+        <source>The camera file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.</source>
+        <translation>内参文件有偏差：文件给出的焦距为 {stated:.0f} px（{off:+.1f} %），由摆动得到的焦距为 {found:.0f} px。请检查文件是否属于这台相机及其变焦和对焦；请使用现在写出的文件。</translation>
+    </message>
+    <message>
         <source>The camera link loses images: {n_incomplete} of {n_sent} incomplete, {n_missed} lost. Lower the frame rate, use a smaller region or larger packets, or check cable and switch.</source>
         <translation>到相机的链路丢失图像：{n_sent} 幅中有 {n_incomplete} 幅不完整，{n_missed} 幅未到达。请降低帧率，使用更小的区域或更大的数据包，或检查线缆和交换机。</translation>
     </message>
@@ -8651,6 +8655,14 @@ mm</translation>
     <message>
         <source>The cameras are not synchronised: exposures are {lag:.1f} ms apart. At 100 mm/s the pen moves {way:.2f} mm in this time. Trigger both cameras by one signal.</source>
         <translation>两台相机不同步：曝光时刻相差 {lag:.1f} ms。光笔以 100 mm/s 运动时，其间移动 {way:.2f} mm。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
+        <source>The centres give a disc diameter of {found:.2f} mm; stated is {stated:g} mm. Check the stated diameter and that the centres are those of the LED discs, or give the images.</source>
+        <translation>由中心得到的发光面直径为 {found:.2f} mm，给出的为 {stated:g} mm。请检查给出的直径，以及这些中心是否为 LED 发光面的中心，或提供图像。</translation>
+    </message>
+    <message>
+        <source>The centres of all images lie within {extent:.1f} px; the images have {width} x {height} px. Give the centres in pixels, and check the size of the images.</source>
+        <translation>所有图像的中心都在 {extent:.1f} px 之内，而图像为 {width} × {height} px。请以像素给出中心，并检查图像尺寸。</translation>
     </message>
     <message>
         <source>The characteristic {name} is not defined for features of this kind or number. Check the plan.</source>
@@ -9123,6 +9135,10 @@ mm</translation>
     <message>
         <source>The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.</source>
         <translation>主管密码多次错误。请等待 {seconds:.0f} s 后重新输入。</translation>
+    </message>
+    <message>
+        <source>The swing does not fit the camera file: the fit did not converge. Check that the file is of this camera, zoom and focus, or find the camera without a file.</source>
+        <translation>摆动与内参文件不符：拟合未收敛。请检查文件是否属于这台相机及其变焦和对焦，或不用文件求相机。</translation>
     </message>
     <message>
         <source>The swing in {folder} cannot be read: {reason}. Check the read permission, or move the folder away.</source>
