@@ -214,7 +214,8 @@ def test_u_is_predicted_anew_after_2_percent_more_images() -> None:
         PEN,
         np.arange(100),
         pixels[:100, None],
-        *(p[:100] for p in poses),
+        swing.rotations[:100],
+        swing.translations[:100],
     )
     found = [kept.uncertainty]
     for i in range(100, 103):
