@@ -93,13 +93,13 @@ class ImagesPanel(Translated, QWidget):
         # Layout
         layout = grid_layout(self, margins=(0, GRID, 0, 0))
         layout.addWidget(self._table, 0, 0, 4, 1)
-        layout.addWidget(self._count, 4, 0)
-        horizontal_layout(layout, (self._take_out, 1), (self._put_back, 1), at=(5, 0))
-        layout.addWidget(self._undo, 6, 0)
+        layout.addWidget(self._switch, 4, 0)  # the image is too narrow for it
+        layout.addWidget(self._count, 5, 0)
+        horizontal_layout(layout, (self._take_out, 1), (self._put_back, 1), at=(6, 0))
+        layout.addWidget(self._undo, 7, 0)
         layout.addWidget(self._view, 0, 1)
         layout.addWidget(self._caption, 1, 1)
-        layout.addWidget(self._switch, 2, 1)
-        layout.addWidget(self._card, 3, 1, 4, 1)
+        layout.addWidget(self._card, 3, 1, 5, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
         layout.setRowStretch(0, VIEW_SHARE)

@@ -18,6 +18,7 @@ from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.steps.review.residual_plots import ArrowPlot
 from lightpen_app.steps.review.residual_view import ResidualView
+from lightpen_app.widgets.camera_switch import CameraSwitch
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +95,17 @@ def test_the_residuals_over_the_image_are_of_the_camera_that_is_chosen(
         points = solution.seen_by(camera).seen_pixels[used]
         starts = list(arrows.columns().values())[:2]
         np.testing.assert_array_equal(np.array(starts, dtype=float), points.T)
+
+
+def test_two_cameras_need_no_more_width_than_one(
+    solution: Solution, panel: ImagesPanel, qtbot: QtBot
+) -> None:
+    panel.resize(500, 460)
+    panel.show()
+    width = panel.minimumSizeHint().width()
+
+    panel.set_value(solution)
+
+    (switch,) = panel.findChildren(CameraSwitch)
+    qtbot.waitUntil(switch.isVisible)
+    assert panel.minimumSizeHint().width() == width
