@@ -184,9 +184,10 @@ def calibrate_camera(
     try:
         found = _calibrated(views, tolerances, first, report, has_k3)
     except CalibrationError as error:
-        raise (
-            explain(views, tolerances, first, None, lessened=HALVED) or error
-        ) from error
+        better = explain(views, tolerances, first, None, lessened=HALVED)
+        if better is None and error.message.code == "intrinsics.misfit":
+            _refuse_bent(views, tolerances, first)
+        raise (better or error) from error
     change = find_change(found.effects, found.views.names)
     alternation = find_alternation(found.effects)
     if change is not None or alternation is not None or found.is_suspicious:
@@ -363,6 +364,17 @@ def without_outliers(views: Views, fitted: BoardFit) -> Views:
             "intrinsics.misfit", rms=fitted.rms, board=views.board.name
         )
     return left
+
+
+def _refuse_bent(views: Views, tolerances: BoardTolerances, flat: BoardFit) -> None:
+    """Refuse views of a board that is bent as none is, if that explains them."""
+    released = released_tolerances(tolerances)
+    try:
+        bent = fit_camera(views, released, flat.state.cameras[0])
+    except CalibrationError:
+        return
+    if bent.rms < HALVED * flat.rms:
+        require_plausible_bend(bent)
 
 
 def _parted(views: Views, kept: BoolArray) -> tuple[Views, tuple[str, ...]]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks import board_trials
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
@@ -259,6 +260,18 @@ def test_a_board_in_another_unit_is_questioned(make_views: MakeViews) -> None:
 
 
 @pytest.mark.slow
-def test_a_board_bent_as_none_is_refused(make_views: MakeViews) -> None:
+@pytest.mark.parametrize("bend", [(12.0, 0, 8.0), (25.0, 0, 0), (0, 25.0, 0)])
+def test_a_board_bent_as_none_is_refused(
+    make_views: MakeViews, bend: tuple[float, float, float]
+) -> None:
     with pytest.raises(CalibrationError, match="bent by"):
-        calibrated(make_views(shape=np.array([0, 0, 12.0, 0, 8.0])))
+        calibrated(make_views(shape=np.array([0, 0, *bend])))
+
+
+@pytest.mark.slow
+def test_a_lens_field_beside_little_noise_is_not_blamed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(board_trials, "NOISE", (0.003, 0.008))
+
+    assert isinstance(board_trials.run_trial(8, rendered=False), board_trials.Trial)
