@@ -6561,6 +6561,10 @@ mm</translation>
         <translation>摆动：最少图像数</translation>
     </message>
     <message>
+        <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation, all with one camera and the same files of camera and LEDs.</source>
+        <translation>可用的摆动：{n_swings} 次。合并需要 {needed} 次，另需一次用于确认；须全部使用一台相机以及相同的内参文件和 LED 文件。</translation>
+    </message>
+    <message>
         <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.</source>
         <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
@@ -8483,10 +8487,6 @@ mm</translation>
     <message>
         <source>Swing: pen temperature</source>
         <translation>摆动：光笔温度</translation>
-    </message>
-    <message>
-        <source>Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation.</source>
-        <translation>给出的摆动次数：{n_swings}。合并需要 {needed} 次，另需一次来确认所得结果。</translation>
     </message>
     <message>
         <source>Taken over from another station: {kind} {id}, {by}.</source>
