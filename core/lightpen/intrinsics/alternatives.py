@@ -42,7 +42,7 @@ CORRELATED = 4.0  # points of a view that tell as much as an independent one
 MAX_PASSES = 8  # of turning one view
 ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
 LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
-LEAST_EFFECT = 0.01  # px rms, that it removes; less is also a lens's field
+LEAST_EFFECT = 0.01  # px rms, that turned images remove; less is a lens's field
 HALVED = 0.5  # the same, of views that no single camera fits
 USELESS = 0.001  # of the image's longer side, by which a change moves the image
 # Larger differences than these, beyond SIGMAS, mean two cameras and not two settings:
@@ -93,7 +93,7 @@ def explain(
 
     useless: CalibrationError | None = None
     turned = _turned(views, tolerances, near)
-    if turned is not None:
+    if turned is not None and nothing**2 - turned[1] ** 2 > LEAST_EFFECT**2:
         which, rms = turned
         names, n_named = _fewer(views, which)
         turned_error = CalibrationError(
@@ -130,8 +130,7 @@ def explain(
         rms = _rms_by(views, released, near)
         consider(rms, N_SHAPE * np.log(n), None)
     best = min(found, key=lambda each: each[0], default=(np.inf, np.inf, None))
-    enough = min(lessened * nothing, np.sqrt(max(nothing**2 - LEAST_EFFECT**2, 0.0)))
-    is_better = best[0] < n_digits and best[1] < enough
+    is_better = best[0] < n_digits and best[1] < lessened * nothing
     return best[2] if is_better else useless
 
 

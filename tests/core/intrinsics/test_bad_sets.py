@@ -224,7 +224,7 @@ def sheared(views: Views, slope: float) -> Views:
     return replace(views, pixels=pixels)
 
 
-def test_nothing_is_blamed_for_less_than_a_lens_may_do(
+def test_no_image_is_called_rotated_for_less_than_a_lens_may_do(
     make_views: MakeViews, camera: Camera
 ) -> None:
     views = sheared(make_views(n_views=8, noise=0.004), 0.0008)
