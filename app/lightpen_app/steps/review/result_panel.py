@@ -29,7 +29,7 @@ from lightpen_app.widgets.translated import Translated
 if TYPE_CHECKING:
     from lightpen.verification.history.press_test import PressTest
 
-DIAL_HEIGHT = 22 * GRID  # px
+DIAL_HEIGHT = 18 * GRID  # px
 
 
 @dataclass(frozen=True, eq=False)
