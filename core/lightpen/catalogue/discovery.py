@@ -19,7 +19,6 @@ MESSAGES = {
     "discover.same-led": "The length is between LED {number} and itself. Give the numbers of two LEDs.",
     "discover.lengths-contradict": "The lengths contradict each other: LEDs {first} and {second} are stated {stated:.3f} mm apart; the other lengths give {implied:.3f} mm. Check the numbers of the LEDs, and measure again.",
     "discover.length-of-others": "The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
-    "discover.no-disc": "The centres give a disc diameter of {found:.2f} mm; stated is {stated:g} mm. Check the stated diameter and that the centres are those of the LED discs, or give the images.",
     "discover.length-not-sketched": "The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.",
     "discover.cones-contradict": "The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.",
     "discover.cones-not-settled": "The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.",

@@ -115,8 +115,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         "--led-diameter",
         type=above_zero,
         metavar="MM",
-        help=f"diameter of the LED discs ({DISC_DIAMETER:g}); with --centers uncertain "
-        "by half",
+        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
     )
     parser.add_argument(
         "--camera", type=Path, metavar="FILE", help="camera file, if there is one"
@@ -184,7 +183,7 @@ def _discover(options: argparse.Namespace) -> None:
             read(place, partial(_report_part, report, each * k, each))
             for k, place in enumerate(places)
         ]
-        request = _request(options, lengths, camera, sketch)
+        request = Request(lengths, _diameter(options, sketch), camera, sketch)
         if separation is not None and options.touched:
             touches = partial(touches_at, options.touched)
             request = replace(request, touched=TouchedLength(touches, separation))
@@ -248,18 +247,10 @@ def _sketch(path: Path | None) -> Pen | None:
     return None if path is None else read_unchecked_pen(path, "mm")
 
 
-def _request(
-    options: argparse.Namespace,
-    lengths: tuple[MeasuredLength, ...],
-    camera: Camera | None,
-    sketch: Pen | None,
-) -> Request:
-    diameter, sigma = DISC_DIAMETER, None
+def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
     if options.led_diameter is not None:
-        diameter = float(finite(str(options.led_diameter)))
-    elif sketch is not None:
-        diameter, sigma = sketch.diameter, sketch.diameter_sigma
-    return Request(lengths, diameter, camera, sketch, diameter_sigma=sigma)
+        return float(finite(str(options.led_diameter)))
+    return DISC_DIAMETER if sketch is None else sketch.diameter
 
 
 def _check_outputs(options: argparse.Namespace) -> None:

@@ -45,7 +45,6 @@ from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
-VAGUE_DISC = 0.5  # of the stated diameter, its standard deviation with centres alone
 NOT_SETTLED = ("bundle.not-settled", "joint.not-settled")
 SLIPPED = 0.03  # of the images, that are left out after a slip
 
@@ -90,9 +89,6 @@ def discover(
     CalibrationError
         The images do not determine them; the text says what to do.
     """
-    if sightings.areas is None and request.diameter_sigma is None:
-        # Centres hardly show the discs' size: a radius may be taken for it.
-        request = replace(request, diameter_sigma=VAGUE_DISC * request.diameter)
     swing = _labelled_swing(sightings, request, report)
     swing = replace(swing, found=numbered(swing.found, request))
     report(0.5)
@@ -208,10 +204,7 @@ def _with_second(
         apart = float(np.linalg.norm(cone - start.cone_rig))
         factor = separation.distance / max(apart, LEAST_LENGTH_SIGMA)
     start = scaled_to(start, factor)
-    diameter, sigma = request.diameter, request.diameter_sigma
-    start = replace(
-        start, pen=replace(start.pen, diameter=diameter, diameter_sigma=sigma)
-    )
+    start = replace(start, pen=replace(start.pen, diameter=request.diameter))
     there = replace(start, cone_rig=factor * cone, rotations=state.rotations @ R.T)
     swing = replace(
         swing, found=replace(swing.found, spots=swing.found.spots[:, order])

@@ -173,7 +173,7 @@ def _camera_before(start: Camera, marks: FloatArray) -> FoundCamera:
 
 def _pen_before(start: Pen, marks: FloatArray) -> FoundPen:
     assert start.led_covariance is not None
-    return FoundPen(marks, start.diameter, start.led_covariance, start.diameter_sigma)
+    return FoundPen(marks, start.diameter, start.led_covariance)
 
 
 def _with_length_found(pen: Pen) -> Pen:

@@ -23,8 +23,6 @@ class Request:
         Without any the result is relative: the largest distance is `RELATIVE`.
     diameter : float
         Of the LED discs, mm.
-    diameter_sigma : float or None
-        Standard uncertainty of it; None: assumed.
     camera : Camera or None
         Of a camera file, with its covariance.
     sketch : Pen or None
@@ -45,7 +43,6 @@ class Request:
     second: "SecondSightings | None" = None
     touched: "TouchedLength | None" = None
     n_coefficients: int | None = None
-    diameter_sigma: float | None = None
 
     @property
     def is_relative(self) -> bool:

@@ -16,7 +16,6 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER, SCALE
 from lightpen.estimation.calibrate import Calibration
 from lightpen.formats.camera_checks import folds
-from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of
@@ -24,7 +23,6 @@ from lightpen.model.posture import tilts_of
 MIN_IMAGES = 40
 MIN_LEDS = 5
 SECOND_PEN = 3  # lights that move with one another, beside those of the pen
-OTHER_DISC = 3.0  # standard deviations, of the diameter found from that stated
 OTHER_SIZE = 0.1  # relative: discs that are another size than stated
 ZOOMED = 1e-3  # of the focal length, between both halves of a swing, and
 HALVES_APART = 6.0  # standard deviations of the difference
@@ -73,28 +71,9 @@ def require_no_second_pen(found: Labelled) -> None:
 def require_length(
     calibration: Calibration, request: Request, lengths: Sequence[KnownLength]
 ) -> None:
-    """Refuse a length that contradicts the diameter of the discs, or two cones.
-
-    So is a diameter below zero, which centres alone may give.
-
-    Raises
-    ------
-    CalibrationError
-        It does.
-    """
-    pen, bundle = calibration.bundle.state.pen, calibration.bundle
-    if pen.diameter <= 0:
-        raise CalibrationError(
-            "discover.no-disc", found=pen.diameter, stated=request.diameter
-        )
+    """Refuse a length that contradicts the diameter of the discs, or two cones."""
     if not request.lengths:
         return
-    if request.diameter_sigma is not None:  # wide: no contradiction is searched
-        place = bundle.layout.diameter
-        sigma = float(np.sqrt(bundle.covariance[place, place][0, 0]))
-        off = abs(pen.diameter - request.diameter)
-        if off > OTHER_DISC * np.hypot(sigma, USUAL.diameter * request.diameter):
-            raise _other_length(request, lengths, pen, pen.diameter)
     for each in calibration.contradictions:
         if each.what == SCALE and request.second is not None:
             distance = request.second.separation.distance
@@ -109,34 +88,27 @@ def require_length(
         if each.what != DIAMETER or each.estimated <= 0:
             continue
         ratio = each.stated / each.estimated
-        if abs(ratio - 1) >= OTHER_SIZE:
-            raise _other_length(request, lengths, pen, each.estimated)
-
-
-def _other_length(
-    request: Request, lengths: Sequence[KnownLength], pen: Pen, diameter: float
-) -> CalibrationError:
-    """Return the error of a length by which the discs have another diameter."""
-    if request.touched is not None:
-        return CalibrationError(
-            "discover.touched-length",
-            length=request.touched.separation.distance,
-            found=diameter,
-            stated=request.diameter,
+        if abs(ratio - 1) < OTHER_SIZE:
+            continue
+        if request.touched is not None:
+            raise CalibrationError(
+                "discover.touched-length",
+                length=request.touched.separation.distance,
+                found=each.estimated,
+                stated=each.stated,
+            )
+        leds, length = ratio * calibration.bundle.state.pen.leds, lengths[0].length
+        first, second, _ = nearest_pair(leds, length)
+        raise CalibrationError(
+            "discover.length-of-others",
+            length=length,
+            first=lengths[0].first + 1,
+            second=lengths[0].second + 1,
+            found=each.estimated,
+            stated=each.stated,
+            other=first,
+            another=second,
         )
-    length = lengths[0].length
-    leds = request.diameter / diameter * pen.leds
-    other, another, _ = nearest_pair(leds, length)
-    return CalibrationError(
-        "discover.length-of-others",
-        length=length,
-        first=lengths[0].first + 1,
-        second=lengths[0].second + 1,
-        found=diameter,
-        stated=request.diameter,
-        other=other,
-        another=another,
-    )
 
 
 def require_lens(camera: Camera) -> None:

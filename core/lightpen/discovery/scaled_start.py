@@ -165,8 +165,6 @@ def adjust_halves(
 
 def _with_discs(pen: Pen, request: Request) -> Pen:
     if request.lengths:
-        return replace(
-            pen, diameter=request.diameter, diameter_sigma=request.diameter_sigma
-        )
+        return replace(pen, diameter=request.diameter)
     usual = USUAL_DISC * RELATIVE  # nothing shows how large they are
     return replace(pen, diameter=usual, diameter_sigma=usual)

@@ -27,7 +27,7 @@ LENGTHS = {"led_sigma", "diameter_sigma"}  # in the unit of the file
 RANGES = {
     "led_sigma": (0.0, 10.0),
     "scale_sigma": (0.0, 0.01),
-    "diameter_sigma": (0.0, LARGEST_DIAMETER),
+    "diameter_sigma": (0.0, 10.0),
     "expansion": (-1e-5, 1e-4),
     "expansion_sigma": (0.0, 1e-4),
     "temperature_c": (-50.0, 100.0),

@@ -28,8 +28,8 @@ A JSON file has
 ``name``        name or serial number, optional
 ``led_covariance`` of all coordinates but for the scale, 3 L rows of 3 L, optional
 ``found_from``  of LEDs found from images (``lightpen discover``), optional: an LED
-                centre of each of these ``images``, px, and ``diameter``,
-                ``diameter_sigma`` and ``led_covariance`` without them
+                centre of each of these ``images``, px, and ``diameter`` and
+                ``led_covariance`` without them
 ``parent_sha256`` of the file that this one was made better from, not read
 ``comment``     not read
 ================== ===================================================================

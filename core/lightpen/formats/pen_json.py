@@ -34,7 +34,7 @@ _FILE_KEYS = {
     "parent_sha256",
     "found_from",
 }
-_FOUND_KEYS = {"images", "diameter", "diameter_sigma", "led_covariance"}
+_FOUND_KEYS = {"images", "diameter", "led_covariance"}
 ASYMMETRY = 1e-6  # of the largest variance
 
 
@@ -111,11 +111,7 @@ def _found(entries: Entries, n_leds: int, unit: float, name: str) -> FoundPen | 
     covariance = unit**2 * _covariance(part, n_leds, "led_covariance")
     diameter = float(part.counted(1, "diameter")[0]) * unit
     check_diameter(diameter, name)
-    sigma = None
-    if part.has("diameter_sigma"):
-        sigma = float(part.counted(1, "diameter_sigma")[0]) * unit
-        checked_number("diameter_sigma", sigma, name)
-    return FoundPen(part.points("images"), diameter, covariance, sigma)
+    return FoundPen(part.points("images"), diameter, covariance)
 
 
 def _covariance(entries: Entries, n_vectors: int, what: str) -> FloatArray:
@@ -186,11 +182,6 @@ def json_text(pen: Pen, parent_sha256: str) -> str:
         found = [
             _matrix("images", pen.found.marks.round(MARK_DIGITS)),
             f'"diameter": {json.dumps(float(pen.found.diameter), allow_nan=False)}',
-            *(
-                []
-                if pen.found.diameter_sigma is None
-                else [f'"diameter_sigma": {float(pen.found.diameter_sigma)!r}']
-            ),
             _matrix("led_covariance", pen.found.led_covariance),
         ]
         entries.append('"found_from": {\n  ' + ",\n  ".join(found) + "\n  }")

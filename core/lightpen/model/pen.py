@@ -119,7 +119,7 @@ class Pen:
         return replace(
             self,
             diameter=self.found.diameter,
-            diameter_sigma=self.found.diameter_sigma,
+            diameter_sigma=None,
             scale_sigma=EXACT_SCALE,
             led_covariance=self.found.led_covariance,
             expansion=0.0,  # the lengths are those during the swing

@@ -30,14 +30,11 @@ class FoundPen:
         Of the LED discs, mm.
     led_covariance : (3 L, 3 L) array
         Of all LED coordinates, by the known lengths, mm^2.
-    diameter_sigma : float or None
-        Standard uncertainty of the diameter, mm; None: assumed.
     """
 
     marks: FloatArray
     diameter: float
     led_covariance: FloatArray
-    diameter_sigma: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -8657,10 +8657,6 @@ mm</translation>
         <translation>两台相机不同步：曝光时刻相差 {lag:.1f} ms。光笔以 100 mm/s 运动时，其间移动 {way:.2f} mm。请用同一信号触发两台相机。</translation>
     </message>
     <message>
-        <source>The centres give a disc diameter of {found:.2f} mm; stated is {stated:g} mm. Check the stated diameter and that the centres are those of the LED discs, or give the images.</source>
-        <translation>由中心得到的发光面直径为 {found:.2f} mm，给出的为 {stated:g} mm。请检查给出的直径，以及这些中心是否为 LED 发光面的中心，或提供图像。</translation>
-    </message>
-    <message>
         <source>The centres of all images lie within {extent:.1f} px; the images have {width} x {height} px. Give the centres in pixels, and check the size of the images.</source>
         <translation>所有图像的中心都在 {extent:.1f} px 之内，而图像为 {width} × {height} px。请以像素给出中心，并检查图像尺寸。</translation>
     </message>

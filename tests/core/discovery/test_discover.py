@@ -13,7 +13,7 @@ from tests.simulated_stations import (
 
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
-from lightpen.discovery.requirements import require_length, require_sketched
+from lightpen.discovery.requirements import require_sketched
 from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import Sightings
 from lightpen.discovery.starts import KnownLength
@@ -121,30 +121,6 @@ def test_an_uncertain_length_makes_the_tip_uncertain_in_proportion() -> None:
     by_length = 2 * 0.02 / STATION.longest * lever
     assert (found.expanded_uncertainty > 0.99 * by_length).all()
     assert found.expanded_uncertainty[1] < 1.5 * by_length[1]
-
-
-@pytest.mark.slow
-def test_a_diameter_stated_twice_too_large_is_within_the_uncertainty() -> None:
-    station = random_station(4, n_images=120)
-    request = replace(station.request, diameter=2 * station.pen.diameter)
-
-    found = discover(station.sightings, request)
-
-    off = np.abs(errors_of(found, station).tip)
-    assert (off < 1.5 * found.expanded_uncertainty).all()
-
-
-@pytest.mark.parametrize("diameter", [0.0, -2.0])
-def test_discs_without_a_diameter_are_refused(
-    found: Discovery, diameter: float
-) -> None:
-    calibration = found.calibration
-    bundle = calibration.bundle
-    state = replace(bundle.state, pen=replace(bundle.state.pen, diameter=diameter))
-    calibration = replace(calibration, bundle=replace(bundle, state=state))
-
-    with pytest.raises(CalibrationError, match="stated diameter"):
-        require_length(calibration, SHORT.request, found.lengths)
 
 
 @pytest.mark.slow

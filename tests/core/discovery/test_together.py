@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.simulated_stations import Station, errors_of, random_station, seen_station
 
-from lightpen.discovery.discover import VAGUE_DISC, discover
+from lightpen.discovery.discover import discover
 from lightpen.discovery.picture import picture_of_pen
 from lightpen.discovery.request import Request, SecondSightings
 from lightpen.discovery.together import Together, discover_together, joined
@@ -56,12 +56,10 @@ def test_what_no_image_shows_is_no_better_known_by_two_swings(
 ) -> None:
     each = together.swings[0]
     twice = joined((each, each))
-    assert each.pen.diameter_sigma is not None
-    stated = (VAGUE_DISC * FIRST.diameter) ** -2  # counts once
-    by_two = (2 * each.pen.diameter_sigma**-2 - stated) ** -0.5
-    assert twice.pen.diameter_sigma == pytest.approx(by_two, rel=0.02)
+    # Centres alone hardly show the size of the discs; the focal length they do.
+    assert twice.pen.diameter_sigma == pytest.approx(each.pen.diameter_sigma, rel=0.02)
     ratio = twice.intrinsics_sigma[0] / each.intrinsics_sigma[0]
-    assert 0.98 * 0.5**0.5 < ratio < 0.75  # what the discs' size adds counts once
+    assert ratio == pytest.approx(0.5**0.5, rel=0.02)
 
 
 def test_the_swing_held_out_agrees_with_the_others(together: Together) -> None:
@@ -97,14 +95,11 @@ def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.001, 1.01])
-def test_two_cones_that_contradict_the_length_are_refused(factor: float) -> None:
-    separation = ConeSeparation(factor * float(np.linalg.norm(APART)), 1e-3)
+def test_two_cones_that_contradict_the_length_are_refused() -> None:
+    separation = ConeSeparation(1.001 * float(np.linalg.norm(APART)), 1e-3)
     second = SecondSightings(again(2, APART).sightings, separation)
 
-    with pytest.raises(
-        CalibrationError, match=r"cones (contradicts the length|did not)"
-    ):
+    with pytest.raises(CalibrationError, match="cones contradicts the length"):
         discover(FIRST.sightings, replace(FIRST.request, second=second))
 
 

@@ -339,7 +339,7 @@ def test_other_units_of_warmth_are_refused(
 
 
 @pytest.mark.parametrize("what", ["led_sigma", "scale_sigma", "diameter_sigma"])
-@pytest.mark.parametrize("value", ["0", "-0.001", "101"])
+@pytest.mark.parametrize("value", ["0", "-0.001", "11"])
 def test_what_is_no_standard_uncertainty_is_refused(
     tmp_path: Path, what: str, value: str
 ) -> None:
@@ -562,7 +562,7 @@ def test_what_was_known_of_a_pen_found_from_images_is_read_back(tmp_path: Path) 
     rng, path = np.random.default_rng(1), tmp_path / "pen.json"
     root = rng.normal(size=(3 * len(LEDS), 3 * len(LEDS)))
     marks = rng.uniform(0, 2000, (60, 2)).round(3)
-    pen = Pen(LEDS, FACING, 8.0, found=FoundPen(marks, 9.5, root @ root.T, 4.5))
+    pen = Pen(LEDS, FACING, 8.0, found=FoundPen(marks, 9.5, root @ root.T))
     write_pen(pen, path)
 
     for diameter in None, 7.0:
@@ -571,7 +571,6 @@ def test_what_was_known_of_a_pen_found_from_images_is_read_back(tmp_path: Path) 
         np.testing.assert_array_equal(read.marks, marks)
         np.testing.assert_array_equal(read.led_covariance, root @ root.T)
         assert read.diameter == (diameter or 9.5)
-        assert read.diameter_sigma == 4.5
 
 
 @pytest.mark.parametrize(
@@ -579,7 +578,6 @@ def test_what_was_known_of_a_pen_found_from_images_is_read_back(tmp_path: Path) 
     [
         ('"diameter": 9.5', '"width": 9.5', 'unknown key "width"'),
         ('"diameter": 9.5', '"diameter": -9.5', "discs"),
-        ('"diameter_sigma": 4.5', '"diameter_sigma": 0', "diameter_sigma"),
         ("[1.0, 2.0]", "[1.0, 2.0, 3.0]", "3 numbers"),
         ("[[1.0, 0.0, ", "[[1.0, 1.0, ", "not a covariance matrix"),
     ],
@@ -588,7 +586,7 @@ def test_a_flaw_of_what_was_known_of_a_pen_is_named(
     tmp_path: Path, line: str, other: str, reported: str
 ) -> None:
     path = tmp_path / "pen.json"
-    found = FoundPen(np.array([[1.0, 2.0]]), 9.5, np.eye(3 * len(LEDS)), 4.5)
+    found = FoundPen(np.array([[1.0, 2.0]]), 9.5, np.eye(3 * len(LEDS)))
     write_pen(Pen(LEDS, FACING, found=found), path)
     text = path.read_text().replace("[\n    [", "[[")
     assert line in text
