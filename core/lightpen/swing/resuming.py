@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.cameras.sources import source_named
+from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 from lightpen.record.swings.header import damaged_file
@@ -39,11 +40,14 @@ class Resumable:
         Of the record's own files.
     state : SwingState
         State with all images in the journal.
+    rig_file : RigFile or None
+        The record's own copy; None of a single camera.
     """
 
     record: Record
     setup: SwingSetup
     state: SwingState
+    rig_file: RigFile | None = None
 
     @property
     def source_choices(self) -> tuple[SourceChoice, ...]:
@@ -82,7 +86,11 @@ def read_resumable(folder: Path) -> Resumable:
         min_images, max_images = record.more
         limits = replace(setup.limits, min_images=min_images, max_images=max_images)
         setup = replace(setup, limits=limits)
-    return Resumable(record, setup, resume_swing(setup, record))
+    found = source(record)
+    rig_file = None
+    if found.rig_file is not None:
+        rig_file = read_rig(found.rig_file, found.camera_files)
+    return Resumable(record, setup, resume_swing(setup, record), rig_file)
 
 
 def read_for_more(folder: Path) -> Resumable:

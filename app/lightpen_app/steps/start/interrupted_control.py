@@ -241,6 +241,8 @@ class InterruptedControl(QObject):
         )
         if not swing.is_of(now.sources):
             now = now.with_second(next(iter(swing.source_choices[1:]), None))
+        if now.second is not None and now.rig_file is None:
+            now = now.with_rig(swing.rig_file)
         selection.set_preparation(now)
 
     def _go_to_station(self, name: str) -> None:

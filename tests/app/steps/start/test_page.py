@@ -1052,7 +1052,10 @@ def test_a_swing_of_two_cameras_takes_up_the_second_again(
     assert start.steps == ["swing"]
     assert workbench.live.n_cameras == 2
     simulated = SourceChoice(SourceKind.SIMULATED)
-    assert workbench.selection.preparation.sources == (simulated, simulated)
+    now = workbench.selection.preparation
+    assert now.sources == (simulated, simulated)
+    assert now.rig_file is not None
+    assert now.rig_file.rig.n_cameras == 2
 
 
 def test_a_swing_does_not_go_on_with_images_of_another_size(
