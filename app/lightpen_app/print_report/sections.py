@@ -133,6 +133,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
     names, calibration = calibration_file.names, calibration_file.calibration
     accepted, due = calibration_file.accepted, calibration_file.due
     measured = calibration_file.measured
+    is_practice = calibration_file.origin is Origin.SIMULATED
     diameter = names.ball_diameter
     temperature = calibration.assumptions.temperature_c
     humidity = calibration.assumptions.humidity_percent
@@ -155,7 +156,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
             (translate("paper", "Cone"), stated(names.cone)),
             (
                 translate("paper", "Saved")
-                if calibration_file.origin is Origin.SIMULATED
+                if is_practice
                 else translate("paper", "Accepted"),
                 translate("paper", "no")
                 if accepted is None
@@ -166,7 +167,7 @@ def _items(calibration_file: CalibrationFile) -> Iterable[Block]:
             (translate("paper", "Method"), _method(calibration.method)),
             (
                 translate("paper", "Next due"),
-                stated("" if due is None else due.isoformat()),
+                stated("" if due is None or is_practice else due.isoformat()),
             ),
             (translate("paper", "Status"), _status(calibration_file)),
             (
