@@ -127,8 +127,12 @@ def brightest_level(frame: Frame, spots: Spots, chosen: IntArray) -> float:
     image, levels = frame.image, []
     for (x, y), area in zip(spots.centers[chosen], spots.areas[chosen], strict=True):
         half = max(round(sqrt(area) / 2), 1)  # of a square of this area
-        left, top = max(round(x) - half, 0), max(round(y) - half, 0)
-        window = image[top : round(y) + half + 1, left : round(x) + half + 1]
+        # The middle of a cut LED may be beyond the border.
+        left = min(max(round(x) - half, 0), image.shape[1] - 1)
+        top = min(max(round(y) - half, 0), image.shape[0] - 1)
+        window = image[
+            top : max(round(y) + half, 0) + 1, left : max(round(x) + half, 0) + 1
+        ]
         levels.append(float(np.percentile(window, 90)))
     return max(levels) / frame.full_scale
 
