@@ -285,7 +285,11 @@ class _Reduced:
     turn_by_step: FloatArray  # (N, 3, 6)
 
     def step(self) -> FloatArray:
-        return np.asarray(np.linalg.solve(self.S.sum(axis=0), self.b.sum(axis=0)))
+        try:
+            step = np.linalg.solve(self.S.sum(axis=0), self.b.sum(axis=0))
+        except np.linalg.LinAlgError as error:  # as good as endlessly far
+            raise CalibrationError("joint.not-settled", n_steps=MAX_STEPS) from error
+        return np.asarray(step)
 
 
 def reduce(state: Linearised, weights: FloatArray) -> _Reduced:

@@ -5,6 +5,7 @@ import pytest
 from tests.simulated_centers import displace_centers, drop_centers
 
 from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.joint import (
     ContactModel,
     JointFit,
@@ -233,3 +234,11 @@ def test_an_image_of_one_led_leaves_the_fit_solvable(weight: float) -> None:
     weights[0, 4] = weight
     step = reduce(state, weights).step()
     assert np.abs(step - usual).max() < 0.01
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_start_endlessly_far_does_not_settle() -> None:
+    true, far = swing(8), np.array([0.0, 0.0, 1e120])
+    pixels = centers(true, 0.0)
+    with pytest.raises(CalibrationError, match="did not converge"):
+        fit_joint(CAMERA, PEN, pixels, true.rotations, true.tip_pen, far)
