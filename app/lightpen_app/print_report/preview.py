@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter, QPrintPreviewWidget
 from PySide6.QtWidgets import QDialog, QGraphicsView, QWidget
 from typing_extensions import override
@@ -42,6 +42,8 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     saved = Signal(object)
     failed = Signal(str)
+
+    CLOSING_KEYS = (Qt.Key.Key_Escape,)
 
     def __init__(
         self,
@@ -92,13 +94,6 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         super().closeEvent(event)
         if self._saving is None:  # else it reports it first
             self.deleteLater()
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape:
-            self.close()
-        else:
-            super().keyPressEvent(event)
 
     def n_pages(self) -> int:
         """Return the number of pages."""

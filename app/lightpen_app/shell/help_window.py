@@ -3,15 +3,8 @@
 from pathlib import PurePosixPath
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import (
-    QKeyEvent,
-    QTextBlockFormat,
-    QTextCursor,
-    QTextDocument,
-    QTextTable,
-)
+from PySide6.QtGui import QTextBlockFormat, QTextCursor, QTextDocument, QTextTable
 from PySide6.QtWidgets import QTextBrowser, QWidget
-from typing_extensions import override
 
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import GRID
@@ -34,6 +27,8 @@ def help_text(key: str, language: str) -> str:
 
 class HelpWindow(FittedWindow, Translated, QWidget):
     """Shows one help text; Escape or F1 closes it."""
+
+    CLOSING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_F1)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent, Qt.WindowType.Window)
@@ -66,13 +61,6 @@ class HelpWindow(FittedWindow, Translated, QWidget):
         """Show the same help in another language."""
         if self._key:
             self.set_topic(self._key, language)
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Escape, Qt.Key.Key_F1):
-            self.close()
-        else:
-            super().keyPressEvent(event)
 
     def _on_anchor_clicked(self, link: QUrl) -> None:
         self.set_topic(PurePosixPath(link.path()).stem, self._language)

@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, QRect, QSize
-from PySide6.QtGui import QGuiApplication, QShowEvent
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
@@ -38,10 +38,25 @@ def fit_screen(window: QWidget) -> None:
 
 
 class FittedWindow(_Base):
-    """Put before the base of a window, it keeps that within the screen when shown."""
+    """Put before the base of a window, it keeps that within the screen when shown.
+
+    Attributes
+    ----------
+    CLOSING_KEYS : tuple of Qt.Key
+        That close the window; a dialog is also closed as Qt does it.
+    """
+
+    CLOSING_KEYS: tuple[Qt.Key, ...] = ()
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if not event.spontaneous():
             fit_screen(self)
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in self.CLOSING_KEYS:
+            self.close()
+        else:
+            super().keyPressEvent(event)

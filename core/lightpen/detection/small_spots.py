@@ -55,7 +55,7 @@ AGREEING = 5.0  # standard deviations of the higher of two edges
 MOST_BESIDE = 0.15  # radii, of an edge from the windowed centre
 SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
 
-SHARES = (0.1, 0.6)  # of that difference, by which edges, and windows, err
+SHARES = (0.1, 0.6)  # of that difference: the errors of edges, and of windows
 SPREAD = 1.3  # half-level radii in a standard deviation of the light
 INTERPOLATED = 1.4  # noise of a pixel over that between pixels, by bilinear weights
 LONGEST = 4.0  # times as long as wide, of a spot

@@ -140,7 +140,7 @@ def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
 ) -> None:
     present.go_on(interrupted)
     present.runner.ask(lambda workflow: workflow.leave())
-    # by somebody who is elsewhere
+    # The operator is not at the step Swing.
     present.runner.ask(lambda workflow: workflow.resume())
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
     present.see_until(lambda: present.status.has_fault)

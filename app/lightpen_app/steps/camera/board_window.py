@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QWidget
 from typing_extensions import override
 
@@ -48,11 +48,13 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     saved(str)
         A camera file was written.
     concluded(CameraTrial)
-        What became of an attempt.
+        The outcome of an attempt.
     """
 
     saved = Signal(str)
     concluded = Signal(object)
+
+    CLOSING_KEYS = (Qt.Key.Key_Escape,)
 
     def __init__(
         self, live: LiveView, place: SavePlace, parent: QWidget | None = None
@@ -134,13 +136,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._hold_simulated(None)
         self._calibration.set_remark(StatusMessage)
         super().closeEvent(event)
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape:
-            self.close()
-        else:
-            super().keyPressEvent(event)
 
     @property
     def is_searching(self) -> bool:

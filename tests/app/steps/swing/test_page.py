@@ -678,7 +678,7 @@ def test_closing_the_window_asks_and_names_the_images(
     until(qtbot, lambda: capturing.state.phase is Phase.PAUSED)
 
     said = capturing.page.unsaved()
-    # for the tests that go on with this swing
+    # Other tests use this swing.
     capturing.run.runner.ask(lambda workflow: workflow.resume())
     assert f"captured images ({capturing.state.n_kept}) are saved" in said
 
