@@ -507,6 +507,7 @@ def _calibration_of(
             single.pixels[part.posed, c],
             part.poses.rotations,
             part.poses.translations,
+            is_near=True,
         )
         for c, part in enumerate(single.posed)
     ]

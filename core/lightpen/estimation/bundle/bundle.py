@@ -47,7 +47,7 @@ from lightpen.model.information import inverse
 
 CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
-FINDING_PASSES = 4  # in which standard deviations are found; then they stand
+FINDING_PASSES = 4  # at most, in which standard deviations are found; then they stand
 MAX_PASSES = 20
 
 
@@ -234,8 +234,9 @@ def fit_bundle(
             used = inliers(_together(solved.residuals)).reshape(used.shape)
         state = unknowns.moved(now.state, solved.values, solved.turns)
         change = solved.values - now.values
-        if n_pass > FINDING_PASSES and np.abs(change[:6]).max() < CONVERGED:
-            return _bundle_of(unknowns, state, used, solved, weight_sigma)
+        is_same = components.sigmas == now.components.sigmas and np.all(used == now.used)
+        if n_pass > 1 and is_same and np.abs(change[:6]).max() < CONVERGED:
+            return _bundle_of(unknowns, state, now.used, solved, weight_sigma)
         views = unknowns.views_at(state, pixels)
         values = _held_by_state(unknowns, solved.values)
         now = _Linearised(state, values, views, used, components, solved.sigma)

@@ -37,7 +37,7 @@ def find_components(
     now = before
     for _ in range(ROUNDS):
         known, now = now, _found_once(unknowns, information, right, now)
-        if _sigmas(now) == _sigmas(known):  # as they would be once more
+        if now.sigmas == known.sigmas:  # as they would be once more
             break
     return now
 
@@ -145,13 +145,6 @@ def _found_leds(
     if stated is None or (component.is_significant and component.sigma > stated):
         return component
     return NONE
-
-
-def _sigmas(components: Components) -> list[float]:
-    """Return the standard deviations by which the unknowns are fitted, mm."""
-    found = (components.leds, *components.seat, components.oval, components.drift)
-    of_effects = [each.sigma for each in components.effects]
-    return [*(each.sigma for each in found), *of_effects]
 
 
 def _likely(found: Component, stated: float = 0.0) -> Component:

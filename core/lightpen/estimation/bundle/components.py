@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from lightpen.estimation.bundle.effects import Effect, EffectComponent, held
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.statistics.variance_components import Component, RandomEffect
@@ -34,6 +36,14 @@ class Components(NamedTuple):
     drift: Component
     jitter: RandomEffect
     effects: tuple[EffectComponent, ...] = ()
+
+    @property
+    def sigmas(self) -> list[float]:
+        """Standard deviations by which the unknowns are fitted, mm."""
+        found = (self.leds, *self.seat, self.oval, self.drift, *self.effects)
+        jitter = self.jitter.covariance
+        by_axis = [] if jitter is None else np.sqrt(np.diag(jitter)).tolist()
+        return [*(each.sigma for each in found), *by_axis]
 
     def with_no_effects(self, effects: tuple[Effect, ...]) -> "Components":
         """Return these with the effects held at 0."""
