@@ -7,7 +7,7 @@ to first order. The last swing, held out, is the proof: it is compared with the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -138,19 +138,22 @@ def joined(swings: Sequence[Discovery]) -> Discovery:
     """Return the joint result of swings, in the frame of the first.
 
     What is known of camera and discs without images counts once: each swing brings the
-    information of its images, which is its own less that of these priors.
+    information of its images, which is its own less that of these priors. What goes
+    beyond the fits, lens and mechanics, is common to all as far as all have it, and of
+    each swing alone beyond that.
     """
     first, at = swings[0], swings[0].parameters
     if len(swings) == 1:
         return first
     basis = _free_of(first)
-    parts = [_parted(each) for each in swings]
+    beyond_fit = reduce(common_part, [each.beyond_fit for each in swings])
+    parts = [_parted(each, beyond_fit) for each in swings]
     start = _values(first, first)
     information = basis.T @ _prior_information(first) @ basis
     right = information @ basis.T @ (_prior_values(first) - start)
     for each, part in zip(swings, parts, strict=True):
         prior = basis.T @ _prior_information(each) @ basis
-        of_images = _not_negative(inverse(basis.T @ part.fit @ basis) - prior)
+        of_images = _not_negative(inverse(basis.T @ part.own @ basis) - prior)
         values = _values(each, first)
         begun = basis.T @ (values - _started_at(each, values))
         information += of_images
@@ -170,7 +173,12 @@ def joined(swings: Sequence[Discovery]) -> Discovery:
     camera = replace(camera, covariance=spread[at.cameras[0], at.cameras[0]])
     pen, camera = _found_from_all(pen, camera, swings)
     return replace(
-        first, pen=pen, camera=camera, tip_pen=whole[at.tip], covariance=spread
+        first,
+        pen=pen,
+        camera=camera,
+        tip_pen=whole[at.tip],
+        covariance=spread,
+        beyond_fit=beyond_fit,
     )
 
 
@@ -192,7 +200,8 @@ def _compared(others: Discovery, last: Discovery) -> HeldOut:
     """Compare a swing with others; the length of all is the same, and cancels."""
     at = others.parameters
     difference = _values(last, others) - _values(others, others)
-    covariance = _parted(others).fit + _parted(last).fit
+    beyond_fit = common_part(others.beyond_fit, last.beyond_fit)
+    covariance = _parted(others, beyond_fit).own + _parted(last, beyond_fit).own
     sigmas = np.sqrt(np.diag(covariance))
     fx = at.cameras[0].start
     return HeldOut(
@@ -250,23 +259,34 @@ def _not_negative(information: FloatArray) -> FloatArray:
 
 
 class _Parts(NamedTuple):
-    """Covariance of a discovery, (q, q) each: by its own images, and as all share it.
+    """Covariance of a discovery, (q, q) each: of its own, and as all share it."""
 
-    Lengths are shared, and what goes beyond the fit: lens and mechanics.
-    """
-
-    fit: FloatArray
+    own: FloatArray
     shared: FloatArray
 
 
-def _parted(each: Discovery) -> _Parts:
+def _parted(each: Discovery, beyond_fit: FloatArray) -> _Parts:
+    """Part by the lengths and by what all have beyond the fit of the tip, (3, 3)."""
     at, lengths = each.parameters, _length_rows(each)
     beyond = np.zeros_like(each.covariance)
-    beyond[at.tip, at.tip] = each.beyond_fit
-    fit = each.covariance - beyond
-    gain = fit @ lengths
+    beyond[at.tip, at.tip] = beyond_fit
+    own = each.covariance - beyond
+    gain = own @ lengths
     by_lengths = gain @ np.linalg.pinv(lengths.T @ gain) @ gain.T
-    return _Parts(fit - by_lengths, beyond + by_lengths)
+    return _Parts(own - by_lengths, beyond + by_lengths)
+
+
+def common_part(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the part (k, k) that two covariances have in common; each exceeds it."""
+    both = one + other
+    values, vectors = np.linalg.eigh(both)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    white = np.linalg.pinv(root)
+    shares, axes = np.linalg.eigh(white @ one @ white.T)
+    spread = root @ axes
+    return np.asarray(
+        (spread * np.clip(np.minimum(shares, 1 - shares), 0, 1)) @ spread.T
+    )
 
 
 def _length_rows(each: Discovery) -> FloatArray:
