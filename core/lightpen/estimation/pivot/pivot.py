@@ -199,8 +199,8 @@ class _Equations:
             WA = np.linalg.inv(covariances) @ A
         H_each = np.swapaxes(WA, 1, 2) @ A
         g_each = np.einsum("nki,nk->ni", WA, b)
-        H = np.einsum("sn,nij->sij", used.astype(float), H_each)
-        g = np.einsum("sn,ni->si", used.astype(float), g_each)
+        H = np.tensordot(used.astype(float), H_each, axes=1)
+        g = used @ g_each
         shift = np.concatenate([np.zeros(3), center])
         return H, g + H @ shift
 
@@ -318,13 +318,15 @@ def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
     n_poses = len(equations.rotations)
     rng = default_rng(0)  # the same poses give the same tip
     size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))
-    order = np.argsort(rng.random((N_SAMPLES, n_poses)), axis=1)
+    order = np.argpartition(rng.random((N_SAMPLES, n_poses)), size - 1, axis=1)
     members = np.zeros((N_SAMPLES, n_poses), dtype=bool)
     np.put_along_axis(members, order[:, :size], True, axis=1)
     solutions = equations.solve(members)
-    tips = np.einsum("nij,sj->sni", equations.rotations, solutions[:, :3])
-    residuals = tips + equations.translations - solutions[:, None, 3:]
-    reached = np.quantile(np.linalg.norm(residuals, axis=2), share, axis=1)
+    tips = solutions[:, :3] @ equations.rotations.reshape(-1, 3).T
+    residuals = tips.reshape(N_SAMPLES, -1, 3) + equations.translations
+    residuals -= solutions[:, None, 3:]
+    squares = np.einsum("sni,sni->sn", residuals, residuals)
+    reached = np.quantile(squares, share, axis=1)
     return np.asarray(solutions[np.argmin(reached)])
 
 
