@@ -99,12 +99,8 @@ _logger = logging.getLogger(__name__)
 def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None) -> int:
     """Run the command line and return the exit status.
 
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        By default the arguments of the process.
-    desktop : Desktop, optional
-        Without it a command must be given.
+    The arguments are those of the process by default. Without a desktop a command must
+    be given.
     """
     given = sys.argv[1:] if arguments is None else arguments
     parser, commands = _parser(given, desktop)

@@ -46,13 +46,7 @@ def log_file(data: Path) -> Path:
 
 
 def log_level(name: str | None) -> int:
-    """Return the level of a name in `LEVELS`, or of the environment without one.
-
-    Raises
-    ------
-    UsageError
-        The environment variable names none.
-    """
+    """Return the level of a name in `LEVELS`, or of the environment without one."""
     name = name or os.environ.get(LEVEL_VARIABLE) or "info"
     try:
         return LEVELS[name.lower()]
@@ -69,10 +63,7 @@ def log_level(name: str | None) -> int:
 def running_log(level: int, *, is_verbose: bool = False) -> Iterator[None]:
     """Log while the body runs, and the exception that ends it; nested, do nothing.
 
-    Parameters
-    ----------
-    is_verbose : bool
-        Whether the lines also go to standard error.
+    If verbose, the lines also go to standard error.
     """
     if _intake() is not None:
         yield

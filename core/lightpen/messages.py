@@ -94,13 +94,7 @@ class Message:
         return CATALOGUE[self.code]
 
     def text(self, translate: Translate = in_english) -> str:
-        """Return the words.
-
-        Parameters
-        ----------
-        translate : callable, optional
-            Returns a template in another language.
-        """
+        """Return the words, in English unless a translation of templates is given."""
         words = {name: _worded(value, translate) for name, value in self.values.items()}
         return translate(self.template).format(**words)
 

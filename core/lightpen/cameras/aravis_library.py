@@ -194,13 +194,5 @@ def _bound(function: Any, result: Any, *arguments: Any) -> Callable[..., Any]:
 
 @cache
 def load_aravis() -> Aravis:
-    """Return the library.
-
-    Raises
-    ------
-    OSError
-        It is not installed.
-    AttributeError
-        A function is not in it: it is too old.
-    """
+    """Return the library; raise `OSError` or, if too old, `AttributeError`."""
     return Aravis()

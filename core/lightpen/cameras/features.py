@@ -96,12 +96,8 @@ def read_settings(features: Features, caps: CameraCapabilities) -> CameraSetting
 def apply_settings(features: Features, wanted: CameraSettings) -> None:
     """Apply settings to a stopped camera; values are clipped to their ranges.
 
-    Pixel format and region come before the frame rate, whose range they change.
-
-    Raises
-    ------
-    ConfigError
-        The pixel format is not offered.
+    Pixel format and region come before the frame rate, whose range they change. Raises
+    `ConfigError` if the pixel format is not offered.
     """
     for name in AUTOMATICS:
         if _offers(features, name, "Off"):

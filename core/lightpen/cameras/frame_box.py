@@ -49,15 +49,10 @@ class FrameQueue:
             return True
 
     def hand_over(self, frame: Frame, is_wanted: Callable[[], bool]) -> None:
-        """Append a frame and wait until it is taken.
+        """Append a frame and wait until it is taken, or no longer wanted after `clear`.
 
         Nothing is made ahead of its reader, so one who answers an image sees what comes
         of it in the next but one.
-
-        Parameters
-        ----------
-        is_wanted : callable
-            Returns whether frames are wanted; checked again after `clear`.
         """
         with self._changed:
             if self._is_ended:

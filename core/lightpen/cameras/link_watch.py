@@ -39,14 +39,9 @@ class LinkWatch:
     def after(
         self, stats: Stats, now: float, settings: CameraSettings
     ) -> tuple[Self, CameraFailure | None]:
-        """Return the next state after an image, and a fault of the link or None.
+        """Return the state after an image, and a fault of the link or None.
 
-        Parameters
-        ----------
-        now : float
-            Arrival time of the image, s.
-        settings : CameraSettings
-            Current settings.
+        ``now`` is the arrival time of the image, s.
         """
         if self.since is None:
             return replace(self, since=stats, began=now), None

@@ -109,10 +109,7 @@ class FramePairs:
     def moved_ms(self) -> float | None:
         """Return, once, the error of the clock offset of the last pairs.
 
-        Returns
-        -------
-        float or None
-            None where they were right, but for half the time between two frames.
+        None where it is less than half the time between two frames.
         """
         moved_ns, self._moved_ns = self._moved_ns, 0
         return moved_ns * 1e-6 if moved_ns else None
@@ -254,10 +251,7 @@ def held_up(moved_ms: float) -> Message:
 def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Message | None:
     """Return the message of a lag that matters at the pen's speed, or None.
 
-    Parameters
-    ----------
-    px_per_mm : float or None
-        Scale at the pen; None if unknown.
+    The scale at the pen, px/mm, may be unknown.
     """
     if lag_ms is None or abs(lag_ms) < LEAST_LAG_MS:
         return None

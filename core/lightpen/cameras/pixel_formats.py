@@ -125,24 +125,11 @@ def usable(names: tuple[str, ...]) -> tuple[str, ...]:
 def decoded(
     data: Bytes, width: int, height: int, pixel_format: PixelFormat, padding: int = 0
 ) -> Image:
-    """Return the grey values of an image as a camera sent it.
+    """Return the grey values (H, W) of an image as a camera sent it, not stretched.
 
-    Parameters
-    ----------
-    data : (N,) array
-        What was sent; the image may share its memory.
-    padding : int
-        Bytes at the end of each row.
-
-    Returns
-    -------
-    (H, W) array
-        8 bit, or 16 bit for deeper formats: the values as they are, not stretched.
-
-    Raises
-    ------
-    ValueError
-        There are too few bytes.
+    They are 8 bit, or 16 bit for deeper formats, and may share the memory of the data.
+    ``padding`` is the number of bytes at the end of each row. Raises `ValueError` if
+    there are too few bytes.
     """
     size = pixel_format.size(width, height, padding)
     if len(data) < size:

@@ -313,11 +313,9 @@ class ImageCamera(Protocol):
         """Capabilities of the open camera."""
 
     def open(self) -> None:
-        """Find and open the device; no-op if it is open.
+        """Find and open the device, or raise `DeviceNotFound` or `DeviceBusy`.
 
-        Raises
-        ------
-        DeviceNotFound, DeviceBusy
+        No-op if it is open.
         """
 
     def close(self) -> None:

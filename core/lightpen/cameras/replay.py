@@ -147,12 +147,8 @@ class ReplayCamera:
     def read(self, timeout_s: float) -> Frame:
         """Return the next image, decoded now.
 
-        Raises
-        ------
-        FrameIncomplete
-            The image cannot be read.
-        DeviceLost
-            Nor can any other.
+        Raises `FrameIncomplete` if it cannot be read, `DeviceLost` if no other can
+        either.
         """
         if self._loaders is None:
             raise ValueError("The camera delivers no images: call `start` first.")
@@ -244,11 +240,6 @@ def _usual_kind(source: ImageSource, where: str) -> tuple[tuple[int, ...], str]:
     """Return the first size that two images have, and the format of the first of them.
 
     So a bad image spoils nothing. Where no two are alike, it is the first image.
-
-    Raises
-    ------
-    FileError
-        There is no image, or none can be read.
     """
     formats: dict[tuple[int, ...], str] = {}  # by size: height and width, px
     unread: FileError | None = None

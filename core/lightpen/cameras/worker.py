@@ -141,10 +141,7 @@ class CameraWorker:
     def stop(self, timeout_s: float = LONGEST_STOP) -> None:
         """Close the camera and end the thread.
 
-        Raises
-        ------
-        DeviceLost
-            The camera did not come back from a call within ``timeout_s``.
+        Raises `DeviceLost` if the camera does not come back from a call in time.
         """
         self._stopping.set()
         self._wake.set()
@@ -177,24 +174,16 @@ class CameraWorker:
     def next_frame(self, timeout_s: float) -> Frame:
         """Return the oldest queued frame for processing.
 
-        Raises
-        ------
-        FrameTimeout
-            No frame within ``timeout_s``.
-        EndOfImages
-            The images or the worker have ended.
+        Raises `FrameTimeout` if there is none in time, `EndOfImages` after the last.
         """
         return self._queue.take(timeout_s)
 
     def set_rest(self, rest: float | None) -> None:
-        """Pause between two images.
+        """Pause between two images, s; None for as long as no other pause is set.
 
-        Parameters
-        ----------
-        rest : float or None
-            s; None for as long as no other is set. Images that are missed meanwhile
-            count as neither missed nor skipped, and the next may be as old as the rest.
-            A camera on a link sends on during a finite rest, and is read.
+        Images that are missed meanwhile count as neither missed nor skipped, and the
+        next may be as old as the rest. A camera on a link sends on during a finite
+        rest, and is read.
         """
         if rest != self._rest:
             self._rest = rest

@@ -91,13 +91,7 @@ def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
 
 
 def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
-    """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen.
-
-    Parameters
-    ----------
-    rig_images : str
-        How the images of several cameras are given.
-    """
+    """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen."""
     parser.add_argument(
         "--camera",
         type=Path,
@@ -135,12 +129,8 @@ def add_conditions(
 ) -> None:
     """Add options for the measured environment.
 
-    Parameters
-    ----------
-    names : str
-        Other names of the option for the temperature of the pen.
-    meaning : str
-        What the temperature is for.
+    ``names`` are other names of the option for the temperature of the pen, ``meaning``
+    is what that is for.
     """
     parser.add_argument(
         *names,

@@ -53,12 +53,8 @@ def keep_record(
 ) -> None:
     """Write a verification as JSON where requested, and enter it in the archive.
 
-    Parameters
-    ----------
-    tip : CalibrationFile or None
-        The tip, whose data folder has the archive; None of LED centres alone.
-    origin : Origin, optional
-        Of the images; by default of the tip.
+    That is in the data folder of the tip; None of LED centres alone. The origin of the
+    images is by default that of the tip.
     """
     names = NOBODY if tip is None else tip.names
     own = None if tip is None else tip.origin

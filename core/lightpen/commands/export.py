@@ -67,13 +67,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
 
 
 def _laboratory(options: argparse.Namespace) -> Laboratory:
-    """Return the laboratory of the options, or that of this computer as they have it.
-
-    Raises
-    ------
-    UsageError
-        Something that a certificate needs is missing.
-    """
+    """Return the laboratory of options or computer; refuse one with gaps."""
     own = None if options.laboratory.strip() else machine_settings().laboratory
     names = [item.name for item in fields(Laboratory)]
     given = {name: getattr(options, name, "").strip() for name in names}

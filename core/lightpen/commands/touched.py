@@ -138,13 +138,7 @@ def measure_runs(
     places: Sequence[tuple[str, ...]],
     centers: Sequence[Path] = (),
 ) -> MeasuredRuns:
-    """Measure the touches at places, and those of files of LED centres before them.
-
-    Parameters
-    ----------
-    options : Namespace
-        With what `add_touch_inputs` adds, and `json`.
-    """
+    """Measure the touches of files of LED centres, and then those at places."""
     drift: Path | None = getattr(options, "drift", None)
     inputs = options.camera, options.rig, options.pen, options.tip, drift
     require_other_file(options.json, *inputs)

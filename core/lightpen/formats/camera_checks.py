@@ -17,13 +17,7 @@ SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 
 
 def checked_size(size: tuple[float, float], name: str | Message) -> tuple[int, int]:
-    """Return width and height of the images, px.
-
-    Raises
-    ------
-    FileError
-        The size is implausible.
-    """
+    """Return width and height of the images, px; refuse implausible ones."""
     for side in size:
         if side != round(side) or not 0 < side <= LARGEST_IMAGE:
             raise FileError(
@@ -39,13 +33,7 @@ def checked_size(size: tuple[float, float], name: str | Message) -> tuple[int, i
 def check_pinhole(
     pinhole: FloatArray, width: int, height: int, name: str | Message
 ) -> None:
-    """Refuse implausible fx fy cx cy, px, for the image size.
-
-    Raises
-    ------
-    FileError
-        They are implausible: other units, other images, or no intrinsics.
-    """
+    """Refuse implausible fx fy cx cy, px, as of other units or other images."""
     fx, fy, cx, cy = pinhole
     if fx <= 0 or fy <= 0:
         raise FileError("camera-file.focal-length-sign", name=name, fx=fx, fy=fy)
@@ -72,13 +60,7 @@ def check_pinhole(
 
 
 def check_skew(skew: float, entries: Entries) -> None:
-    """Refuse a skew, px, that is not zero.
-
-    Raises
-    ------
-    FileError
-        They are not.
-    """
+    """Refuse a skew, px, that is not zero."""
     if abs(skew) > SKEW_TOLERANCE:
         raise FileError("camera-file.skew", name=entries.name, skew=skew)
 
@@ -86,13 +68,7 @@ def check_skew(skew: float, entries: Entries) -> None:
 def checked_distortion(
     coefficients: FloatArray, entries: Entries, lens: LensModel = LensModel.BROWN
 ) -> FloatArray:
-    """Return 5 or 8 coefficients, or the 4 of a fisheye.
-
-    Raises
-    ------
-    FileError
-        There are as many as no model here has, or others than these are not zero.
-    """
+    """Return 5 or 8 coefficients, or the 4 of a fisheye; refuse others unless zero."""
     count = len(coefficients)
     if count == 0 and entries.word("distortion_model").casefold() == "none":
         return np.zeros(5)
@@ -118,13 +94,7 @@ def checked_distortion(
 
 
 def check_fold(camera: Camera, entries: Entries) -> None:
-    """Refuse a distortion that is not invertible within the image.
-
-    Raises
-    ------
-    FileError
-        It does.
-    """
+    """Refuse a distortion that is not invertible within the image."""
     if folds(camera):
         raise FileError(
             "camera-file.fold",

@@ -31,15 +31,7 @@ def write_camera(
 ) -> None:
     """Write the intrinsics of a camera as YAML of OpenCV or Kalibr, to the last digit.
 
-    Parameters
-    ----------
-    path : Path
-        Name ending in .yaml or .yml.
-
-    Raises
-    ------
-    UsageError
-        The name has another suffix.
+    Raises `UsageError` unless the name ends in .yaml or .yml.
     """
     if path.suffix.lower() not in (".yaml", ".yml"):
         raise UsageError("camera-file.suffix", name=printable(path.name))

@@ -105,17 +105,10 @@ _CAMERA_OF_CHAIN = r"(?a)cam\d+"
 def read_camera(path: Path) -> Camera:
     """Read the intrinsics of a camera; see the module for the layouts.
 
-    Returns
-    -------
-    Camera
-        With 5 distortion coefficients, k3 = 0 being added if the file has 4, or with 8,
-        further ones being dropped if they are zero. ``calibrated_on`` is None if the
-        file has no date or an ambiguous one, such as 03/04/25.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or is not the complete file of a pinhole camera.
+    It has 5 distortion coefficients, k3 = 0 being added if the file has 4, or 8,
+    further ones being dropped if they are zero. ``calibrated_on`` is None if the file
+    has no date or an ambiguous one, such as 03/04/25. Raises `FileError` unless it is
+    the complete file of a camera.
     """
     text = read_text(path, CAMERA_FILE, CAMERA_FILE_LIMIT)
     name = printable(path.name)

@@ -170,13 +170,7 @@ def _decoded(data: bytes, name: str) -> Image:
 
 
 def grey_image(image: npt.NDArray[Any], name: str | Message) -> Image:
-    """Return a decoded image in grey values of 8 or 16 bit, (H, W).
-
-    Raises
-    ------
-    FileError
-        Its values are of another type.
-    """
+    """Return a decoded image in grey values of 8 or 16 bit, (H, W); refuse others."""
     if image.dtype not in (np.uint8, np.uint16):
         raise FileError("image.value-type", name=name, value_type=str(image.dtype))
     if image.ndim == 2:

@@ -37,17 +37,7 @@ _YAML_DIRECTIVE = r"%YAML[: ].*"
 def parse_document(text: str, name: str) -> dict[str, Tree]:
     """Return the mapping that a YAML, XML or JSON file holds, recognised by content.
 
-    Parameters
-    ----------
-    text : str
-        Content of the file.
-    name : str
-        Name of the file, for messages.
-
-    Raises
-    ------
-    FileError
-        The content is none of the three, or has something that is refused.
+    The name of the file is for messages. Raises `FileError` for anything else.
     """
     start = text.lstrip()[:1]
     if start == "<":

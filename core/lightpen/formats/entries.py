@@ -53,10 +53,7 @@ class Entries:
     def entry(self, *names: str) -> tuple[str, Tree]:
         """Return the name that an entry has in the file, and its value.
 
-        Raises
-        ------
-        FileError
-            It is missing, or there under two names.
+        Raises `FileError` if it is missing, or there under two names.
         """
         found = [self.values[_plain(n)] for n in names if _plain(n) in self.values]
         if not found:
@@ -80,12 +77,8 @@ class Entries:
         """Return the numbers of a list, matrix or single value in one row.
 
         A matrix is a list of rows, or a mapping with ``rows``, ``cols`` and ``data``.
-
-        Raises
-        ------
-        FileError
-            It is missing, has something else than finite numbers, or not as many as
-            its ``rows`` and ``cols`` say.
+        Raises `FileError` if it is missing, has something else than finite numbers, or
+        not as many as its ``rows`` and ``cols`` say.
         """
         key, value = self.entry(*names)
         cells = _cells(value)
@@ -140,13 +133,7 @@ class Entries:
         return value.strip() if isinstance(value, str) else ""
 
     def refuse_others(self, *names: str) -> None:
-        """Reject unknown entries, which may be misspelt.
-
-        Raises
-        ------
-        FileError
-            There is one.
-        """
+        """Refuse unknown entries, which may be misspelt."""
         known = {_plain(name) for name in names}
         for plain, (key, _) in self.values.items():
             if plain not in known:

@@ -18,19 +18,10 @@ NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK)
 
 
 def locked(descriptor: int, *, shared: bool = False, patience_s: float = 0.0) -> bool:
-    """Lock an open file; return whether it succeeded.
+    """Lock an open file within ``patience_s``; return whether it succeeded.
 
-    Parameters
-    ----------
-    shared : bool
-        Whether several processes may hold it.
-    patience_s : float
-        Time to wait for the lock.
-
-    Raises
-    ------
-    OSError
-        The disk fails, or it supports no locks (`NO_LOCKS`).
+    Several processes may share a lock. Raises `OSError` if the disk fails or supports
+    no locks (`NO_LOCKS`).
     """
     deadline = time.monotonic() + patience_s
     while True:
@@ -50,12 +41,8 @@ def locked(descriptor: int, *, shared: bool = False, patience_s: float = 0.0) ->
 def folder_locked(folder: Path, patience_s: float) -> Iterator[bool]:
     """Hold an advisory lock on a folder; yield whether it was acquired.
 
-    On Windows and on file systems without locks it always succeeds.
-
-    Raises
-    ------
-    OSError
-        There is no such folder.
+    On Windows and on file systems without locks it always succeeds. Raises `OSError` if
+    there is no such folder.
     """
     if os.name != "posix":
         yield True

@@ -47,19 +47,10 @@ _logger = logging.getLogger(__name__)
 
 
 def read_bytes(path: Path, what: Message, limit: int) -> bytes:
-    """Return the content of a file.
+    """Return the content of a file of at most ``limit`` bytes, checked before reading.
 
-    Parameters
-    ----------
-    what : Message
-        File type for messages, such as "camera file".
-    limit : int
-        Largest size, bytes. It is checked before anything is read.
-
-    Raises
-    ------
-    FileError
-        The file is missing, a folder, empty, unreadable or larger than `limit`.
+    ``what`` is the file type for messages. Raises `FileError` if the file is missing, a
+    folder, empty, unreadable or larger.
     """
     with opened(path, what, limit) as stream:
         # A longer read would allocate the requested size in advance.
@@ -68,18 +59,7 @@ def read_bytes(path: Path, what: Message, limit: int) -> bytes:
 
 @contextlib.contextmanager
 def opened(path: Path, what: Message, limit: int) -> Iterator[BinaryIO]:
-    """Check a file and open it for reading.
-
-    Parameters
-    ----------
-    what, limit
-        As for `read_bytes`.
-
-    Raises
-    ------
-    FileError
-        As for `read_bytes`, also while it is read.
-    """
+    """Check a file and open it for reading; see `read_bytes`."""
     shown = printable(str(path))
     try:
         _check_readable(_status(path, what), what, shown, limit)
@@ -155,19 +135,10 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Write a new file whole or not at all; never replace a file.
+    """Write a new file whole or not at all; raise `NameTakenError` if it exists.
 
-    When this returns, the file is on the disk with its name, whatever happens next.
-
-    Parameters
-    ----------
-    mode : int
-        Who may read and write it, as of `os.open`.
-
-    Raises
-    ------
-    NameTakenError
-        The file exists.
+    When this returns, the file is on the disk with its name, whatever happens next. The
+    mode is that of `os.open`.
     """
     _require_file(path)
     sweep_parts(path.parent)
@@ -198,13 +169,7 @@ def _require_file(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush the directory entries of a folder to disk (not on Windows).
-
-    Raises
-    ------
-    OSError
-        The disk fails.
-    """
+    """Flush the directory entries of a folder to disk (not on Windows)."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -224,10 +189,7 @@ def unreadable(path: Path, what: Message, error: OSError) -> FileError:
 def sha256(path: Path) -> str:
     """Return the SHA-256 digest of a file's content, in hexadecimal digits.
 
-    Raises
-    ------
-    FileError
-        The file cannot be read, or is a pipe or device, which never ends.
+    A pipe or device, which never ends, is refused.
     """
     return start_sha256(path, None)
 

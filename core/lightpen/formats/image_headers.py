@@ -60,17 +60,9 @@ _Reader: TypeAlias = Callable[[BinaryIO, _Name], ImageHeader]
 
 
 def read_image_header(stream: BinaryIO, name: str | Message) -> ImageHeader:
-    """Read the header of an image; refuse implausibly large images.
+    """Read the header of an image from its first byte; refuse implausibly large images.
 
-    Parameters
-    ----------
-    stream : BinaryIO
-        The file, at its first byte; it is left anywhere.
-
-    Raises
-    ------
-    FileError
-        The format is not known, the header is damaged, or the image is too large.
+    Raises `FileError` if the format is not known or the header is damaged.
     """
     start = stream.read(16)
     stream.seek(0)
@@ -84,13 +76,7 @@ def read_image_header(stream: BinaryIO, name: str | Message) -> ImageHeader:
 def check_pixels(
     width: int, height: int, name: str | Message, most: int = MAX_PIXELS
 ) -> None:
-    """Refuse an image with too many pixels.
-
-    Raises
-    ------
-    FileError
-        It has more than `most`.
-    """
+    """Refuse an image with too many pixels."""
     if width * height > most:
         raise FileError(
             "image.too-many-pixels", name=name, width=width, height=height, most=most

@@ -101,16 +101,10 @@ def look_at_all(
 ) -> Iterator[Seen]:
     """Process all images in threads; yield the results in order.
 
-    Images are released at once; processing runs a few images ahead.
-
-    Parameters
-    ----------
-    look : callable
-        Takes the loader of an image; an exception ends the processing.
-    memory_a_pixel : int
-        Memory of processing, bytes per pixel; limits the threads by `WORK_MEMORY`.
-    n_threads : int, optional
-        Maximum number of threads; by default the number of processors.
+    Images are released at once; processing runs a few images ahead. ``look`` takes the
+    loader of an image; an exception ends the processing. ``memory_a_pixel``, bytes,
+    limits the threads by `WORK_MEMORY`; they are at most as many as there are
+    processors.
     """
     keep_freed_memory()
     room = MemoryRoom(WORK_MEMORY)
@@ -138,13 +132,9 @@ def look_at_all(
 def find_images(*places: str) -> ImageSource:
     """Find the images of a folder, a pattern such as ``swing/*.png``, or a video.
 
-    A folder without images may have them in its subfolder ``images``.
-
-    Parameters
-    ----------
-    *places : str
-        One folder, pattern or video, or several image files, as a shell makes them of
-        a pattern. Images are taken in the natural order of their names: 2 before 10.
+    A folder without images may have them in its subfolder ``images``. Several places
+    are image files, as a shell makes them of a pattern. Images are taken in the natural
+    order of their names: 2 before 10.
     """
     if len(places) > 1:
         return image_files(sorted(map(Path, places), key=_by_name))

@@ -65,13 +65,7 @@ class Update:
 
 
 def read_update(file: Path) -> Update | None:
-    """Return the version that an administrator names, if it is newer than this one.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or names no version.
-    """
+    """Return the version that an administrator names, if it is newer than this one."""
     data = read_bytes(file, message("file.update"), MEGABYTE)
     try:
         update = parse_own_json(data, Update)
@@ -96,13 +90,7 @@ def machine_file() -> Path:
 
 
 def machine_settings() -> MachineSettings:
-    """Return the settings of the file; defaults without one.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or sets what there is not.
-    """
+    """Return the settings of the file; defaults without one."""
     file = machine_file()
     if not file.exists():
         return MachineSettings()

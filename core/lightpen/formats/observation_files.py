@@ -102,18 +102,10 @@ class PoseTable:
 
 
 def read_centers(path: Path, n_leds: int) -> Centers:
-    """Read LED centres; see the module for the layout.
+    """Read LED centres of a pen with ``n_leds`` LEDs; see the module for the layout.
 
-    Parameters
-    ----------
-    n_leds : int
-        Number of LEDs of the pen.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or has LEDs that the pen does not have, an LED twice
-        in a frame, or cells that are not numbers. The text names the line.
+    Raises `FileError`, which names the line, for LEDs that the pen does not have, an
+    LED twice in a frame, or cells that are not numbers.
     """
     table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
     columns = table.columns(_CENTERS, message("table.of-centers"))
@@ -153,13 +145,9 @@ def read_poses(path: Path) -> PoseTable:
     """Read poses; see the module for the layout.
 
     Rotations given in few digits are replaced by the nearest rotations; those that are
-    rotations to 1e-6 stay as they are.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or has matrices that are no rotations or covariances,
-        poses given twice, or cells that are not numbers. The text names the line.
+    rotations to 1e-6 stay as they are. Raises `FileError`, which names the line, for
+    matrices that are no rotations or covariances, poses given twice, or cells that are
+    not numbers.
     """
     table = read_table(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
     columns, covariance_columns = _pose_columns(table)

@@ -60,13 +60,7 @@ class PenFile:
 
     @classmethod
     def read(cls, path: Path, units: str | None = None) -> Self:
-        """Read it.
-
-        Raises
-        ------
-        UsageError
-            The file does not say its units, and none are given.
-        """
+        """Read it; raise `UsageError` unless the units are in the file or given."""
         pen = read_pen(path, units)
         return cls(path, pen, units, is_simulated(path), sha256(path))
 
@@ -93,14 +87,9 @@ def open_files(
     units: str | None = None,
     rig_path: Path | None = None,
 ) -> OpenedFiles:
-    """Read the files last in use, each independently of the others.
+    """Read the files last in use, each independently of the others; None if not in use.
 
-    Parameters
-    ----------
-    camera_path, pen_path, rig_path : Path or None
-        None if there was no such file.
-    units : str, optional
-        Units of a pen file that states none.
+    ``units`` are those of a pen file that states none.
     """
     camera_file, pen_file, rig_file, faults = None, None, None, []
     try:

@@ -38,17 +38,10 @@ class DamagedError(ValueError):
 
 
 def parse_own_json(data: bytes, shape: type[T]) -> T:
-    """Parse a text strictly.
+    """Parse a text strictly as a type for `msgspec`; unknown entries are ignored.
 
-    Parameters
-    ----------
-    shape : type
-        Type as for `msgspec`; unknown entries are ignored.
-
-    Raises
-    ------
-    DamagedError
-        It does not hold that, or more values than the program ever writes.
+    Raises `DamagedError` if it does not hold that, or more values than the program ever
+    writes.
     """
     if sum(map(data.count, _BEFORE_VALUES)) > MOST_VALUES:
         raise DamagedError("There are too many values.")
@@ -65,26 +58,14 @@ def parse_own_json(data: bytes, shape: type[T]) -> T:
 
 
 def parse_checked(data: bytes, shape: type[T]) -> T:
-    """Parse a text and verify its checksum; see `parse_own_json`.
-
-    Raises
-    ------
-    DamagedError
-        It does not, or has no checksum.
-    """
+    """Parse a text and verify its checksum, which it must have."""
     if not has_checksum(data):
         raise DamagedError("There is no checksum.")
     return parse_own_json(data, shape)
 
 
 def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
-    """Convert a parsed value to a type; see `parse_own_json`.
-
-    Parameters
-    ----------
-    strict : bool
-        Whether texts are refused as numbers.
-    """
+    """Convert a parsed value; see `parse_own_json`. Strict: texts are no numbers."""
     try:
         with _ONE_READER:
             return convert(tree, shape, strict=strict)
@@ -99,13 +80,7 @@ def with_checksum(text: bytes) -> bytes:
 
 
 def has_checksum(text: bytes) -> bool:
-    """Return whether the text of an object has a checksum, and verify it.
-
-    Raises
-    ------
-    DamagedError
-        It is not.
-    """
+    """Return whether the text of an object has a checksum, and verify it."""
     body, mark, end = text.rstrip().rpartition(CHECKSUM)
     if mark and end != _digest(body) + b'"}':
         raise DamagedError("The checksum is another one.")
@@ -113,13 +88,7 @@ def has_checksum(text: bytes) -> bool:
 
 
 def require_usual(moment: datetime) -> None:
-    """Refuse a date outside the range of all time zones.
-
-    Raises
-    ------
-    ValueError
-        Also where `parse_own_json` makes the type that calls it.
-    """
+    """Raise `ValueError` for a date outside the range of all time zones."""
     if not FIRST_YEAR <= moment.year <= LAST_YEAR:
         raise ValueError(f"{moment} is too far away.")
 

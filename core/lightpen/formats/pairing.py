@@ -35,19 +35,9 @@ class Pairing:
 
 
 def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairing:
-    """Pair images by name, by the last number in their names, or by their order.
+    """Pair the images of cameras by name, by the last number in the names, or by order.
 
-    Parameters
-    ----------
-    names : sequence of sequence of str
-        Image names of each camera, in their order.
-    cameras : sequence of str
-        Names of the cameras.
-
-    Raises
-    ------
-    FileError
-        The names do not match and the numbers of images differ.
+    Raises `FileError` if the names do not match and the numbers of images differ.
     """
     for key_of in (_stem, _last_number):
         paired = _paired(names, key_of)

@@ -23,13 +23,7 @@ _NAME = re.compile(r"\.[0-9a-f]{16}\.part")
 
 @contextlib.contextmanager
 def part_of(target: Path, data: bytes, mode: int = 0o666) -> Iterator[Path]:
-    """Write data to a temporary file beside its target, of a mode as of `os.open`.
-
-    Raises
-    ------
-    OSError
-        It cannot be written.
-    """
+    """Write data to a temporary file beside its target, of a mode as of `os.open`."""
     part, stream = _own_part(target.parent, mode)
     try:
         with stream:
@@ -49,11 +43,6 @@ def renamed(rename: Callable[[Path], object], target: Path) -> None:
 
     Scanners for viruses open what was just written, others the file that is replaced,
     and both keep Windows from renaming.
-
-    Raises
-    ------
-    OSError
-        It cannot be renamed.
     """
     deadline = time.monotonic() + PATIENCE
     while True:

@@ -50,19 +50,9 @@ class PenContent:
 
 
 def agreed_unit(stated: str, given: str | None, name: str) -> str:
-    """Return the unit of a file's lengths.
+    """Return the unit of a file's lengths, as stated in the file or given by the user.
 
-    Parameters
-    ----------
-    stated, given : str
-        Units from the file and from the user; empty if not given.
-    name : str
-        Displayed name of the file.
-
-    Raises
-    ------
-    UsageError
-        Neither says it, or they differ.
+    Raises `UsageError` if neither says it, or they differ.
     """
     if stated and given and stated != given:
         raise UsageError(
@@ -75,13 +65,7 @@ def agreed_unit(stated: str, given: str | None, name: str) -> str:
 
 
 def checked_number(what: str, number: float, name: str) -> float:
-    """Return a number of a file, checked against `RANGES`.
-
-    Raises
-    ------
-    FileError
-        It is out of its range.
-    """
+    """Return a number of a file, checked against `RANGES`."""
     least, most = RANGES[what]
     if not least < number <= most:
         raise FileError(
@@ -96,13 +80,7 @@ def checked_number(what: str, number: float, name: str) -> float:
 
 
 def check_diameter(diameter: float, name: str) -> None:
-    """Refuse an implausible disc diameter, mm.
-
-    Raises
-    ------
-    FileError
-        They are not wide at all, or too wide.
-    """
+    """Refuse an implausible disc diameter, mm."""
     if not 0 < diameter <= LARGEST_DIAMETER:
         raise FileError(
             "pen-file.diameter", name=name, diameter=diameter, most=LARGEST_DIAMETER
@@ -110,13 +88,7 @@ def check_diameter(diameter: float, name: str) -> None:
 
 
 def unit_normal(normal: FloatArray, place: str | Message) -> FloatArray:
-    """Return a normal (3,) of unit length.
-
-    Raises
-    ------
-    FileError
-        It is far from that length; the place says where.
-    """
+    """Return a normal (3,) of unit length; refuse one that is far from it."""
     squared = float(normal @ normal) if np.abs(normal).max() < 2 else np.inf
     if abs(squared - 1) > 2 * NORMAL_TOLERANCE:
         raise FileError(

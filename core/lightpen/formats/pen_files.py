@@ -97,25 +97,9 @@ def read_raw_pen(
 ) -> Pen:
     """Read a pen of the paper's layout from a measuring machine's coordinates.
 
-    Parameters
-    ----------
-    path : Path
-        File as for `read_pen`, in any right-handed frame.
-    units, diameter
-        As for `read_pen`.
-
-    Returns
-    -------
-    Pen
-        In the pen frame; see `lightpen.model.pen.pen_frame_from_raw`. A nominal tip of
-        the file is moved with the LEDs.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or its LEDs do not define the pen frame.
-    UsageError
-        As for `read_pen`.
+    See `read_pen` for the file and the errors, and
+    `lightpen.model.pen.pen_frame_from_raw` for the frame of the pen returned. A nominal
+    tip of the file is moved with the LEDs.
     """
     content = _read(path, units)
     raw = _pen(content, diameter, None)
@@ -131,38 +115,16 @@ def read_raw_pen(
 
 
 def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:
-    """Read a pen for inspection and repair, without checking its LEDs.
-
-    Parameters
-    ----------
-    path, units
-        As for `read_pen`.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, or a cell is not what it should be.
-    UsageError
-        As for `read_pen`.
-    """
+    """Read a pen as `read_pen`, for inspection and repair, with its LEDs unchecked."""
     return _pen(_read(path, units), None, None)
 
 
 def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     """Write a pen as a table or as JSON, to be read back to the last digit.
 
-    Parameters
-    ----------
-    path : Path
-        Name that ends in .csv or .json.
-    parent_sha256 : str, optional
-        Checksum of the file from which the pen was improved.
-
-    Raises
-    ------
-    UsageError
-        The name ends otherwise, or the pen has a name, a nominal tip or a covariance,
-        for which a table has no place.
+    The name ends in .csv or .json; else, or where a table has no place for name,
+    nominal tip or covariance of the pen, a `UsageError` is raised. ``parent_sha256`` is
+    the checksum of the file from which the pen was improved.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":

@@ -39,21 +39,9 @@ ASYMMETRY = 1e-6  # of the largest variance
 
 
 def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
-    """Return the pen of a JSON document.
+    """Return the pen of a JSON document, named as displayed; refuse an incomplete one.
 
-    Parameters
-    ----------
-    units : str or None
-        Unit of its lengths, where it does not say.
-    name : str
-        Displayed name of the file.
-
-    Raises
-    ------
-    FileError
-        It is no complete pen.
-    UsageError
-        The units are neither stated nor given, or both and different.
+    ``units`` are those of its lengths where it does not say; see `agreed_unit`.
     """
     if not isinstance(tree, dict):
         raise FileError("pen-file.list", name=name)

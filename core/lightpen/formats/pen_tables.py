@@ -32,19 +32,9 @@ _COLUMN = (
 
 
 def from_table(table: Table, units: str | None) -> PenContent:
-    """Return the pen of a table.
+    """Return the pen of a table; refuse an incomplete one.
 
-    Parameters
-    ----------
-    units : str or None
-        Unit of its lengths, where it does not say.
-
-    Raises
-    ------
-    FileError
-        It is no complete pen.
-    UsageError
-        The units are neither stated nor given, or both and different.
+    ``units`` are those of its lengths where it does not say; see `agreed_unit`.
     """
     named = [_name_and_unit(column) for column in table.header]
     stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}

@@ -84,10 +84,8 @@ class RigFile:
 def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     """Read a rig file and the camera files it names; see the module for the layout.
 
-    Parameters
-    ----------
-    camera_files : sequence of Path, optional
-        One a camera, in place of those that it names, as for a copy.
+    ``camera_files``, one a camera, are read in place of those that it names, as for a
+    copy.
     """
     name = printable(path.name)
     entries = Entries.of(
@@ -119,10 +117,7 @@ def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
 def write_rig(rig: Rig, path: Path, camera_files: Sequence[str]) -> None:
     """Write a rig, to be read back to the last digit.
 
-    Parameters
-    ----------
-    camera_files : sequence of str
-        Names of the camera files, from the folder of the rig file.
+    ``camera_files`` are the names of the camera files from the folder of the rig file.
     """
     cameras: list[dict[str, Any]] = []
     for c, (name, file) in enumerate(zip(rig.names, camera_files, strict=True)):

@@ -120,21 +120,9 @@ class Table:
         return places
 
     def numbers(self, columns: Sequence[int]) -> FloatArray:
-        """Return columns as numbers.
+        """Return columns, by their indices from 0, as numbers (N, k).
 
-        Parameters
-        ----------
-        columns : sequence of k int
-            Indices of the columns, from 0.
-
-        Returns
-        -------
-        (N, k) array
-
-        Raises
-        ------
-        FileError
-            A cell is not a finite number; the text names its line.
+        Raises `FileError`, which names the line, for a cell that is no finite number.
         """
         cells = [row[column] for row in self.rows for column in columns]
         values = _clean_numbers(cells)
@@ -143,21 +131,9 @@ class Table:
         return values.reshape(len(self.rows), len(columns))
 
     def whole_numbers(self, column: int) -> IntArray:
-        """Return a column of whole numbers, such as frame or LED numbers.
+        """Return a column, by its index from 0, of whole numbers (frames, LEDs).
 
-        Parameters
-        ----------
-        column : int
-            Index of the column, from 0.
-
-        Returns
-        -------
-        (N,) array
-
-        Raises
-        ------
-        FileError
-            A cell is not a whole number; the text names its line.
+        Raises `FileError`, which names the line, for any other cell.
         """
         values = self.numbers([column])[:, 0]
         wrong = (values != np.round(values)) | (np.abs(values) > LARGEST_WHOLE)
@@ -193,18 +169,11 @@ class Table:
 
 
 def read_table(path: Path, what: Message, limit: int) -> Table:
-    """Read a table from delimited text.
+    """Read a table from delimited text of at most ``limit`` bytes.
 
     The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
     have decimal commas unless the comma separates columns. Blank lines and lines that
     begin with ``#`` are skipped. A first line without numbers is a header.
-
-    Parameters
-    ----------
-    what : Message
-        File type for messages.
-    limit : int
-        Largest size, bytes.
     """
     return parse_table(read_text(path, what, limit), printable(path.name))
 

@@ -55,21 +55,10 @@ def newest_format(kind: str) -> int:
 
 
 def parse_upgraded(data: bytes, shape: type[T], kind: str) -> T:
-    """Parse a text with checksum, upgraded to the newest format.
+    """Parse a text with checksum, upgraded to the newest format of its kind.
 
-    Parameters
-    ----------
-    shape : type
-        Type of the newest format, as in `parse_own_json`.
-    kind : str
-        Kind of the file, a key of `UPGRADES`.
-
-    Raises
-    ------
-    DamagedError
-        It has no checksum or names no format, or is not of the format that it names.
-    LaterFormatError
-        That is later than the newest.
+    Raises `DamagedError` if it has no checksum or is not of the format that it names,
+    and `LaterFormatError` if that is later than the newest.
     """
     return in_shape(upgraded(parse_checked(data, dict[str, Any]), kind), shape)
 

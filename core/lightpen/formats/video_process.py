@@ -27,12 +27,7 @@ from lightpen.formats.files import printable
 def limit_memory(more: int) -> None:
     """Limit this process to its present memory plus ``more`` bytes.
 
-    It is unchanged where the system has no such limit.
-
-    Raises
-    ------
-    OSError
-        The system refuses.
+    It is unchanged where the system has no such limit. Raises `OSError` if it refuses.
     """
     if sys.platform == "linux":
         import resource
@@ -117,10 +112,7 @@ MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 def count_frames(path: Path) -> int:
     """Return the number of frames of a video; see `videos`.
 
-    Raises
-    ------
-    FileError
-        As there, or decoding it takes too much memory.
+    Raises `FileError` as there, or if decoding it takes too much memory.
     """
     with _decoder(_send_count, path) as receive:
         n_frames: int = receive()

@@ -30,12 +30,8 @@ CODECS = frozenset(
 def count_frames_in_process(path: Path) -> int:
     """Return the number of frames of a video, not trusting its header.
 
-    They are counted as they come, not decoded.
-
-    Raises
-    ------
-    FileError
-        It is no video, or longer or larger than is read.
+    They are counted as they come, not decoded; too long or too large a video is
+    refused.
     """
     stream = _opened_video(path, cv2.CAP_PROP_FORMAT, -1)
     try:

@@ -337,13 +337,7 @@ class Live:
             self._listener.on_image(image)
 
     def _take_next(self, captured: _Capture, rest: float | None) -> None:
-        """Process the next image, or the next simultaneous pair.
-
-        Parameters
-        ----------
-        rest : float or None
-            Moments within this time of the last one are skipped, s.
-        """
+        """Process the next image, or the next simultaneous pair, after a rest, s."""
         wanted = captured.wanted or self._region
         frame = self._next_frame()
         if frame is None:

@@ -106,18 +106,9 @@ def align_321(primary: Quantity, secondary: Quantity, origin: Quantity) -> Align
 
 
 def align_points(points: Sequence[Quantity], nominals: FloatArray) -> Alignment:
-    """Align by points with known positions in the part.
+    """Align by the origins of features with places (N, 3), mm, in the part.
 
-    Parameters
-    ----------
-    points : sequence of Quantity
-        Features; their origins count.
-    nominals : (N, 3) array
-        Places of them in the part, mm.
-
-    References
-    ----------
-    .. [1] W. Kabsch, Acta Cryst. A32 (1976) 922-923.
+    W. Kabsch, Acta Cryst. A32 (1976) 922-923.
     """
     n = len(points)
     actual = np.array([point.values[PLACE] for point in points])
@@ -145,15 +136,9 @@ def tie(
 ) -> Alignment:
     """Return the motion that brings datum points touched again to where they were.
 
-    The part or the camera was moved in between. Both touches of each point are
-    uncertain, and the motion carries the covariance of both.
-
-    Parameters
-    ----------
-    then, now : sequence of Quantity
-        The same features before and after; their origins count.
-    inputs : (P, P) array
-        Covariance of all inputs.
+    The part or the camera was moved in between. The origins of the same features before
+    and after count. Both touches of each point are uncertain, and the motion carries
+    the covariance of both, from that of all inputs, (P, P).
     """
     n = len(then)
 

@@ -103,15 +103,8 @@ def evaluate(
 ) -> tuple[Value, Quantity | None]:
     """Return a characteristic, and its quantity if it is a smooth one.
 
-    Parameters
-    ----------
-    inputs : (P, P) array
-        Covariance of all inputs of the part.
-
-    Raises
-    ------
-    CalibrationError
-        It is not defined for features of these kinds.
+    ``inputs`` is the covariance (P, P) of all inputs of the part. Raises
+    `CalibrationError` if the characteristic is not defined for features of these kinds.
     """
     found = [of[name] for name in planned.of]
     if planned.quantity in DEVIATIONS:

@@ -70,10 +70,7 @@ def surface_of(
 ) -> TouchedSurface:
     """Return the surface that was touched.
 
-    Raises
-    ------
-    CalibrationError
-        The side is unknown, or touches are on both sides.
+    Raises `CalibrationError` if the side is unknown, or touches are on both sides.
     """
     at = touches.of(planned.name)
     assert planned.kind is not None

@@ -17,13 +17,7 @@ CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
 
 
 def outline_of(one: Measured, *, in_part: bool = False) -> list[FloatArray]:
-    """Return the lines (M, 3) of a feature, mm.
-
-    Parameters
-    ----------
-    in_part : bool
-        Whether in the frame of the part; else in that of the camera.
-    """
+    """Return the lines (M, 3) of a feature, mm, in the frame of camera or part."""
     values = (one.in_part if in_part else one.surface.quantity).values
     origin, axis, sizes = values[PLACE], values[AXIS], values[6:]
     frame = frame_about(axis)

@@ -95,17 +95,9 @@ class Feature:
 
 
 def fit_feature(kind: FeatureKind, points: FloatArray) -> Feature:
-    """Fit a feature of a kind to points.
+    """Fit a feature of a kind to points (N, 3), mm.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-        mm.
-
-    Raises
-    ------
-    CalibrationError
-        The points are too few, or do not determine the feature.
+    Raises `CalibrationError` if they are too few or do not determine the feature.
     """
     surface = SURFACES[kind]
     if len(points) < surface.min_points:

@@ -66,12 +66,8 @@ def refine(
 ) -> tuple[PartTouches, Refinement | None]:
     """Return touches refined by those on features of known form.
 
-    Parameters
-    ----------
-    sensitivity : (3 N, q) array
-        Derivative of the coordinates of the touches by the parameters.
-    covariance : (q, q) array
-        Of the parameters of the instrument.
+    ``sensitivity`` (3 N, q) is the derivative of the coordinates of the touches by the
+    parameters of the instrument, ``covariance`` (q, q) is theirs.
     """
     known = [each for each in plan.features if each.known is not None]
     if not known:

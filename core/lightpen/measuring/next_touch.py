@@ -119,10 +119,7 @@ def best_places(
 ) -> list[Place]:
     """Return the n most informative places, one after the other.
 
-    Parameters
-    ----------
-    touched : (N, 3) array, optional
-        Points that are probed already.
+    ``touched`` (N, 3) are points that are probed already.
     """
     surface = SURFACES[area.kind]
     places = _places(area)

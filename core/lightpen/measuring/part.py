@@ -110,11 +110,8 @@ class MeasuredPart:
 def measure_part(plan: Plan, touches: PartTouches) -> MeasuredPart:
     """Measure a part by a plan.
 
-    Raises
-    ------
-    CalibrationError
-        A feature has too few touches or none, its side is unknown, or a characteristic
-        is not defined for its features.
+    Raises `CalibrationError` if a feature has too few touches or none, its side is
+    unknown, or a characteristic is not defined for its features.
     """
     plan = _with_kinds(plan, touches)
     fits, surfaces, points, ties = _probed(plan, touches)

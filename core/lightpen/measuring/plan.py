@@ -276,13 +276,7 @@ def free_plan(name: str, touches: int = UNKNOWN_TOUCHES) -> Plan:
 
 
 def read_plan(path: Path) -> Plan:
-    """Read a plan.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, has unknown entries or contradicts itself.
-    """
+    """Read a plan; raise `FileError` for unknown or contradictory entries."""
     return parse_plan(read_text(path, PLAN, MAX_SIZE), printable(path.name))
 
 

@@ -44,12 +44,8 @@ def quantity_of(
 ) -> Quantity:
     """Return a feature's origin, axis and sizes as a quantity.
 
-    Parameters
-    ----------
-    at : (N,) sequence of int
-        Where in the inputs the coordinates of its points stand, three by three.
-    n_inputs : int
-        Number of all inputs P.
+    The coordinates of its N points stand at ``at`` (N,) in the P inputs, three by
+    three.
     """
     by_inputs = np.zeros((len(feature.values), n_inputs))
     columns = (np.asarray(at)[:, None] + np.arange(3)).ravel()
@@ -62,10 +58,7 @@ def derive(
 ) -> Quantity:
     """Return a function of quantities, with its derivative by central differences.
 
-    Parameters
-    ----------
-    function : callable
-        Takes the values of each quantity, returns M values or one.
+    The function takes the values of each quantity, and returns M values or one.
     """
     arguments = [quantity.values for quantity in quantities]
     values = np.atleast_1d(np.asarray(function(*arguments), dtype=float))

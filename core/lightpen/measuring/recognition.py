@@ -33,14 +33,8 @@ def recognise(
 ) -> FeatureKind | None:
     """Return the kind of feature that points lie on; None if they do not show it.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-        Ball centres, mm.
-    noise : float
-        Standard deviation of a coordinate by what the points do not share, mm.
-    approaches : (N, 3) array, optional
-        Unit vectors along which the ball came; NaN if unknown.
+    The ball centres (N, 3), mm, have a noise, mm, that they do not share. Approaches
+    (N, 3) are unit vectors along which the ball came; NaN if unknown.
     """
     if len(points) == 1:
         return FeatureKind.POINT
@@ -56,13 +50,7 @@ def recognise(
 
 
 def recognised(name: str, kind: FeatureKind | None) -> FeatureKind:
-    """Return a recognised kind.
-
-    Raises
-    ------
-    CalibrationError
-        There is none.
-    """
+    """Return a recognised kind, or raise `CalibrationError` if there is none."""
     if kind is None:
         kinds = ", ".join(str(NAMES[each]) for each in FeatureKind)
         raise CalibrationError("measuring.not-recognised", name=name, kinds=kinds)

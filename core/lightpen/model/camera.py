@@ -164,33 +164,11 @@ class Camera:
         return pixels - self.lens_field.at(pixels)
 
     def project(self, points_cam: FloatArray) -> FloatArray:
-        """Return the pixels of points in the camera frame.
-
-        Parameters
-        ----------
-        points_cam : (..., 3) array
-            Points in front of the camera, mm.
-
-        Returns
-        -------
-        (..., 2) array
-            px.
-        """
+        """Return the pixels (..., 2) of points (..., 3), mm, in front of the camera."""
         return self.pixels(points_cam[..., :2] / points_cam[..., 2:])
 
     def project_with_jacobian(self, points_cam: FloatArray) -> PointMap:
-        """Return the pixels of points in the camera frame and d px / d mm.
-
-        Parameters
-        ----------
-        points_cam : (..., 3) array
-            Points in front of the camera, mm.
-
-        Returns
-        -------
-        PointMap
-            ``points`` in px, ``jacobian`` (..., 2, 3) in px/mm.
-        """
+        """Return the pixels of points (..., 3) in front of it, and d px / d mm."""
         inverse_depth = 1 / points_cam[..., 2]
         normalised = points_cam[..., :2] * inverse_depth[..., None]
         pixels = self.pixels_with_jacobian(normalised)
@@ -206,20 +184,10 @@ class Camera:
         return self._distorted_pixels(normalised, r2, factor)
 
     def pixels_with_jacobian(self, normalised: FloatArray) -> PointMap:
-        """Return the pixels of undistorted normalised points, and the derivative.
+        """Return the pixels of undistorted normalised points, and the derivative, px.
 
         With n the point, r its distance from the axis and p = (p2, p1), Brown's model
         is ``n (gain(r^2) + 2 p n) + r^2 p``.
-
-        Parameters
-        ----------
-        normalised : (..., 2) array
-            ``(u / w, v / w)``.
-
-        Returns
-        -------
-        PointMap
-            ``points`` in px, ``jacobian`` (..., 2, 2) in px.
         """
         slopes = self._slopes
         r2 = np.einsum("...i,...i->...", normalised, normalised)
@@ -268,17 +236,9 @@ class Camera:
         return distorted
 
     def intrinsics_jacobian(self, normalised: FloatArray) -> FloatArray:
-        """Return the derivative of the pixels by the intrinsics.
+        """Return the derivative (..., 2, 4 + n) of the pixels by the `intrinsics`.
 
-        Parameters
-        ----------
-        normalised : (..., 2) array
-            Undistorted normalised points.
-
-        Returns
-        -------
-        (..., 2, 4 + n) array
-            Columns in the order of `intrinsics`.
+        It is taken at undistorted normalised points (..., 2).
         """
         x, y = normalised[..., 0], normalised[..., 1]
         r2 = x * x + y * y
@@ -313,46 +273,16 @@ class Camera:
     def unproject(self, pixels: FloatArray) -> FloatArray:
         """Return the undistorted normalised points ``(u / w, v / w)`` of pixels.
 
-        Parameters
-        ----------
-        pixels : (..., 2) array
-            px; NaN gives NaN.
-
-        Returns
-        -------
-        (..., 2) array
-
-        Raises
-        ------
-        CalibrationError
-            The distortion cannot be undone there: the coefficients fold the image.
-
-        Notes
-        -----
+        NaN gives NaN. Raises `CalibrationError` where the coefficients fold the image.
         Directions of a fisheye that are more than 88 degrees off the axis are returned
         at 88 degrees, see `sees`.
         """
         return self.unproject_with_jacobian(pixels).points
 
     def unproject_with_jacobian(self, pixels: FloatArray) -> PointMap:
-        """Return the undistorted normalised points of pixels, and the derivative.
+        """Return the undistorted normalised points of pixels, and the derivative, 1/px.
 
-        Newton's method on `pixels_with_jacobian`.
-
-        Parameters
-        ----------
-        pixels : (..., 2) array
-            px; NaN gives NaN.
-
-        Returns
-        -------
-        PointMap
-            ``points`` normalised, ``jacobian`` (..., 2, 2) in 1/px.
-
-        Raises
-        ------
-        CalibrationError
-            The distortion cannot be undone there: the coefficients fold the image.
+        Newton's method on `pixels_with_jacobian`; see `unproject`.
         """
         focal = np.array([self.fx, self.fy])
         normalised = (pixels - np.array([self.cx, self.cy])) / focal

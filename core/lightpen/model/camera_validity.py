@@ -16,17 +16,8 @@ def unmodelled_effects_of(
 ) -> tuple[Message, ...]:
     """Return why the intrinsics of a camera may no longer be valid.
 
-    Parameters
-    ----------
-    temperature_c : float, optional
-        At the station, degrees Celsius.
-    serial : str
-        Serial number of the camera in use; empty if unknown.
-
-    Returns
-    -------
-    tuple of Message
-        Nothing is said of what the file or the station leaves out.
+    The temperature is that at the station, degrees Celsius, the serial number that of
+    the camera in use. Nothing is said of what the file or the station leaves out.
     """
     doubts = []
     if camera.serial and serial and camera.serial.casefold() != serial.casefold():

@@ -91,12 +91,7 @@ def measure_coverage(rotations: FloatArray) -> Coverage:
 
 
 def posture_spread(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the spread of the pen's orientations in the camera frame.
-
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        Of cam_from_pen.
+    """Return the spread of the pen's rotations cam_from_pen (N, 3, 3).
 
     Returns
     -------
@@ -112,13 +107,7 @@ def posture_spread(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def require_spread(rotations: FloatArray) -> None:
-    """Refuse rotations (N, 3, 3) that do not determine the tip.
-
-    Raises
-    ------
-    CalibrationError
-        Says which movement is missing.
-    """
+    """Refuse rotations (N, 3, 3) that do not determine the tip, by what is missing."""
     spread, axes = posture_spread(rotations)
     if spread[0] >= MIN_SPREAD:
         return

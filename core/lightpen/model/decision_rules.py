@@ -48,10 +48,7 @@ def conformity_probability(
 ) -> float:
     """Return the probability that the true value lies within its limits.
 
-    Parameters
-    ----------
-    value, uncertainty : float
-        Measured value and its U (k = 2), in the unit of the limits.
+    The uncertainty is U (k = 2) of the measured value, both in the unit of the limits.
     """
     if not uncertainty > 0:
         return float(lower <= value <= upper)
@@ -70,14 +67,9 @@ def decide(
     upper: float = inf,
     max_risk: float = USUAL_RISK,
 ) -> Decision:
-    """Return the decision on a value with its U (k = 2).
+    """Return the decision on a value with its U (k = 2) and limits of the true value.
 
-    Parameters
-    ----------
-    lower, upper : float
-        Limits of the true value; infinite where there is none.
-    max_risk : float
-        Of accepting what does not conform, and of rejecting what does.
+    ``max_risk`` is that of accepting what does not conform, and of rejecting what does.
     """
     if rule is DecisionRule.RISK:
         p = conformity_probability(value, uncertainty, lower=lower, upper=upper)

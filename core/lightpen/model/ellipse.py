@@ -43,21 +43,11 @@ class Ellipses(NamedTuple):
 def ellipse_centers(
     camera: Camera, centers_cam: FloatArray, normals_cam: FloatArray, radius: float
 ) -> FloatArray:
-    """Return the centres of the ellipses that discs are imaged as.
+    """Return the centres (..., 2), px, of the ellipses that discs are imaged as.
 
     The centre is that of the conic in the undistorted normalised plane, distorted.
-
-    Parameters
-    ----------
-    centers_cam, normals_cam : (..., 3) array
-        Centres, mm, and unit normals of the discs in the camera frame.
-    radius : float
-        Radius of the discs, mm.
-
-    Returns
-    -------
-    (..., 2) array
-        px.
+    Centres, mm, and unit normals of the discs (..., 3) are in the camera frame; the
+    radius is in mm.
     """
     return camera.pixels(conic_centers(centers_cam, normals_cam, radius))
 
@@ -68,19 +58,8 @@ def ellipse_centers_with_jacobian(
     """Return the centres of the ellipses that discs are imaged as, and d px / d mm.
 
     The derivative is that of the projected centre: the ellipse's centre lies within
-    some 0.1 px of it and moves with it to a part in a thousand.
-
-    Parameters
-    ----------
-    centers_cam, normals_cam : (..., 3) array
-        Centres, mm, and unit normals of the discs in the camera frame.
-    radius : float
-        Radius of the discs, mm; 0 takes the projected centres.
-
-    Returns
-    -------
-    PointMap
-        ``points`` in px, ``jacobian`` (..., 2, 3) in px/mm.
+    some 0.1 px of it and moves with it to a part in a thousand. For the arguments see
+    `ellipse_centers`; a radius of 0 takes the projected centres.
     """
     conics = conic_centers(centers_cam, normals_cam, radius)
     pixels = camera.pixels_with_jacobian(conics)
@@ -95,20 +74,7 @@ def ellipse_centers_with_jacobian(
 def disc_images(
     camera: Camera, centers_cam: FloatArray, normals_cam: FloatArray, radius: float
 ) -> Ellipses:
-    """Return centre and shape of the ellipses that discs are imaged as.
-
-    Parameters
-    ----------
-    centers_cam, normals_cam : (..., 3) array
-        Centres, mm, and unit normals of the discs in the camera frame.
-    radius : float
-        Radius of the discs, mm.
-
-    Returns
-    -------
-    Ellipses
-        In px.
-    """
+    """Return centre and shape, px, of the ellipses of discs; see `ellipse_centers`."""
     conics = conic_images(centers_cam, normals_cam, radius)
     pixels = camera.pixels_with_jacobian(conics.centers)
     J = pixels.jacobian
@@ -120,12 +86,7 @@ def conic_images(
 ) -> Ellipses:
     """Return centre and shape of the conics that discs are in the normalised plane.
 
-    Parameters
-    ----------
-    centers_cam, normals_cam : (..., 3) array
-        Centres, mm, and unit normals of the discs in the camera frame.
-    radius : float
-        Radius of the discs, mm.
+    For the arguments see `ellipse_centers`.
     """
     X, n = centers_cam, normals_cam
     r2 = radius**2
@@ -143,22 +104,11 @@ def conic_images(
 def centers_from_centroids(
     camera: Camera, centroids: FloatArray, shapes: FloatArray
 ) -> FloatArray:
-    """Return the ellipse centres of discs from their area centroids.
+    """Return the ellipse centres (..., 2) of discs from their area centroids, px.
 
-    Distortion moves the centroid of an area off the distorted centre of the area by
-    a term of second order, some 0.003 px for a disc of 40 px near the image border.
-
-    Parameters
-    ----------
-    centroids : (..., 2) array
-        Area centroids, px; NaN passes through.
-    shapes : (..., 2, 2) array
-        Covariance of the area of each disc, px^2.
-
-    Returns
-    -------
-    (..., 2) array
-        px.
+    Distortion moves the centroid of an area off the distorted centre of the area by a
+    term of second order, some 0.003 px for a disc of 40 px near the image border.
+    ``shapes`` (..., 2, 2) are the covariances of the areas, px^2; NaN passes through.
     """
     known = np.isfinite(centroids).all(axis=-1) & np.isfinite(shapes).all(axis=(-1, -2))
     centers = centroids.copy()

@@ -20,11 +20,7 @@ def inverse(matrix: FloatArray) -> FloatArray:
     """Return the inverse (k, k) of a covariance or an information (k, k).
 
     By Cholesky decomposition after scaling, since the unknowns have different units.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The matrix is not positive definite.
+    Raises `numpy.linalg.LinAlgError` unless it is positive definite.
     """
     scale = 1 / np.sqrt(np.diag(matrix))
     # As scipy.linalg.cho_solve, whose import takes 0.03 s.

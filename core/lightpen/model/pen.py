@@ -129,13 +129,7 @@ class Pen:
 
 
 def grown(pen: Pen, growth: float) -> Pen:
-    """Return a pen scaled about the centroid of its LEDs.
-
-    Parameters
-    ----------
-    growth : float
-        Relative.
-    """
+    """Return a pen scaled about the centroid of its LEDs by a relative growth."""
     middle = pen.leds.mean(axis=0)
     return replace(
         pen,
@@ -145,19 +139,10 @@ def grown(pen: Pen, growth: float) -> Pen:
 
 
 def check_leds(leds: FloatArray, diameter: float) -> None:
-    """Refuse LEDs that do not determine a pose.
+    """Refuse LEDs (L, 3), mm, in any frame, that do not determine a pose.
 
-    Parameters
-    ----------
-    leds : (L, 3) array
-        LED centres in any frame, mm.
-    diameter : float
-        Diameter of the LED discs, mm.
-
-    Raises
-    ------
-    FileError
-        They are too few, in a line, too close, or not in millimetres.
+    Raises `FileError` if they are too few, in a line, too close by the diameter of
+    their discs, mm, or not in millimetres.
     """
     if not MIN_LEDS <= len(leds) <= MAX_LEDS:
         raise FileError(
@@ -183,13 +168,9 @@ def check_frame(pen: Pen) -> None:
     """Refuse a pen of the paper's layout that is not in the paper's frame.
 
     The layout is recognised from the geometry, whatever the order and the frame of the
-    LEDs. Pens of other layouts pass.
-
-    Raises
-    ------
-    FileError
-        LEDs are exchanged, an axis is mirrored, or the coordinates are in another
-        frame, such as a measuring machine's. The text names the LED and the amount.
+    LEDs. Pens of other layouts pass. Raises `FileError`, which names the LED and the
+    amount, if LEDs are exchanged, an axis is mirrored, or the coordinates are in
+    another frame, such as a measuring machine's.
     """
     slots = _layout(pen.leds)
     if slots is None:
@@ -214,24 +195,10 @@ def check_frame(pen: Pen) -> None:
 def pen_frame_from_raw(raw_leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return R, t that bring raw coordinates of the paper's pen into the pen frame.
 
-    The front plane is the least-squares plane of LEDs 5 to 10; see the module for the
-    rest of the definition.
-
-    Parameters
-    ----------
-    raw_leds : (10, 3) array
-        LED centres in any right-handed frame, mm.
-
-    Returns
-    -------
-    R : (3, 3) array
-    t : (3,) array
-        ``leds_pen = raw_leds @ R.T + t``.
-
-    Raises
-    ------
-    FileError
-        The LEDs are not of the paper's layout, out of order, or mirrored.
+    ``leds_pen = raw_leds @ R.T + t``, with ``raw_leds`` (10, 3) in any right-handed
+    frame, mm. The front plane is the least-squares plane of LEDs 5 to 10; see the
+    module for the rest of the definition. Raises `FileError` if the LEDs are not of the
+    paper's layout, out of order, or mirrored.
     """
     if raw_leds.ndim != 2 or raw_leds.shape[1] != 3:
         raise ValueError(f"`raw_leds` must have shape (10, 3), got {raw_leds.shape}.")
@@ -246,19 +213,10 @@ def pen_frame_from_raw(raw_leds: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def order_of_paper(leds: FloatArray, up: FloatArray) -> IntArray | None:
-    """Return the LEDs of the paper's layout in the order of their numbers.
+    """Return the LEDs (L, 3), mm, of the paper's layout in the order of their numbers.
 
-    Parameters
-    ----------
-    leds : (L, 3) array
-        LED centres in any right-handed frame and order, mm.
-    up : (3,) array
-        Direction from the tip to the LEDs, along which numbers grow.
-
-    Returns
-    -------
-    (10,) array of int or None
-        None for another layout.
+    They are in any right-handed frame and order; numbers grow along ``up`` (3,), the
+    direction from the tip to the LEDs. None for another layout.
     """
     slots = _layout(leds)
     if slots is None:
@@ -273,13 +231,7 @@ def order_of_paper(leds: FloatArray, up: FloatArray) -> IntArray | None:
 
 
 def in_pen_frame(raw: Pen) -> Pen:
-    """Return a pen of the paper's layout in the pen frame; see `pen_frame_from_raw`.
-
-    Parameters
-    ----------
-    raw : Pen
-        LEDs, normals and nominal tip in any right-handed frame.
-    """
+    """Return a pen of the paper's layout, in any right-handed frame, in its own."""
     return moved(raw, *pen_frame_from_raw(raw.leds))
 
 

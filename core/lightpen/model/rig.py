@@ -54,13 +54,7 @@ def rig_of(camera: Camera) -> Rig:
 
 
 def from_first(rig: Rig) -> Rig:
-    """Return a rig expressed in the frame of its first camera.
-
-    Parameters
-    ----------
-    rig : Rig
-        Its cam_from_rig is cam_from_there; it has no covariance.
-    """
+    """Return a rig without covariance, expressed in the frame of its first camera."""
     rotations = rig.rotations @ rig.rotations[0].T
     translations = rig.translations - rotations @ rig.translations[0]
     rotations[0], translations[0] = np.eye(3), 0.0  # exactly, whatever was rounded

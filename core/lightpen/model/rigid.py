@@ -18,16 +18,9 @@ TINY = 1e-200  # rad^2; added to no angle that differs from 0
 
 
 def rotation_from_vector(vectors: FloatArray) -> FloatArray:
-    """Return the rotation matrices of rotation vectors (Rodrigues' formula).
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad.
 
-    Parameters
-    ----------
-    vectors : (..., 3) array
-        Axis times angle, rad.
-
-    Returns
-    -------
-    (..., 3, 3) array
+    Rodrigues' formula.
     """
     angle_squared = np.einsum("...i,...i->...", vectors, vectors)
     half = 0.5 * np.sqrt(angle_squared + TINY)
@@ -42,18 +35,10 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray:
 
 
 def with_turns(moves: FloatArray, arms: FloatArray) -> FloatArray:
-    """Return derivatives by a rotation vector and a move, from those by a move alone.
+    """Return derivatives (..., k, 6) by a rotation vector and a move.
 
-    Parameters
-    ----------
-    moves : (..., k, 3) array
-        Derivatives of k values by the move of a point.
-    arms : (..., 3) array
-        From the centre of rotation to the point.
-
-    Returns
-    -------
-    (..., k, 6) array
+    ``moves`` (..., k, 3) are those of k values by the move of a point alone, ``arms``
+    (..., 3) lead from the centre of rotation to the point.
     """
     J = np.empty((*moves.shape[:-1], 6))
     x, y, z = (arms[..., None, k] for k in range(3))
@@ -119,17 +104,7 @@ def skew(vectors: FloatArray) -> FloatArray:
 
 
 def nearest_rotation(matrices: FloatArray) -> FloatArray:
-    """Return the rotations nearest to matrices in the Frobenius norm.
-
-    Parameters
-    ----------
-    matrices : (..., 3, 3) array
-
-    Returns
-    -------
-    (..., 3, 3) array
-        Rotations, determinant +1.
-    """
+    """Return the rotations nearest to matrices (..., 3, 3) in the Frobenius norm."""
     U, _, Vt = np.linalg.svd(matrices)
     sign = np.linalg.det(U @ Vt)
     U[..., :, 2] *= sign[..., None]

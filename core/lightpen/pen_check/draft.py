@@ -112,13 +112,7 @@ class PenDraft:
         )
 
     def pen(self) -> Pen:
-        """Return the unchecked pen.
-
-        Raises
-        ------
-        FileError
-            A cell holds no number, or a normal or the diameter cannot be one.
-        """
+        """Return the unchecked pen; raise `FileError` for a cell that cannot be one."""
         for flaw in self.flaws():
             raise FileError(flaw.message)
         cells = np.array([[float(_pointed(c)) for c in row] for row in self.rows])
@@ -175,13 +169,7 @@ class DraftCheck:
 
 
 def check_draft(draft: PenDraft, pen: Pen | None = None) -> DraftCheck:
-    """Check a draft.
-
-    Parameters
-    ----------
-    pen : Pen, optional
-        Original pen of an unmodified draft, which shows fewer digits.
-    """
+    """Check a draft; an unmodified one shows fewer digits than the original pen."""
     if not draft.rows:
         return DraftCheck()
     try:
@@ -240,18 +228,11 @@ def exchanged(
 
 
 def mended(draft: PenDraft, finding: Finding) -> PenDraft:
-    """Return a draft with a finding of live images corrected.
+    """Return a draft with a finding of live images that `can_be_mended` corrected.
 
     Coordinates that two LEDs have of each other are exchanged, and an LED off its place
     is put where the images show it. Where either of two coordinates can be exchanged,
     that is chosen which leaves the LEDs in the pen frame.
-
-    Parameters
-    ----------
-    draft : PenDraft
-        Draft of the compared pen, in the same frame.
-    finding : Finding
-        One that `can_be_mended`.
     """
     if finding.what is not MatchFinding.EXCHANGED:
         return _put_in_place(draft, finding)
@@ -313,12 +294,6 @@ def open_pen(path: Path, units: str | None = None) -> OpenedPen:
 
 
 def save_pen(pen: Pen, path: Path) -> PenFile:
-    """Write a pen and return it as the file that is now in use.
-
-    Raises
-    ------
-    FileError
-        It cannot be written; what was there before is unchanged.
-    """
+    """Write a pen and return it as the file that is now in use."""
     write_pen(pen, path)
     return PenFile.read(path)

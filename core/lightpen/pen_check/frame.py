@@ -106,11 +106,6 @@ def moved_into_frame(pen: Pen) -> Pen:
 
     Discs that all face +z in raw coordinates were given no normals; they then face the
     viewer.
-
-    Raises
-    ------
-    FileError
-        The LEDs do not define the frame.
     """
     moved = in_pen_frame(pen)
     if np.all(pen.normals == [0.0, 0.0, 1.0]):

@@ -140,13 +140,7 @@ def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:
 
 
 def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
-    """Compare a pen with views of it.
-
-    Parameters
-    ----------
-    pen : Pen
-        One that `lightpen.model.pen.check_leds` passes.
-    """
+    """Compare a pen that `lightpen.model.pen.check_leds` passes with views of it."""
     labels = label_images(views, camera, pen, MODERATE)
     found = [
         i

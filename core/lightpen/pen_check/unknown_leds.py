@@ -44,13 +44,7 @@ class UnknownLeds:
 def find_unknown_leds(
     camera: Camera, poses: Poses, pixels: Sequence[FloatArray]
 ) -> UnknownLeds:
-    """Find points on the pen by the spots left over.
-
-    Parameters
-    ----------
-    pixels : sequence of N arrays (K, 2)
-        Spots of each view that are no LED, px.
-    """
+    """Find points on the pen by the spots (K, 2) of each view that are no LED, px."""
     n_views = len(pixels)
     left = _padded(pixels)
     points: list[FloatArray] = []

@@ -102,10 +102,7 @@ def _window(
 def held_light(camera: Camera, board: Board, number: int) -> FloatArray:
     """Return the light of a board that an operator holds, as `render_board`.
 
-    Parameters
-    ----------
-    number : int
-        Of the pose; all differ, until they are repeated.
+    The poses are numbered; all differ, until they are repeated.
     """
     poses = _held_poses(camera, board)
     at = number % len(poses.rotations)

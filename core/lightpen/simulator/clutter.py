@@ -20,13 +20,7 @@ BLOB_CORNERS = 9
 def random_lamps(
     camera: Camera, discs: Ellipses, rng: np.random.Generator
 ) -> tuple[Lamp, ...]:
-    """Return one to four stray lamps clear of the LEDs, often one between them.
-
-    Parameters
-    ----------
-    discs : Ellipses
-        The L discs in the image, px.
-    """
+    """Return one to four stray lamps clear of L discs, px, often one between them."""
     lamps = []
     radius = _reaches(discs).mean()
     if rng.random() < BETWEEN_CHANCE:
@@ -45,13 +39,7 @@ def random_lamps(
 def random_glares(
     camera: Camera, discs: Ellipses, rng: np.random.Generator
 ) -> tuple[Glare, ...]:
-    """Return up to two ragged reflections and sometimes a bright window.
-
-    Parameters
-    ----------
-    discs : Ellipses
-        The L discs in the image, px.
-    """
+    """Return up to two ragged reflections and sometimes a bright window."""
     glares = []
     for _ in range(rng.integers(3)):
         length = _reaches(discs).mean() * rng.uniform(1, 6)
@@ -67,13 +55,7 @@ def random_glares(
 
 
 def random_finger(discs: Ellipses, rng: np.random.Generator) -> Finger:
-    """Return a finger that hides one LED, or part of it, from the side of the pen.
-
-    Parameters
-    ----------
-    discs : Ellipses
-        The L discs in the image, px.
-    """
+    """Return a finger that hides one disc, or part of it, from the side of the pen."""
     reach = _reaches(discs).mean()
     radius = reach * rng.uniform(1.0, 1.7)
     target = discs.centers[rng.integers(len(discs.centers))]

@@ -81,19 +81,8 @@ def disc_contours(
 ) -> Contours:
     """Return the imaged contours of discs, moving or not.
 
-    Parameters
-    ----------
-    centers_cam, normals_cam : (S, N, 3) array
-        Centres, mm, and unit normals of N discs in the camera frame at S times.
-    radius : float
-        Of the discs, mm.
-    sigma : float
-        Gaussian blur they are to be seen with, px.
-
-    Returns
-    -------
-    Contours
-        Of N outlines.
+    Centres, mm, and unit normals (S, N, 3) of N discs are in the camera frame at S
+    times, the radius in mm; sigma is the Gaussian blur they are to be seen with, px.
     """
     n_times = len(centers_cam)
     longest = 2 * np.pi * camera.fx * radius / centers_cam[..., 2].min()
@@ -114,21 +103,8 @@ def ellipse_contour(
 ) -> Contours:
     """Return the contour of one ellipse in the image.
 
-    Parameters
-    ----------
-    center : (2,) array
-        px.
-    semi_axes : tuple of float
-        px.
-    angle : float
-        Of the first semi-axis from the image's x axis, rad.
-    sigma : float
-        Gaussian blur it is to be seen with, px.
-
-    Returns
-    -------
-    Contours
-        Of one outline.
+    Centre (2,), semi-axes and the Gaussian blur sigma are in px; the angle is that of
+    the first semi-axis from the image's x axis, rad.
     """
     angles = _node_angles(2 * np.pi * max(semi_axes), sigma)
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -141,19 +117,8 @@ def ellipse_contour(
 def blurred_insides(contours: Contours, sigma: float, margin: int = 0) -> list[Patch]:
     """Return the blurred, pixel-integrated inside of each outline.
 
-    Parameters
-    ----------
-    contours : Contours
-        N outlines.
-    sigma : float
-        Of the Gaussian blur, px.
-    margin : int
-        Dark pixels to add all round.
-
-    Returns
-    -------
-    list of Patch
-        N of them.
+    Sigma of the Gaussian blur is in px, ``margin`` the number of dark pixels to add all
+    round.
     """
     reach = REACH * sigma + 1 + margin
     lows = np.floor(contours.nodes.min(axis=1, initial=np.inf) - reach)

@@ -48,14 +48,9 @@ class HotSpot:
     def brightness(
         self, u: LightArray, v: LightArray, towards: FloatArray
     ) -> LightArray:
-        """Return the brightness of points of a disc of radius 1.
+        """Return the brightness of points u, v of a disc of radius 1, in its axes.
 
-        Parameters
-        ----------
-        u, v : float32 array
-            Points in the axes of the disc.
-        towards : (3,) array
-            Unit vector to the camera, in these axes and the normal.
+        ``towards`` (3,) is the unit vector to the camera, in these axes and the normal.
         """
         x, y = self.place
         squares = (u - x) ** 2 + (v - y) ** 2

@@ -182,10 +182,7 @@ class Operator:
     def touch(self, place: FloatArray) -> None:
         """Put the tip on a place and hold it still.
 
-        Parameters
-        ----------
-        place : (3,) array
-            From the bottom of the cone in the camera frame, mm.
+        The place is from the bottom of the cone in the camera frame, mm.
         """
         self._wish(partial(self._put, place))
         self.hold()
@@ -209,48 +206,20 @@ class Operator:
         self._wish(self._aim_here)
 
     def lean_towards(self, tilt: float, direction: float, turn: float) -> None:
-        """Tilt the pen to a posture with human dynamics.
-
-        Parameters
-        ----------
-        tilt, direction, turn : float
-            rad.
-        """
+        """Tilt the pen to a posture, angles in rad, with human dynamics."""
         goal = lean_vectors(tilt, direction, turn)
         self._wish(partial(self._aim, goal, GUIDED), delay=REACTION)
 
     def lean(self, tilt: float, direction: float, turn: float) -> None:
-        """Follow the mouse.
-
-        Parameters
-        ----------
-        tilt, direction, turn : float
-            rad.
-        """
+        """Follow the mouse to a posture, angles in rad."""
         self._wish(partial(self._aim, lean_vectors(tilt, direction, turn), MOUSE))
 
     def slip(self, distance: float, seconds: float) -> None:
-        """Let the tip slip out of the bottom of the cone.
-
-        Parameters
-        ----------
-        distance : float
-            mm, in a random direction.
-        seconds : float
-            After which it slips back.
-        """
+        """Let the tip slip out of the cone by a distance, mm, for some seconds."""
         self._wish(partial(self._slip, distance, seconds))
 
     def cover(self, seconds: float = inf, leds: Collection[int] | None = None) -> None:
-        """Cover LEDs by a hand.
-
-        Parameters
-        ----------
-        seconds : float
-            After which the hand goes away.
-        leds : collection of int, optional
-            Their numbers, from 1; all unless given.
-        """
+        """Cover LEDs, by their numbers from 1 or all, by a hand for some seconds."""
         hidden = self._all_leds if leds is None else frozenset(leds)
         if not hidden <= self._all_leds:
             raise ValueError(
@@ -263,12 +232,9 @@ class Operator:
         self._wish(self._uncover, moves=False)
 
     def held(self, times: FloatArray) -> HandPose:
-        """Return the pose of the pen; times must not decrease between calls.
+        """Return the pose of the pen at times (F,), s, that never decrease.
 
-        Parameters
-        ----------
-        times : (F,) array
-            By the clock, s, over no more than 0.15 s.
+        They are over no more than 0.15 s.
         """
         with self._lock:
             self._advance(int(np.floor(times.max() / STEP)) + 1)

@@ -101,13 +101,7 @@ class ScenePlan:
 
 
 def plan_scene(scene: Scene) -> ScenePlan:
-    """Draw everything random of a scene but the noise.
-
-    Returns
-    -------
-    ScenePlan
-        The same for the same scene.
-    """
+    """Draw everything random of a scene but the noise; always the same."""
     rig = rig_of(scene.camera)
     return plan_rig(scene, rig)[0]
 
@@ -115,17 +109,8 @@ def plan_scene(scene: Scene) -> ScenePlan:
 def plan_rig(scene: Scene, rig: Rig) -> tuple[ScenePlan, ...]:
     """Draw everything random that several cameras see at once, but the noise.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its ``camera`` stands for the middle of the rig.
-    rig : Rig
-        cam_from_rig from that middle.
-
-    Returns
-    -------
-    tuple of ScenePlan
-        Of each camera, in its own frame.
+    The camera of the scene stands for the middle of the rig, from which cam_from_rig
+    is; each plan is in the frame of its camera.
     """
     rng = _stream(scene, _SWING)
     stands = list(zip(rig.cameras, rig.rotations, rig.translations, strict=True))
@@ -227,13 +212,7 @@ def _share(scene: Scene, index: int) -> float:
 
 
 def camera_turn(scene: Scene, share: float) -> FloatArray:
-    """Return the rotation of the camera of a scene, (3, 3).
-
-    Parameters
-    ----------
-    share : float
-        Fraction of the whole rotation.
-    """
+    """Return a share of the rotation of the camera of a scene, (3, 3)."""
     right, down = scene.camera_turn * share * np.array(TURN) / scene.camera.fx
     return rotation_from_vector(np.array([-down, right, 0.0]))
 

@@ -58,14 +58,9 @@ def pursue(
     goal_rate: FloatArray,
     pursuit: TrackingMotion,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position and rate of a hand after one `STEP`.
+    """Return position and rate of a hand after one `STEP`, as it goes after a goal.
 
-    Parameters
-    ----------
-    place, rate : (3,) array
-        Now, rad and rad/s, or mm and mm/s.
-    goal, goal_rate : (3,) array
-        What it goes after, and how that moves.
+    All are (3,), rad and rad/s, or mm and mm/s.
     """
     wish = pursuit.gain * (goal - place)
     speed = float(np.linalg.norm(wish))
@@ -78,12 +73,8 @@ def pursue(
 def swing_at(seed: int, step: int) -> tuple[FloatArray, FloatArray]:
     """Return the lean of an endless swing and its rate, (3,) each, rad and rad/s.
 
-    Parameters
-    ----------
-    seed : int
-        Chooses the swing, see `lightpen.simulator.postures.operator_postures`.
-    step : int
-        `STEP` s each, from the start of the clock.
+    The seed chooses the swing, see `lightpen.simulator.postures.operator_postures`; a
+    step is `STEP` s from the start of the clock.
     """
     block, i = divmod(step, STEPS_PER_PIECE)
     leans = _swing_block(seed, block)

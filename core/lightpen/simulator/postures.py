@@ -102,18 +102,11 @@ def draw_postures(n: int, rng: np.random.Generator, kind: SwingKind) -> Postures
 
 
 def operator_postures(times: FloatArray, seed: int = 0) -> Postures:
-    """Return the postures of the pen in an operator's hand at given times.
+    """Return the postures of the pen in an operator's hand at times (F,), s.
 
     The pen goes round the cone in some seven seconds while its tilt and roll vary at
     rates of their own; the hand trembles by `TREMOR`. A smooth function of time: the
     same seed continues the same movement.
-
-    Parameters
-    ----------
-    times : (F,) array
-        Seconds.
-    seed : int
-        Chooses the movement.
     """
     rng = np.random.default_rng(seed)
     phases = rng.uniform(0, 2 * np.pi, 3)

@@ -112,17 +112,9 @@ def led_levels(
 def hidden_fraction(
     camera: Camera, outline: FloatArray, fingers: Sequence[Finger]
 ) -> float:
-    """Return the fraction of an outline's area that fingers or the border hide.
+    """Return the fraction of the area of an outline (N, 2), px, that is hidden.
 
-    Parameters
-    ----------
-    outline : (N, 2) array
-        px.
-
-    Returns
-    -------
-    float
-        To about 0.002 for discs of 40 px.
+    Fingers or the border hide it. To about 0.002 for discs of 40 px.
     """
     top_left = np.floor(outline.min(axis=0)).astype(int) - 1
     right, bottom = np.ceil(outline.max(axis=0)).astype(int) + 2

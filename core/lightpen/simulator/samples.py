@@ -64,14 +64,9 @@ SAMPLE_PENS: dict[str, Callable[[], Pen]] = {
 
 
 def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
-    """Return cameras in a row about the paper's camera position.
+    """Return 2 to 4 cameras in a row about the paper's camera position.
 
-    Parameters
-    ----------
-    n_cameras : int
-        2 to 4.
-    baseline : float
-        From the first to the last, mm.
+    The baseline is from the first to the last, mm.
     """
     u, _, w = PAPER_CONE
     places = np.linspace(-baseline / 2, baseline / 2, n_cameras)
@@ -89,13 +84,7 @@ def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
 
 
 def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
-    """Return the rig of a camera and another to its right, which sees the cone alike.
-
-    Parameters
-    ----------
-    cone_cam : (3,) array
-        Before the camera, mm.
-    """
+    """Return the rig of a camera and one to its right that sees the cone alike."""
     u, _, w = cone_cam
     turn = np.array([0.0, np.arctan2(u, w) - np.arctan2(u - BASELINE, w), 0.0])
     R = rotation_from_vector(turn)

@@ -61,23 +61,10 @@ def write_scene(
 ) -> FloatArray:
     """Write a simulated set: ``camera.yaml``, ``leds.csv``, ``images``, ``truth.json``.
 
-    Parameters
-    ----------
-    folder : Path
-        Created if it is missing.
-    report : callable, optional
-        Called with the fraction done; what it raises stops the writing.
-
-    Returns
-    -------
-    (3,) array
-        The true tip in the frame in which the LEDs of ``leds.csv`` fit the true ones
-        best, mm.
-
-    Raises
-    ------
-    FileError
-        The folder is not empty, or something cannot be written.
+    ``report`` is called with the fraction done; what it raises stops the writing.
+    Returns the true tip (3,), mm, in the frame in which the LEDs of ``leds.csv`` fit
+    the true ones best. Raises `FileError` if the folder is not empty or cannot be
+    written.
     """
     images = folder / "images"
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
@@ -95,28 +82,11 @@ def write_scene(
 def write_rig_scene(
     scene: Scene, rig: Rig, folder: Path, report: Callable[[float], None] | None = None
 ) -> FloatArray:
-    """Write the images of a swing by several cameras, one folder each.
+    """Write the images of a swing by several cameras; see `write_scene`.
 
-    Beside these a camera file for each, ``rig.json``, ``leds.csv``, ``truth.json``.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its camera stands for the middle of the rig.
-    rig : Rig
-        cam_from_rig from that middle, with the covariance that its file states.
-    folder, report
-        As for `write_scene`.
-
-    Returns
-    -------
-    (3,) array
-        As `write_scene`.
-
-    Raises
-    ------
-    FileError
-        As `write_scene`.
+    One folder for each camera, and a camera file beside it; ``rig.json``, ``leds.csv``,
+    ``truth.json``. The scene's camera stands for the middle of the rig, from which
+    cam_from_rig is, with the covariance that its file states.
     """
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
     _make_folders(folder, *(folder / name for name in rig.names))

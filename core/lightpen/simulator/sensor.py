@@ -63,13 +63,7 @@ class Sensor:
 
 
 def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
-    """Return the image that a sensor reads.
-
-    Returns
-    -------
-    (H, W) array
-        uint8 for 8 bits, else uint16.
-    """
+    """Return the image (H, W) that a sensor reads, uint8 for 8 bits, else uint16."""
     if light.gradient != (0.0, 0.0):
         return _read_uneven(light, sensor, rng)
     image = _dark_image(light.background, sensor, light.levels.size, rng)
@@ -82,13 +76,7 @@ def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
 
 
 def quantize(light: Light, sensor: Sensor) -> Image:
-    """Return the image without noise.
-
-    Returns
-    -------
-    (H, W) array
-        uint8 for 8 bits, else uint16.
-    """
+    """Return the image without noise, as `expose`."""
     charges = (light.levels + _background(light)) * np.float32(sensor.full_well)
     return _digits(charges, sensor)
 

@@ -65,13 +65,7 @@ MEASURED_AT = 20.0  # degrees C
 
 
 def paper_camera(binning: int = 1) -> Camera:
-    """Return the paper's camera: 5 megapixels, 4638 px focal length.
-
-    Parameters
-    ----------
-    binning : int
-        So many pixels in a row, and in a column, are read out as one.
-    """
+    """Return the paper's camera: 5 megapixels, 4638 px focal length, or binned."""
     shift = (binning - 1) / 2  # pixel (0, 0) is the centre of the first one
     return Camera(
         width=2448 // binning,
@@ -105,13 +99,7 @@ def paper_pen() -> Pen:
 
 
 def flat_pen(name: str, leds: Sequence[tuple[float, float, float]]) -> Pen:
-    """Return a pen whose discs all face +z, with the paper's nominal tip.
-
-    Parameters
-    ----------
-    leds : sequence of tuple
-        Centre of each LED, mm.
-    """
+    """Return a pen with LEDs, mm, that all face +z, and the paper's nominal tip."""
     return Pen(
         leds=np.array(leds, dtype=np.float64),
         normals=np.tile([0.0, 0.0, 1.0], (len(leds), 1)),
@@ -203,12 +191,7 @@ def swing_from_postures(
 ) -> Swing:
     """Return the swing of given postures, with the tip in the cone.
 
-    Parameters
-    ----------
-    tip_pen, cone_cam : (3,) array
-        mm.
-    tips_cam : (F, 3) array, optional
-        Where the tip is in each frame, mm; in the cone unless given.
+    The tip in each frame, ``tips_cam`` (F, 3), mm, may be given instead.
     """
     rotations = postures.rotations
     if tips_cam is None:
@@ -236,14 +219,9 @@ def slip_tip(
     distances: FloatArray | float,
     rng: np.random.Generator,
 ) -> Swing:
-    """Return the swing with the tip out of the cone in some frames.
+    """Return the swing with the tip out of the cone in the frames of a mask (F,).
 
-    Parameters
-    ----------
-    frames : (F,) bool array
-        Frames that slip.
-    distances : (F,) array or float
-        How far from the bottom of the cone, mm, in a random direction.
+    It is off the bottom of the cone by the distances, mm, in a random direction.
     """
     directions = rng.standard_normal(swing.tips_cam.shape)
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
@@ -264,22 +242,11 @@ def simulate_centers(
     sigma: float,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Return measured centres of the LEDs, without rendering an image.
+    """Return measured centres (F, L, 2) of the LEDs, px, without rendering an image.
 
-    The exact centre of each disc's elliptic image plus independent Gaussian noise. LEDs
-    that face away or lie outside the image are missing.
-
-    Parameters
-    ----------
-    rotations, translations : (F, 3, 3) and (F, 3) array
-        cam_from_pen; mm.
-    sigma : float
-        Standard deviation per coordinate, px.
-
-    Returns
-    -------
-    (F, L, 2) array
-        px; NaN where missing.
+    The exact centre of each disc's elliptic image plus independent Gaussian noise,
+    sigma px per coordinate. LEDs that face away or lie outside the image are NaN. The
+    poses cam_from_pen are rotations (F, 3, 3) and translations (F, 3), mm.
     """
     leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
     centers = ellipse_centers(camera, leds_cam, normals_cam, pen.diameter / 2)
@@ -305,19 +272,10 @@ def faces_camera(leds_cam: FloatArray, normals_cam: FloatArray) -> BoolArray:
 def edge_gaps(
     camera: Camera, pen: Pen, rotations: FloatArray, translations: FloatArray
 ) -> FloatArray:
-    """Return a lower bound of the narrowest gap between two discs of each frame.
+    """Return a lower bound (F,) of the narrowest gap between two discs, px.
 
-    Each disc reaches as far as its semi-major axis in every direction.
-
-    Parameters
-    ----------
-    rotations, translations : (F, 3, 3) and (F, 3) array
-        cam_from_pen; mm.
-
-    Returns
-    -------
-    (F,) array
-        px; negative where discs may overlap.
+    Each disc reaches as far as its semi-major axis in every direction; discs may
+    overlap where it is negative. For the arguments see `simulate_centers`.
     """
     leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
     centers, shapes = disc_images(camera, leds_cam, normals_cam, pen.diameter / 2)

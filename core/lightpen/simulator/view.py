@@ -171,24 +171,12 @@ def moving_poses(
     turn: FloatArray,
     n_times: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the poses of a pen that turns about a point during the exposure.
+    """Return S poses, (S, 3, 3) and (S, 3), of a pen that turns during the exposure.
 
-    Parameters
-    ----------
-    rotation, translation : (3, 3) and (3,) array
-        cam_from_pen at mid-exposure; mm.
-    pivot_pen : (3,) array
-        Point of the pen that stays, mm.
-    turn : (3,) array
-        Rotation vector of the whole exposure in the camera frame, rad.
-    n_times : int
-        Poses wanted: enough that the LEDs move no more than the blur between two.
-
-    Returns
-    -------
-    rotations : (S, 3, 3) array
-    translations : (S, 3) array
-        mm.
+    It turns about the point ``pivot_pen`` (3,), mm, from the pose cam_from_pen at
+    mid-exposure; ``turn`` (3,) is the rotation vector of the whole exposure in the
+    camera frame, rad. ``n_times`` poses suffice if the LEDs move no more than the blur
+    between two.
     """
     parts = (np.arange(n_times) + 0.5) / n_times - 0.5
     rotations = rotation_from_vector(parts[:, None] * turn) @ rotation

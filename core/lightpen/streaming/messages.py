@@ -63,14 +63,8 @@ def pose_messages(
 ) -> bytes:
     """Return the messages of a detected pose and its tip position.
 
-    Parameters
-    ----------
-    tip : StreamedTip or None
-        None without a current tip: only the pose is sent.
-    number : int
-        Number of the image.
-    at : float
-        Time of exposure, s since 1970 (UTC).
+    Without a current tip only the pose is sent, with the number of the image and its
+    time of exposure, s since 1970 (UTC).
     """
     basic = {"Image": str(number), "Units": "mm rad"}
     sigma = detection.sigma if tip is None else _sigma(detection, tip.instrument)

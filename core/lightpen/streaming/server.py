@@ -182,13 +182,7 @@ class PoseStream:
         return self._status.n_clients > 0
 
     def open(self, place: StreamPlace) -> None:
-        """Start listening at this address only.
-
-        Raises
-        ------
-        StreamError
-            The address or port cannot be used.
-        """
+        """Listen at this address only; raise `StreamError` if it cannot be used."""
         self.close()
         if find_spec("pyigtl") is None:
             raise StreamError("stream.no-package")

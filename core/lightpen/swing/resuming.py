@@ -124,12 +124,7 @@ def _shows(record: Record, pen: Pen, rig: Rig) -> bool:
 def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingState:
     """Return an interrupted swing with all images that its record acknowledged.
 
-    Parameters
-    ----------
-    setup : SwingSetup
-        Of the record's own camera and pen.
-    time : float
-        s.
+    The setup has the record's own camera and pen.
     """
     images = record.used_images
     kept = kept_before(

@@ -75,17 +75,10 @@ class SwingRunner:
     ) -> None:
         """Process an image; returns when it is done.
 
-        Parameters
-        ----------
-        detection : PenDetection or None
-            Detection in the image; None if the image has the wrong size.
-        setup : SwingSetup, optional
-            Setup of the detection; images of another swing are ignored.
-        n_images : int, optional
-            Length of the recording, which is replayed in a loop; the swing ends with
-            the last image.
-        stats : Stats, optional
-            Counters of the camera at this image.
+        The detection is None if the image has the wrong size; images of another setup
+        are ignored. A recording of ``n_images``, which is replayed in a loop, ends the
+        swing with its last image. ``stats`` are the counters of the camera at this
+        image.
         """
         self._queue.ask_and_wait(
             lambda: self._workflow.take(frame, detection, setup, n_images, stats)

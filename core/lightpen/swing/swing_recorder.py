@@ -44,36 +44,13 @@ def capture_image(
     rule: Rule | None = None,
     others: Sequence[SecondaryView] = (),
 ) -> Transition:
-    """Take one image into a swing.
+    """Take one image, with its detection, into a swing whose record is written.
 
-    Parameters
-    ----------
-    writer : RecordWriter
-        Writer of the swing's record.
-    image : (H, W) array
-        Grey image of the camera's size, 8 or 16 bit.
-    detection : PenDetection
-        Detection in the image.
-    time : float
-        When it was taken, s.
-    device_time_ns : int, optional
-        Time stamp of the camera, ns.
-    stats : Stats, optional
-        What became of the camera's images since the swing began.
-    rule : Rule, optional
-        How the image changes the swing; by default the rule for live images.
-    others : sequence of SecondaryView, optional
-        Simultaneous images of the other cameras of a rig.
-
-    Returns
-    -------
-    Transition
-        An image that is kept is on the disk by now.
-
-    Raises
-    ------
-    FileError
-        The image could not be recorded; ``state`` and the record go without it.
+    ``rule`` is how it changes the swing, by default that for live images; ``stats`` are
+    the counters of the camera since the swing began, ``others`` the simultaneous images
+    of the other cameras of a rig. An image that is kept is on the disk when this
+    returns. Raises `FileError` if it could not be recorded; ``state`` and the record go
+    without it.
     """
     if state.next_number != writer.next_number:
         raise ValueError(
@@ -109,21 +86,9 @@ def take_recorded_image(
     *,
     is_known: bool = False,
 ) -> Transition:
-    """Take the next recorded image; the last one ends the capture.
+    """Take the next recorded image, read at a time, s; the last one ends the capture.
 
-    Parameters
-    ----------
-    time : float
-        When it is read, s.
-    n_images : int
-        Number of images in the recording.
-    is_known : bool
-        Whether it was taken before the swing was interrupted.
-
-    Returns
-    -------
-    Transition
-        As `lightpen.swing.capture.rules.advance_swing` returns it.
+    A known image was taken before the swing was interrupted.
     """
     state = replace(_further(state, n_images), time=time)
     events: tuple[SwingEvent, ...] = ()
@@ -224,11 +189,6 @@ class SwingRecorder:
 
         `n_images` are those of the recording that the image is of. None for an image
         that is not of this swing.
-
-        Raises
-        ------
-        LightpenError
-            If the image cannot be stored.
         """
         if stats is not None:
             self._counters = self._counters.after(stats)

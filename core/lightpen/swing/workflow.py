@@ -576,12 +576,8 @@ class SwingWorkflow:
     def accept(self, reason: str = "", signature: Signature | None = None) -> None:
         """Accept the tip, or report why it cannot be; the previous one then stays.
 
-        Parameters
-        ----------
-        reason : str
-            Reason for accepting the result despite findings.
-        signature : Signature, optional
-            Signature of a supervisor, if one is required.
+        A reason is needed to accept it despite findings, a signature where there are
+        supervisors.
         """
         self._faults.trying(lambda: self._store(reason, signature))
 
@@ -613,12 +609,7 @@ class SwingWorkflow:
     ) -> None:
         """Revoke a result in favour of the one before, or report why not.
 
-        Parameters
-        ----------
-        reason : str
-            In the words of the operator.
-        signature : Signature, optional
-            Signature of a supervisor, if one is required.
+        The reason is in the words of the operator.
         """
         self._faults.trying(lambda: self._withdraw(result, operator, reason, signature))
 

@@ -69,12 +69,7 @@ class VerificationRunner:
     ) -> None:
         """Take an image, and return when it is processed.
 
-        Parameters
-        ----------
-        detection : PenDetection or None
-            Detection in the image; None if the image has the wrong size.
-        region : RegionOfInterest
-            Region searched in this image; images searched for another region are
-            ignored.
+        The detection is None if the image has the wrong size; images searched for
+        another region are ignored.
         """
         self._queue.ask_and_wait(lambda: self._workflow.take(frame, detection, region))

@@ -239,13 +239,9 @@ class VerificationWorkflow:
     def read(self, task: AnyTask, place: str, *, is_still: bool) -> None:
         """Do a task with recorded images; a drift reference counts in it.
 
-        Parameters
-        ----------
-        place : str
-            A folder, pattern, video or record; or a folder of such folders, one a run.
-        is_still : bool
-            Whether the pen is held still through the images of a touch; else each
-            image is a touch.
+        The place is a folder, pattern, video or record; or a folder of such folders,
+        one a run. The pen is held still through the images of a touch, or each image is
+        a touch.
         """
         tip, setup, state = self._status.tip, self._status.setup, self._status.state
         if self._task.is_there or tip is None or setup is None or state is None:

@@ -74,11 +74,6 @@ def own_chain(database: Database) -> str:
     """Return the own chain of a database; it begins with the first call.
 
     With it begins its station key.
-
-    Raises
-    ------
-    ArchiveError
-        The database cannot be used, or the key not be stored.
     """
     with database.writing() as connection:
         chain = connection.execute(_AT_HOME).scalar_one_or_none()
@@ -106,12 +101,8 @@ def append(
 
     When this returns, the entry is kept whatever happens next; when it raises, or is
     killed, it is kept whole or not at all. Of two programs that enter the same result
-    file, or that the same swing was abandoned, one does; the other gets None.
-
-    Parameters
-    ----------
-    record : str, optional
-        Record as JSON; the event contains its hash.
+    file, or that the same swing was abandoned, one does; the other gets None. The event
+    contains the hash of the record, which is JSON.
     """
     with database.writing() as connection:
         if _is_entered(connection, chain, event):
@@ -134,13 +125,9 @@ def copy_entries(
 ) -> CopyResult:
     """Let the copy of a chain grow by entries, in their order; known ones are passed.
 
-    The own chain of the database grows by `append` alone.
-
-    Raises
-    ------
-    ArchiveError
-        They do not continue the copy, are not signed by the station of the
-        chain, are beyond the head of the own chain, or the copy says otherwise.
+    The own chain of the database grows by `append` alone. Raises `ArchiveError` if they
+    do not continue the copy, are not signed by the station of the chain, are beyond the
+    head of the own chain, or the copy says otherwise.
     """
     with database.writing() as connection:
         if _is_server(connection):
@@ -167,11 +154,8 @@ def adopt_entries(
 ) -> None:
     """Let the own chain here grow by entries that this folder lost.
 
-    Raises
-    ------
-    ArchiveError
-        They do not continue the chain, are not signed by its station, or
-        the own chain is another one.
+    Raises `ArchiveError` if they do not continue the chain, are not signed by its
+    station, or the own chain is another one.
     """
     empty = delete(CHAINS).where(
         CHAINS.c.is_own, CHAINS.c.number == 0, CHAINS.c.chain != chain
@@ -230,13 +214,7 @@ def note_delivered(database: Database, chain: str, number: int) -> None:
 
 
 def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[StoredEntry]:
-    """Yield the entries of a chain in their order.
-
-    Parameters
-    ----------
-    after : int
-        Number of the entry before the first.
-    """
+    """Yield the entries of a chain after that of a number, in their order."""
     while True:
         batch = batch_of(database, chain, after)
         yield from batch
@@ -347,13 +325,7 @@ def columns_of(entry: StoredEntry) -> dict[str, Any]:
 
 
 def sound_entry(row: Row[Any]) -> StoredEntry | None:
-    """Return the entry in a row, unless anything in the row was changed.
-
-    Parameters
-    ----------
-    row : Row
-        Row with all columns of an entry.
-    """
+    """Return the entry in a row with all columns, unless anything in it was changed."""
     columns = {column.name: row._mapping[column] for column in ENTRIES.c}
     if not isinstance(columns["text"], str):
         return None
@@ -537,13 +509,7 @@ def _named_entry(entry: StoredEntry) -> Message:
 
 
 def read_row(database: Database, row: Row[Any]) -> StoredEntry:
-    """Return the entry in a row with the columns `READ`.
-
-    Raises
-    ------
-    ArchiveError
-        It is damaged, or was changed since it was entered.
-    """
+    """Return the entry in a row with the columns `READ`; refuse a changed one."""
     damaged = ArchiveError(
         "archive.entry-damaged", number=row.number, archive=database.name
     )

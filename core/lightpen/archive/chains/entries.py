@@ -222,13 +222,7 @@ def written(entry: Entry) -> StoredEntry:
 
 
 def read_entry(text: str, signature: str = "") -> StoredEntry:
-    """Return the entry that a text holds, with the signature kept beside it.
-
-    Raises
-    ------
-    DamagedError
-        It holds none, or was not written so.
-    """
+    """Return an entry with its signature, or raise `DamagedError`."""
     try:
         data = text.encode("utf-8", "surrogateescape")
     except UnicodeEncodeError as error:  # half of a character

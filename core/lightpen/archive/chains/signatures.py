@@ -31,19 +31,9 @@ _LENGTH = 192
 
 
 def entry_signature(head: ChainHead, event: Event, sha256: str) -> str:
-    """Return the signature of an entry.
+    """Return the signature of an entry with a hash, by the chain before it.
 
-    Parameters
-    ----------
-    head : ChainHead
-        Of the chain before the entry.
-    sha256 : str
-        Of the entry.
-
-    Raises
-    ------
-    ArchiveError
-        The key cannot be read, or is not in this user account.
+    Raises `ArchiveError` if the key cannot be read or is not in this user account.
     """
     introduced = event.settings.get(STATION_KEY) if event.kind is Kind.LIMITS else None
     name = head.chain if not head.key else chain_of(head.key)

@@ -60,14 +60,10 @@ class ArchiveCheckResult:
 def check_archive(
     database: Database, data: Path | None = None, report: Report = lambda fraction: None
 ) -> ArchiveCheckResult:
-    """Check every entry, every record and every file that an archive refers to.
+    """Check every entry, record and file that an archive refers to.
 
-    Parameters
-    ----------
-    data : Path, optional
-        Data folder, whose files are examined, too.
-    report : callable
-        Called with the fraction done, 0 to 1; what it raises ends the check.
+    A data folder given is examined, too. ``report`` is called with the fraction done, 0
+    to 1; what it raises ends the check.
     """
     ends, home = heads(database), chain_at_home(database)
     n_all = max(1, sum(head.number for head in ends))
@@ -90,20 +86,11 @@ def check_archive(
 
 
 def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
-    """Check an archive in a file, and the files that it refers to.
+    """Check an archive in a file, and the files that it refers to; see `check_archive`.
 
-    Of a file that a program began to write meanwhile nothing is known but what a check
-    beside that program shows, which is made then.
-
-    Parameters
-    ----------
-    data, report
-        As of `check_archive`.
-
-    Raises
-    ------
-    ArchiveError
-        It is not there, not of this program, or cannot be read at all.
+    A file that a program began to write meanwhile counts as damaged only if a second
+    check finds it so. Raises `ArchiveError` if the archive is missing or cannot be read
+    at all.
     """
     while True:
         before = _last_written(archive)

@@ -37,12 +37,7 @@ def with_recomputed(
 ) -> ArchiveCheckResult:
     """Recompute accepted tips of a data folder; return the check with the differences.
 
-    Parameters
-    ----------
-    n_tips : int or None
-        How many, chosen at random; None for all.
-    report : callable
-        Called with the fraction done, 0 to 1; what it raises ends the check.
+    ``n_tips`` are chosen at random; None for all. For ``report`` see `check_archive`.
     """
     home, tips = chain_at_home(database), list[StoredEntry]()
     if home is not None and n_tips != 0:

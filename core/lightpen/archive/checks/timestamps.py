@@ -83,11 +83,8 @@ def authority(address: str = "", certificate: Path | None = None) -> Authority:
 def request_timestamp(database: Database, data: Path, by: Authority) -> Timestamp:
     """Have the last entry of the own chain timestamped, and store the answer.
 
-    Raises
-    ------
-    ArchiveError
-        There is no new entry or no package for it; the authority gives no answer or
-        one that is not valid, or the clock of the station is ahead.
+    Raises `ArchiveError` if there is no new entry or no package for it, the authority
+    gives no valid answer, or the clock of the station is ahead.
     """
     home = chain_at_home(database)
     number = next((each.number for each in heads(database) if each.chain == home), 0)
@@ -117,11 +114,8 @@ def with_timestamps(
 ) -> ArchiveCheckResult:
     """Verify the timestamps of a data folder; return the check with what is wrong.
 
-    Parameters
-    ----------
-    certificate : Path or None
-        Of the authority, as `Authority.certificate`; None for that of the computer.
-        Without one signatures are not verified, which is a note.
+    The certificate is that of the authority, as `Authority.certificate`; None for that
+    of the computer. Without one signatures are not verified, which is a note.
     """
     findings, notes, n_sound = list[Message](), list[Message](), 0
     try:
@@ -266,13 +260,7 @@ def _no_root(file: Path) -> FileError:
 
 
 def _answer(address: str, query: bytes) -> bytes:
-    """Return the HTTP response of an authority to a query.
-
-    Raises
-    ------
-    OSError, HTTPException, ValueError
-        There is no answer, or none of this kind.
-    """
+    """Return the HTTP response of an authority to a query."""
     from urllib.request import Request, urlopen
 
     if not address.startswith(("http://", "https://")):

@@ -62,14 +62,8 @@ def due_tips(
 ) -> tuple[DueTip, ...]:
     """Return the tips of real pens in force at a station, the due ones first.
 
-    Parameters
-    ----------
-    chain : str
-        Chain of the data folder in which the tips are current.
-    rule : DueRule
-        Station rule for tips without their own.
-    library : Library, optional
-        Library with the rules of tips; retired tips are omitted.
+    The chain is that of the data folder in which the tips are current. The station's
+    rule is for tips without their own in the library; retired tips are omitted.
     """
     found = (
         last_accepted(database, pen, tip, chain=chain)

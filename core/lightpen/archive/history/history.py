@@ -76,13 +76,7 @@ class KnownNames:
 def lines(
     database: Database, wanted: EntryFilter, first: int, n_lines: int
 ) -> tuple[Line, ...]:
-    """Return a page of the entries that match a filter, the newest first.
-
-    Parameters
-    ----------
-    first : int
-        How many newer ones are left out.
-    """
+    """Return a page of entries that match a filter, less the ``first`` newest."""
     newest_first = [column.desc() for column in IN_ORDER]
     places = (
         select(ENTRIES.c.chain, ENTRIES.c.number)

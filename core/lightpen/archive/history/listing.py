@@ -23,12 +23,9 @@ BATCH = 1000  # entries that are read at one time
 
 
 def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
-    """Write the entries of a filter, the newest first; return their number.
+    """Write the entries of a filter, newest first; return their number.
 
-    Parameters
-    ----------
-    path : Path
-        ``.csv`` for a table, else JSON; what is there is replaced.
+    The file is a table if its name ends in ``.csv``, else JSON.
     """
     entries = tuple(_all(database, wanted))
     is_table = path.suffix.lower() == ".csv"
@@ -39,13 +36,7 @@ def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
 
 
 def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
-    """Return entries as a table, one a line.
-
-    Parameters
-    ----------
-    home : str or None
-        Own chain of the archive; entries of all others are foreign.
-    """
+    """Return entries as a table; those of another chain than ``home`` are foreign."""
     return csv_table([COLUMNS, *(_row(each, home) for each in entries)])
 
 

@@ -62,10 +62,7 @@ def newest(
 ) -> tuple[StoredEntry, ...]:
     """Return a page of the entries that match a filter, the newest first.
 
-    Parameters
-    ----------
-    before : Entry, optional
-        The last of those that were returned before.
+    ``before`` is the last of those that were returned before.
     """
     condition = condition_of(wanted)
     if before is not None:
@@ -92,11 +89,8 @@ def last_accepted(
 ) -> StoredEntry | None:
     """Return the last acceptance of a pen and tip that was not revoked.
 
-    Parameters
-    ----------
-    chain : str, optional
-        Chain of a data folder; by default any. The current result of a station is in
-        its result files.
+    By default in the chain of any data folder. The current result of a station is in
+    its result files.
     """
     condition = (
         (ENTRIES.c.pen == searchable(pen))

@@ -61,13 +61,7 @@ class LazyLogbook:
         assessment: SwingAssessment | None,
         at: datetime,
     ) -> None:
-        """Enter that a swing was abandoned, with the tip that was not accepted.
-
-        Raises
-        ------
-        ArchiveError, FileError
-            As of `lightpen.archive.logbook.logbook.Logbook.enter_refused`.
-        """
+        """Enter that a swing was abandoned, with the tip that was not accepted."""
         logbook = self._open()
         if logbook is None:
             return
@@ -81,11 +75,6 @@ class LazyLogbook:
 
         An archive that cannot be read stops nothing in a data folder without a
         supervisor password.
-
-        Raises
-        ------
-        AcceptanceError
-            They are not those that were entered.
         """
         try:
             logbook = self._open()
@@ -108,13 +97,7 @@ class LazyLogbook:
         return () if logbook is None else logbook.shared
 
     def close(self) -> None:
-        """Close the archive; later entries are refused.
-
-        Raises
-        ------
-        ArchiveError, FileError
-            As of `lightpen.archive.logbook.logbook.Logbook.close`.
-        """
+        """Close the archive; later entries are refused."""
         with self._lock:
             logbook, self._opened, self._is_closed = self._opened, None, True
         if logbook is not None:

@@ -148,16 +148,8 @@ class Logbook:
     ) -> tuple[Message, ...]:
         """Enter events from files that the archive does not have yet.
 
-        Parameters
-        ----------
-        report : callable
-            Called with the fraction done, 0 to 1; what it raises ends the work, and the
-            rest stays owed.
-
-        Returns
-        -------
-        tuple of Message
-            Why some files cannot be entered; they stay owed.
+        ``report`` is called with the fraction done; what it raises ends the work. What
+        is not entered stays owed; the messages returned say why.
         """
         with self._lock:
             self._entered.read()
@@ -173,13 +165,7 @@ class Logbook:
     def enter_refused(
         self, solution: Solution, assessment: SwingAssessment, at: datetime
     ) -> None:
-        """Enter that the tip of a swing that is abandoned was not accepted.
-
-        Raises
-        ------
-        ArchiveError
-            It cannot be entered; the entry remains pending.
-        """
+        """Enter that the tip of an abandoned swing was not accepted."""
         with self._lock:
             self._enter(account_of_refused(self._results, solution, assessment, at))
 
@@ -207,23 +193,11 @@ class Logbook:
     ) -> Result:
         """Put the tip of an entry in force again, and enter that.
 
-        Parameters
-        ----------
-        by : Names
-            Operator who reinstates it, and station.
-        signature : Signature, optional
-            Of a supervisor, where there is a password.
-
-        Raises
-        ------
-        ArchiveError
-            The entry put no tip in force, is not of this station, its files are not as
-            they were entered, or it cannot be entered; it stays owed then.
-        AcceptanceError
-            The tip is retired, there is no reason, or there is a password and no
-            supervisor signs.
-        FileError
-            It cannot be made current; what was in force stays so.
+        ``by`` names the operator who reinstates it, and the station. Raises
+        `ArchiveError` if the entry put no tip in force, is not of this station, its
+        files are not as they were entered, or it cannot be entered; it stays owed then.
+        Raises `AcceptanceError` if the tip is retired, there is no reason, or there is
+        a password and no supervisor signs.
         """
         require_in_use(self._results, entry.entry.event.names.tip)
         event, now = entry.entry.event, local_now()
@@ -253,13 +227,7 @@ class Logbook:
         return result
 
     def confirm(self, supervision: Supervision) -> None:
-        """Confirm that the limits of the data folder are those that were entered.
-
-        Raises
-        ------
-        AcceptanceError
-            They are not.
-        """
+        """Raise `AcceptanceError` unless the limits of the folder are those entered."""
         confirm_limits(self.database, self.chain, supervision)
 
     def delivery(self) -> ReplicationState | None:
@@ -374,13 +342,7 @@ def _set_aside(records: Path) -> Iterator[Path]:
 def confirm_limits(
     database: Database, chain: str | None, supervision: Supervision
 ) -> None:
-    """Confirm that limits are those that were entered in the chain of a data folder.
-
-    Raises
-    ------
-    AcceptanceError
-        They are not.
-    """
+    """Raise `AcceptanceError` unless limits are those entered in a chain."""
     if supervision.chain not in ("", chain):
         raise AcceptanceError("limits.other-archive")
     entries = entries_of_limits(database, chain) if chain else ()

@@ -24,18 +24,7 @@ from lightpen.record.swings.names import Names
 def require_restorable(
     database: Database, chain: str, entry: StoredEntry, data: Path
 ) -> None:
-    """Refuse an entry that is not of a chain, or whose result is not as it was.
-
-    Parameters
-    ----------
-    chain : str
-        Own chain of the data folder.
-
-    Raises
-    ------
-    ArchiveError
-        It is refused.
-    """
+    """Refuse an entry that is not of a chain, or whose result is not as it was."""
     number = entry.entry.number
     there = batch_of(database, chain, number - 1)[:1]
     if [each.sha256 for each in there] != [entry.sha256]:
@@ -57,10 +46,7 @@ def due_doubts(
 ) -> Iterator[Message]:
     """Yield the overdue items of the tip of an entry.
 
-    Parameters
-    ----------
-    rule : DueRule
-        Of the station, for tips that have none of their own.
+    The station's rule is for tips that have none of their own.
     """
     names = entry.entry.event.names
     yield from overdue_items(library, names, local_time(now).date())
@@ -81,17 +67,9 @@ def restored_result(
 ) -> Result:
     """Return the result that puts the tip of an entry in force again.
 
-    Parameters
-    ----------
-    record : str or None
-        Record of the entry: the file of its result.
-    by : Names
-        Operator who reinstates it, and station.
-
-    Raises
-    ------
-    ArchiveError
-        The entry put no tip in force, or the archive does not show all of it.
+    The record of the entry is the file of its result; ``by`` names the operator who
+    reinstates it, and the station. Raises `ArchiveError` if the entry put no tip in
+    force, or the archive does not show all of it.
     """
     event = entry.entry.event
     if not reason.strip():

@@ -30,35 +30,17 @@ class ArchivePlace:
 
 
 def with_entry(file: CalibrationFile) -> CalibrationFile:
-    """Return a calibration that states, if accepted, whether it is entered.
-
-    Raises
-    ------
-    ArchiveError, FileError
-        As of `entry_of_file`.
-    """
+    """Return a calibration that states, if accepted, whether it is entered."""
     if file.accepted is None:
         return file
     return replace(file, is_entered=entry_of_file(file.path, file.sha256) is not None)
 
 
 def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
-    """Return the entry of a result or a verification.
+    """Return the entry of a result or a verification with a checksum as read.
 
-    Parameters
-    ----------
-    sha256 : str
-        Checksum of the file as read.
-
-    Returns
-    -------
-    ArchivePlace or None
-        None of a file in no data folder, and of one that is not entered yet.
-
-    Raises
-    ------
-    FileError
-        It is not the file that was entered.
+    None of a file in no data folder, and of one that is not entered yet. Raises
+    `FileError` if it is not the file that was entered.
     """
     data = data_folder_of_verification(result) or data_folder_of(result)
     if data is None:

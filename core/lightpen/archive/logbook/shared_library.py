@@ -82,14 +82,9 @@ def newer_elsewhere(
 ) -> tuple[TakenOver, ...]:
     """Return the changes of other stations that are newer than those of this one.
 
-    Parameters
-    ----------
-    database : Database
-        Archive of the data folder, with copies of other chains.
-    now : datetime
-        A change that is dated later, by a clock that is ahead, does not count.
-    server : Database, optional
-        Archive of the plant.
+    The database is the archive of the data folder, with copies of other chains; the
+    server that of the plant. A change dated later than ``now``, by a clock that is
+    ahead, does not count.
     """
     home, found = chain_at_home(database), list(_copied(database))
     if server is not None:
@@ -120,19 +115,8 @@ def take_over(
 ) -> tuple[TakenOver, ...]:
     """Take over the changes of other stations that are newer than those of this one.
 
-    Parameters
-    ----------
-    database, now, server
-        As of `newer_elsewhere`.
-    signature : Signature, optional
-        Of a supervisor, where the data folder has a password.
-
-    Raises
-    ------
-    AcceptanceError
-        There is a password, and no supervisor signs.
-    ArchiveError, FileError
-        As of `newer_elsewhere`, or a change cannot be kept.
+    The arguments are those of `newer_elsewhere`; a library with a supervisor password
+    needs the signature of a supervisor (`AcceptanceError`).
     """
     newer = newer_elsewhere(data, database, now, server)
     for each in newer:

@@ -18,14 +18,9 @@ from lightpen.record.library.tip_library import Library
 def statuses(
     database: Database, chain: str, rule: DueRule, library: Library, now: datetime
 ) -> StationStatus:
-    """Return the current status of all tips of a station.
+    """Return the current status of all tips of a station, whose chain it is.
 
-    Parameters
-    ----------
-    chain : str
-        Chain of the station's data folder.
-    rule : DueRule
-        Rule for tips without their own.
+    The rule is for tips without their own.
     """
     in_force = {}
     for tip in due_tips(database, chain, rule, library):
@@ -45,13 +40,7 @@ def statuses(
 def folder_statuses(
     data: Path, rule: DueRule, library: Library, now: datetime
 ) -> StationStatus:
-    """Return the same by the archive of a data folder, which is only read.
-
-    Raises
-    ------
-    ArchiveError
-        It is not of this program, or cannot be used.
-    """
+    """Return the same by the archive of a data folder, which is only read."""
     try:
         with closing(look_into(data / ARCHIVE)) as database:
             chain = chain_at_home(database) or ""

@@ -72,13 +72,7 @@ def check_server(database: Database, server: Database) -> ServerCheckResult:
 
 
 def require_continued(database: Database, chain: str, server: Database) -> None:
-    """Refuse a server whose last entry of the own chain is not where it should be.
-
-    Raises
-    ------
-    ArchiveError
-        As of `require_same`.
-    """
+    """Refuse a server whose last entry of the own chain is not where it should be."""
     head = chain_head(server, chain)
     here = _hashes(database, chain, head.number - 1, head.number)
     is_same = head.number == 0 or here == [(head.number, head.sha256)]
@@ -87,13 +81,7 @@ def require_continued(database: Database, chain: str, server: Database) -> None:
 
 
 def require_same(database: Database, chain: str, server: Database) -> None:
-    """Refuse a server that is ahead of the own chain, lost some of it or differs.
-
-    Raises
-    ------
-    ArchiveError
-        It does; the text says what to do. Or one of the two cannot be read.
-    """
+    """Refuse a server that is ahead of the own chain, lost some of it or differs."""
     for each in _findings(database, chain, server):
         raise ArchiveError(each)
 

@@ -64,10 +64,8 @@ class _LastLine(Struct):
 def deliver(database: Database, chain: str, server: Database) -> CopyResult:
     """Copy the entries of a chain that a server lacks.
 
-    Raises
-    ------
-    ArchiveError
-        It does not answer, is ahead of this chain, or holds other entries of it.
+    Raises `ArchiveError` if it does not answer, is ahead of this chain, or holds other
+    entries of it.
     """
     require_continued(database, chain, server)
     known = chain_head(server, chain).number
@@ -80,13 +78,7 @@ def deliver(database: Database, chain: str, server: Database) -> CopyResult:
 
 
 def export_entries(database: Database, path: Path) -> int:
-    """Write all entries of an archive to a new file; return their number.
-
-    Raises
-    ------
-    NameTakenError
-        The file exists.
-    """
+    """Write all entries of an archive to a new file; return their number."""
     n_entries, checksum = 0, sha256()
     try:
         with path.open("xb") as stream:
@@ -113,12 +105,7 @@ def export_entries(database: Database, path: Path) -> int:
 def import_entries(database: Database, path: Path) -> CopyResult:
     """Copy the entries of an exported archive into another; known ones are passed.
 
-    Raises
-    ------
-    FileError
-        The file is no exported archive, or not whole.
-    ArchiveError
-        The archive holds other entries of one of the chains.
+    Raises `ArchiveError` if that holds other entries of one of the chains.
     """
     for _ in _read(path):  # all of it, before any of it is kept
         pass

@@ -52,16 +52,9 @@ def fetch(
 ) -> FetchResult:
     """Add the entries that a data folder lacks from its chain on a server, with files.
 
-    Parameters
-    ----------
-    chain : str
-        Start of the name of the chain of a folder that has none yet; not needed where
-        the server shows one alone.
-
-    Raises
-    ------
-    ArchiveError
-        The server has no such chain, or other entries than those that are here.
+    ``chain`` is the start of the name of the chain of a folder that has none yet; not
+    needed where the server shows one alone. Raises `ArchiveError` if the server has no
+    such chain, or other entries than those that are here.
     """
     home = chain_at_home(database)
     if home is None or chain_head(database, home).number == 0:

@@ -38,17 +38,9 @@ SET lock_timeout = 30000"""
 def open_server(address: str) -> Database:
     """Open the archive on a server.
 
-    Parameters
-    ----------
-    address : str
-        ``postgresql://user@host/database``, with options of libpq as
-        ``?sslrootcert=FILE&passfile=FILE``. ``keyring=SERVICE`` names the service under
-        which the system keyring has the password of the user.
-
-    Raises
-    ------
-    ArchiveError
-        It does not answer, or not as an archive of this program.
+    The address is ``postgresql://user@host/database`` with options of libpq such as
+    ``?sslrootcert=FILE&passfile=FILE``. ``keyring=SERVICE`` names the service under
+    which the system keyring has the password of the user.
     """
     url = _url(address)
     try:

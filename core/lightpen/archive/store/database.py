@@ -117,13 +117,7 @@ class Database:
 
 
 def open_file(path: Path) -> Database:
-    """Open the archive in a file, or make one.
-
-    Raises
-    ------
-    ArchiveError
-        It is not of this program, or cannot be used.
-    """
+    """Open the archive in a file, or make one."""
     name = printable(str(path))
     with _looking_at(path):
         is_there = path.exists()
@@ -147,12 +141,7 @@ def open_file(path: Path) -> Database:
 def look_into(path: Path) -> Database:
     """Open the archive in a file to be read only; nothing about it changes.
 
-    Raises
-    ------
-    NoArchiveError
-        It is not there, or nothing was ever entered in it.
-    ArchiveError
-        It is not of this program, or cannot be used.
+    Raises `NoArchiveError` if it is missing or nothing was ever entered.
     """
     database = _read_only(path)
     with _looking_at(path):
@@ -230,10 +219,7 @@ def _begin(connection: Connection) -> None:
 def known_version(database: Database) -> str | None:
     """Return the version of a database; None if it is empty.
 
-    Raises
-    ------
-    ArchiveError
-        It is of another program, or of a later version of this one, and is closed.
+    Raises `ArchiveError` if it is of another program or a later version, and closes it.
     """
     try:
         with database.reading() as connection:
@@ -253,13 +239,7 @@ def _is_known(version: str) -> bool:
 
 
 def update_tables(database: Database) -> Database:
-    """Make the tables of a file, or bring those of an earlier version up to date.
-
-    Raises
-    ------
-    ArchiveError
-        It cannot be done; the database is closed.
-    """
+    """Make the tables, or update those of an earlier version, or close it."""
     known_version(database)
     try:
         with database.writing() as connection:

@@ -218,15 +218,10 @@ def floats(numbers: object) -> FloatArray:
 
 
 def read_calibration(path: Path) -> CalibrationFile:
-    """Read a calibration.
+    """Read a calibration, or raise `UsageError` if the file holds none.
 
-    Raises
-    ------
-    FileError
-        It cannot be read, is not as it was written, or is a result in a data folder
-        and not signed as it must be.
-    UsageError
-        It is no calibration.
+    Raises `FileError` if it was changed, or is a result in a data folder and not signed
+    as it must be.
     """
     content, data = read_bytes(path, WHAT, LARGEST_RECORD), data_folder_of(path)
     if data is not None and has_head(content):
@@ -235,13 +230,7 @@ def read_calibration(path: Path) -> CalibrationFile:
 
 
 def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
-    """Return the calibration that a file holds.
-
-    Raises
-    ------
-    UsageError
-        It is no calibration.
-    """
+    """Return the calibration that a file holds, or raise `UsageError`."""
     digest = sha256(data).hexdigest()
     if has_head(data):
         result = parse_result(data, path, Path)

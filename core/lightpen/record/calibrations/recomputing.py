@@ -65,12 +65,8 @@ class Recomputed:
 def recompute(path: Path) -> Recomputed:
     """Calibrate again from a record as JSON, or from an accepted result.
 
-    Raises
-    ------
-    UsageError
-        It does not hold the files, or not the images in the second of two cones.
-    CalibrationError
-        It does not determine the tip.
+    Raises `UsageError` if it does not hold the files, or not the images in the second
+    of two cones.
     """
     record = read_calibration(path).calibration
     if record.second_cone is not None and not record.second_cone.frames:

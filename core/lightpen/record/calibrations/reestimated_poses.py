@@ -56,10 +56,7 @@ class ReestimatedPoses:
 def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
     """Pose the images of a calibration again.
 
-    Returns
-    -------
-    ReestimatedPoses or None
-        None of several cameras or two cones, and where the file does not keep enough.
+    None of several cameras or two cones, and where the file does not keep enough.
     """
     fitted = calibration.instrument
     if fitted is None or calibration.rig is not None or calibration.second_cone:

@@ -34,12 +34,8 @@ def traced_items(
 ) -> tuple[TracedItem, ...]:
     """Return pen, tip, cone, cameras and references of a result.
 
-    Parameters
-    ----------
-    cameras : sequence of str
-        Serial numbers.
-    certified : collection of float
-        Certified values that it was compared with, mm, by which references are found.
+    The cameras are found by their serial numbers, references by the certified values,
+    mm, that the result was compared with.
     """
     used = [
         (ItemKind.CAMERA, tuple(cameras)),

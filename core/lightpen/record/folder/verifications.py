@@ -110,13 +110,7 @@ def is_verification(content: bytes) -> bool:
 
 
 def read_verification(content: bytes, file: Path) -> StoredVerification:
-    """Read the file of a verification.
-
-    Raises
-    ------
-    FileError
-        It is damaged, or in a data folder and not signed as it must be.
-    """
+    """Read the file of a verification, signed as it must be in a data folder."""
     try:
         done = parse_checked(content, StoredVerification)
     except DamagedError as error:

@@ -108,13 +108,7 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
 
 
 def read_limits_change(content: bytes, file: Path) -> LimitsChange:
-    """Return the content of a file of limits, without verifying signatures.
-
-    Raises
-    ------
-    FileError
-        It was changed since.
-    """
+    """Return the content of a file of limits, without verifying signatures."""
     try:
         return parse_upgraded(content, LimitsChange, upgrades.LIMITS)
     except LaterFormatError as error:
@@ -128,10 +122,7 @@ def write_limits_change(
 ) -> str:
     """Write a change as the file of a number, and return its hash.
 
-    Raises
-    ------
-    NameTakenError
-        Another program made a change meanwhile.
+    Raises `NameTakenError` if another program made a change meanwhile.
     """
     file = numbered_file(data / LIMITS_FOLDER, number)
     make_folder(file.parent)

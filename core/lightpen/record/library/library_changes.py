@@ -76,14 +76,8 @@ class Author:
 def add_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
     """Add an item, and return the library with it.
 
-    Raises
-    ------
-    UsageError
-        Its id is in use or no id, or an entry makes no sense.
-    AcceptanceError
-        There is a password, and no supervisor has signed.
-    FileError
-        It cannot be kept; the library stays as it was.
+    Raises `UsageError` if its id is in use or no id, or an entry makes no sense, and
+    `AcceptanceError` if there is a password and no supervisor has signed.
     """
     item = _sensible(item)
     while True:
@@ -100,20 +94,9 @@ def change_item(
 ) -> Library:
     """Put another version of an item in its place, and return the library.
 
-    One that is as it was is not kept once more.
-
-    Parameters
-    ----------
-    before : item, optional
-        As it was shown while it was edited.
-
-    Raises
-    ------
-    UsageError
-        It is not in the library, an entry makes no sense, or it was changed since it
-        was shown.
-    AcceptanceError, FileError
-        As of `add_item`.
+    One that is as it was is not kept once more. ``before`` is the item as it was shown
+    while it was edited. Raises `UsageError` if it is not in the library, an entry makes
+    no sense, or it was changed since it was shown; see also `add_item`.
     """
     item = _sensible(item)
     while True:
@@ -143,15 +126,7 @@ def retire_item(
     *,
     is_retired: bool = True,
 ) -> Library:
-    """Retire an item, or bring it back, and return the library.
-
-    Raises
-    ------
-    UsageError
-        It is not in the library.
-    AcceptanceError, FileError
-        As of `add_item`.
-    """
+    """Retire an item of the library, or bring it back; see `add_item`."""
     item = known_item(read_library(data), kind, name)
     retired = structs.replace(item, is_retired=is_retired)
     return change_item(data, retired, by, now, before=item)
@@ -160,21 +135,10 @@ def retire_item(
 def adopt_change(
     data: Path, change: LibraryChange, signature: Signature | None
 ) -> Library:
-    """Store a change of another station in this library; return the library.
+    """Store a change of another station in this library; see `add_item`.
 
-    Parameters
-    ----------
-    change : LibraryChange
-        With the time, station and operator of the original.
-    signature : Signature or None
-        Of a supervisor of this station, where there is a password.
-
-    Raises
-    ------
-    UsageError
-        An entry makes no sense.
-    AcceptanceError, FileError
-        As of `add_item`.
+    It keeps the time, station and operator of the original. Where there is a password,
+    the signature is that of a supervisor of this station.
     """
     item = _sensible(change.item)
     by = Author(change.station, change.operator, change.reason, signature)
@@ -185,13 +149,7 @@ def adopt_change(
 
 
 def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
-    """Return an item of a library.
-
-    Raises
-    ------
-    UsageError
-        It is not in there.
-    """
+    """Return an item of a library, or raise `UsageError`."""
     found = library.item(kind, name)
     if found is None:
         raise UsageError(no_such_item(kind, name))
@@ -199,26 +157,14 @@ def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
 
 
 def read_picture(file: Path) -> bytes:
-    """Return the content of a file that holds a picture.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is no picture.
-    """
+    """Return the content of a file that holds a picture."""
     content = read_bytes(file, PICTURE, LARGEST_PICTURE)
     read_image_header(BytesIO(content), printable(str(file)))
     return content
 
 
 def read_kept_picture(data: Path, picture: Picture) -> bytes:
-    """Return the content of a picture in the data folder.
-
-    Raises
-    ------
-    FileError
-        As of `read_picture`, or it is not the one that was kept.
-    """
+    """Return the content of a picture in the data folder, the one that was kept."""
     file = data / picture.place
     content = read_picture(file)
     if sha256(content).hexdigest() != picture.sha256:
@@ -227,13 +173,7 @@ def read_kept_picture(data: Path, picture: Picture) -> bytes:
 
 
 def keep_picture(data: Path, file: Path) -> Picture:
-    """Copy a picture into the data folder, named by its hash; return its path.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, is no picture, or cannot be kept.
-    """
+    """Copy a picture into the data folder, named by its hash; return its path."""
     content = read_picture(file)
     digest = sha256(content).hexdigest()
     kept = data / LIBRARY / PICTURES / f"{digest[:16]}{file.suffix.lower()}"
@@ -244,13 +184,7 @@ def keep_picture(data: Path, file: Path) -> Picture:
 
 
 def given_axis(direction: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return the axis of a stylus along a direction, of length 1.
-
-    Raises
-    ------
-    UsageError
-        It is no direction.
-    """
+    """Return the axis of a stylus along a direction, of length 1."""
     length = float(np.linalg.norm(direction))
     if not (math.isfinite(length) and length > 0):
         raise UsageError("library.no-direction")

@@ -27,12 +27,7 @@ def add_numbered(folder: Path, data: bytes | Callable[[Path], bytes]) -> Path:
     """Add a file, the newest of all, and return it.
 
     When this returns, it is kept whatever happens next; when it raises, or is killed,
-    it is kept whole or not at all.
-
-    Parameters
-    ----------
-    data : bytes or callable
-        Content; or a function that returns it for the file.
+    it is kept whole or not at all. The content may depend on the file.
     """
     make_folder(folder)
     for free in count(1 + newest_number(folder)):

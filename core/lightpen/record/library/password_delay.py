@@ -29,18 +29,7 @@ class _Attempts(Struct, frozen=True):
 
 
 def require_patience(key: str) -> None:
-    """Refuse an attempt too soon after wrong ones.
-
-    Parameters
-    ----------
-    key : str
-        Public key that follows from the right password.
-
-    Raises
-    ------
-    AcceptanceError
-        It is too soon.
-    """
+    """Refuse an attempt too soon after wrong ones, by the key of the right password."""
     before = _read(key)
     if before.n_wrong <= FREE:
         return

@@ -100,13 +100,7 @@ class Supervision:
         return next(same, None)
 
     def signers(self, supervisor: SigningKey | None = None) -> Signers:
-        """Return the keys by which a new file is signed.
-
-        Raises
-        ------
-        FileError
-            The station key is not in this user account, or cannot be read.
-        """
+        """Return the keys by which a new file is signed; see `station_key`."""
         key = station_key(chain_of(self.station_keys[-1]))
         if key is None:
             raise FileError("signing.key-missing", chain=self.chain[:8])
@@ -118,18 +112,7 @@ class Supervision:
         """Refuse a file of a guarded folder that is not signed as it must be.
 
         It must be by keys that count, or as it was when a supervisor introduced them.
-
-        Parameters
-        ----------
-        text : bytes
-            Of the JSON object with the signatures.
-        has_supervisor : bool
-            Whether it names a supervisor.
-
-        Raises
-        ------
-        FileError
-            It is not.
+        ``text`` is the JSON object with the signatures; it may name a supervisor.
         """
         place = place_in(data, file)
         if self.password is None or self.known.get(place) == entries_sha256(text):
@@ -151,11 +134,8 @@ def folded_name(station: str) -> str:
 def read_supervision(data: Path) -> Supervision:
     """Return limits and guard of a data folder.
 
-    Raises
-    ------
-    FileError
-        A file cannot be read, is missing, changed or not signed: other limits or
-        another password must not count in silence.
+    Raises `FileError` if a file is missing, changed or not signed: other limits or
+    another password must not count in silence.
     """
     folder = data / LIMITS_FOLDER
     guard = Supervision()
@@ -181,11 +161,8 @@ def require_supervisor(
 ) -> SigningKey:
     """Return the key of a supervisor; refuse who is none.
 
-    Raises
-    ------
-    AcceptanceError
-        There is no password yet, it is another one, the name is missing, or too many
-        wrong passwords were entered just now.
+    Raises `AcceptanceError` if there is no password yet, it is another one, the name is
+    missing, or too many wrong passwords were entered just now.
     """
     if signature is None:
         raise AcceptanceError("supervisor.needed")
@@ -205,12 +182,8 @@ def approval_of_change(
 ) -> SigningKey | None:
     """Return the key of the supervisor who approves another tip to be in force.
 
-    None where there is no password.
-
-    Raises
-    ------
-    AcceptanceError
-        There is one, and no supervisor signs or no reason is given.
+    None where there is no password; else a signature and a reason are needed
+    (`AcceptanceError`).
     """
     if not supervision.is_guarded:
         return None
@@ -220,13 +193,7 @@ def approval_of_change(
 
 
 def require_name(signature: Signature) -> None:
-    """Refuse a signature without a name.
-
-    Raises
-    ------
-    AcceptanceError
-        It has none.
-    """
+    """Refuse a signature without a name."""
     if not signature.name.strip():
         raise AcceptanceError("supervisor.no-name")
 

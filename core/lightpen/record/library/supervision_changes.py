@@ -68,11 +68,8 @@ class _Approval(Struct):
 def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
     """Set the supervisor password; changing it needs the present one.
 
-    Raises
-    ------
-    AcceptanceError
-        The present password is another one, the name is missing, or the new one is too
-        short.
+    Raises `AcceptanceError` if that is another one, the name is missing, or the new one
+    is too short.
     """
     guard = read_supervision(data)
     approving = None
@@ -102,17 +99,10 @@ def set_limits(
     now: datetime,
     before: StationLimits | None = None,
 ) -> None:
-    """Set the limits of a station.
+    """Set the limits of a station; ``before`` are those shown while they were entered.
 
-    Parameters
-    ----------
-    before : StationLimits, optional
-        Limits that were shown while these were entered.
-
-    Raises
-    ------
-    AcceptanceError
-        It is not signed by a supervisor, or the limits were changed meanwhile.
+    Raises `AcceptanceError` if no supervisor signs, or the limits were changed
+    meanwhile.
     """
     guard = read_supervision(data)
     key = require_supervisor(guard, signature)
@@ -136,21 +126,8 @@ def save_limits(
 ) -> Supervision:
     """Set limits, and a password where there is none or a new one is given.
 
-    Parameters
-    ----------
-    before
-        As of `set_limits`.
-
-    Returns
-    -------
-    Supervision
-        What is set now.
-
-    Raises
-    ------
-    AcceptanceError
-        It is not signed by a supervisor, the password is too short, or the limits were
-        changed meanwhile.
+    Returns what is set now. Raises `AcceptanceError` as `set_limits`, or if the
+    password is too short.
     """
     if not read_supervision(data).is_guarded:
         set_password(data, signature, signature.password, now)
@@ -164,21 +141,11 @@ def save_limits(
 def renew_station_key(
     data: Path, chain: str, signature: Signature | None, now: datetime
 ) -> str:
-    """Introduce another station key, and return its public half.
+    """Introduce another station key for a chain, and return its public half.
 
     It is approved by the key before where that is in this user account, and by the
-    supervisor who signs. Where there is a password, one of both is needed. If a
-    supervisor signs, the keys before sign no file any more.
-
-    Parameters
-    ----------
-    chain : str
-        Of the archive.
-
-    Raises
-    ------
-    AcceptanceError
-        There is a password, the key before is not here, and no supervisor signs.
+    supervisor who signs. Where there is a password, one of both is needed
+    (`AcceptanceError`). If a supervisor signs, the keys before sign no file any more.
     """
     guard = read_supervision(data)
     old = station_key(chain_of(guard.station_keys[-1]) if guard.station_keys else chain)

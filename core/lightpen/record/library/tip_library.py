@@ -300,11 +300,8 @@ class Library:
 def read_library(data: Path) -> Library:
     """Return the library of a data folder; empty where there is none.
 
-    Raises
-    ------
-    FileError
-        It cannot be read, or was changed: an older limit must not count again in
-        silence.
+    Raises `FileError` if it was changed: an older limit must not count again in
+    silence.
     """
     found: dict[ItemKind, dict[str, AnyItem]] = {kind: {} for kind in ItemKind}
     for _, change in library_changes(data):
@@ -335,13 +332,7 @@ def item_entries(item: AnyItem) -> dict[str, Plain]:
 
 
 def library_changes(data: Path) -> Iterator[tuple[Path, LibraryChange]]:
-    """Yield the changes of a library with their files, the oldest first.
-
-    Raises
-    ------
-    FileError
-        As of `read_library`.
-    """
+    """Yield the changes of a library with their files, the oldest first."""
     supervision = read_supervision(data)
     for file in library_files(data):
         yield file, read_change(file, supervision)
@@ -353,18 +344,10 @@ def library_files(data: Path) -> tuple[Path, ...]:
 
 
 def read_change(file: Path, supervision: Supervision | None = None) -> LibraryChange:
-    """Return the change that a file holds.
+    """Return the change that a file holds, with the supervision of its data folder.
 
-    Parameters
-    ----------
-    supervision : Supervision, optional
-        Of the data folder, if it was read already.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, was changed, is not signed though there is a supervisor
-        password, or is of a later version of the program.
+    Raises `FileError` if it was changed, is not signed though there is a supervisor
+    password, or is of a later version of the program.
     """
     text = read_bytes(file, WHAT, MEGABYTE)
     data = file.parents[1]
@@ -381,13 +364,7 @@ def read_change(file: Path, supervision: Supervision | None = None) -> LibraryCh
 
 
 def parse_change(content: bytes) -> LibraryChange:
-    """Return the change that a file of the library of any station holds.
-
-    Raises
-    ------
-    DamagedError, LaterFormatError
-        It was changed, or is of a later version of the program.
-    """
+    """Return the change that a file of the library of any station holds."""
     return parse_upgraded(content, LibraryChange, upgrades.LIBRARY)
 
 

@@ -61,25 +61,11 @@ def accept(
 
     Killed at any moment, it leaves either the result before in force and the swing to
     be gone on with, or the new result. Accepting the same images of a swing again gives
-    the result that is stored.
+    the result that is stored. A tip to be checked needs a reason, and a supervisor
+    where the station has one (`AcceptanceError`).
 
-    Parameters
-    ----------
-    solution : Solution
-        Solution of a record on disk.
-    reason : str
-        Why it is accepted though it is to be checked.
-    signature : Signature, optional
-        Signature of a supervisor, if one is required.
-
-    Raises
-    ------
-    AcceptanceError
-        The tip is to be repeated, or to be checked and there is no reason, or no
-        supervisor where it takes one.
-    FileError
-        Another program writes to the record, it has changed since it was solved, or the
-        result cannot be stored; what was in force before stays so.
+    Raises `FileError` if another program writes to the record, it has changed since it
+    was solved, or the result cannot be stored; what was in force before stays so.
     """
     record = open_record(solution.source.folder)
     if is_press_test(record):
@@ -150,11 +136,6 @@ def require_in_use(archive: FolderArchive, name: str) -> None:
     """Reject a retired tip.
 
     A library that cannot be read is reported with the verdict.
-
-    Raises
-    ------
-    AcceptanceError
-        It is retired.
     """
     tip = None
     with suppress(FileError):

@@ -13,17 +13,9 @@ from lightpen.record.swings.reading import is_record
 
 
 def swing_folder(path: Path) -> Path:
-    """Return the folder of the swing that a path leads to.
+    """Return the folder of a swing by itself, a file in it, or a result.
 
-    Parameters
-    ----------
-    path : Path
-        The folder itself, a file in it, or a result.
-
-    Raises
-    ------
-    FileError
-        It leads to no swing, or the result or its swing cannot be read.
+    Raises `FileError` if the path leads to no swing.
     """
     place = path.absolute()
     for folder in (place, place.parent):

@@ -78,20 +78,10 @@ class FolderArchive:
         return self._data / RESULTS
 
     def store(self, result: Result, supervisor: SigningKey | None = None) -> None:
-        """Put a result in force.
+        """Put a result in force, signed by the supervisor whom it names.
 
         When this returns, the result is kept whatever happens next; when it raises, or
         is killed, it is kept whole or not at all.
-
-        Parameters
-        ----------
-        supervisor : SigningKey, optional
-            Of the supervisor whom the result names.
-
-        Raises
-        ------
-        FileError
-            It cannot be kept; what was in force before stays so.
         """
         root, record = self._root(result.is_simulated), self.place_of(result.record)
         sign = self._signing(read_supervision(self._data), supervisor)
@@ -110,24 +100,9 @@ class FolderArchive:
         """Let the result before a result in force be in force again.
 
         It is one step, as `store`. Where there is a supervisor password, it takes a
-        supervisor and a reason, as what comes into force again was not judged by the
-        present limits.
-
-        Parameters
-        ----------
-        operator : str
-            Operator who revokes it.
-        reason : str
-            In their words.
-        signature : Signature, optional
-            Of a supervisor.
-
-        Raises
-        ------
-        AcceptanceError
-            There is a password, and no supervisor or no reason.
-        FileError
-            It is not in force any more, or what revokes it cannot be kept.
+        supervisor and a reason of the operator (`AcceptanceError`), as what comes into
+        force again was not judged by the present limits. Raises `FileError` if it is
+        not in force any more.
         """
         names, supervision = result.names, self.supervision()
         key = approval_of_change(supervision, signature, reason)
@@ -157,16 +132,8 @@ class FolderArchive:
     ) -> Result | None:
         """Return the last accepted result of a pen and a tip, or None.
 
-        Parameters
-        ----------
-        is_simulated : bool
-            Whether of a simulated pen; else of a real one.
-
-        Raises
-        ------
-        FileError
-            A result that may be the one in force cannot be read. An older one must not
-            come into force again in silence.
+        Raises `FileError` if a result that may be the one in force cannot be read: an
+        older one must not come into force again in silence.
         """
         file = self.file_in_force(pen, tip, is_simulated=is_simulated)
         return None if file is None else self.read(file)
@@ -205,12 +172,7 @@ class FolderArchive:
     def supervision(self) -> Supervision:
         """Return the present limits and who guards them, as the archive confirms them.
 
-        Raises
-        ------
-        FileError
-            A file of them is missing, changed or not signed; see `read_supervision`.
-        AcceptanceError
-            They are not those that were entered in the archive.
+        Raises `AcceptanceError` if they are not those that were entered in the archive.
         """
         supervision = read_supervision(self._data)
         self._confirm(supervision)
@@ -251,13 +213,7 @@ class FolderArchive:
         return (absolute.relative_to(self._data) if inside else absolute).as_posix()
 
     def file_of(self, result: Result) -> Path:
-        """Return the file of a result that is not revoked.
-
-        Raises
-        ------
-        FileError
-            There is none any more.
-        """
+        """Return the file of a result that is not revoked."""
         place, root = self.place_of(result.record), self._root(result.is_simulated)
         for file, heading in self._standing(root, passes_over_damage=True):
             if heading.record == place and _is_same(self.read(file), result):
@@ -317,13 +273,7 @@ class FolderArchive:
 def signed_heading(
     data: Path, file: Path, start: bytes, supervision: Supervision
 ) -> ResultHeading:
-    """Return the heading in the start of a result of a data folder.
-
-    Raises
-    ------
-    FileError
-        It is damaged, or not signed as it must be.
-    """
+    """Return the heading in the start of a result, signed as it must be."""
     heading = parse_heading(start, file)
     supervision.require_signed(
         data, file, head_of(start), has_supervisor=bool(heading.supervisor)

@@ -257,14 +257,9 @@ class Result:
 def result_bytes(
     result: Result, record: str, sign: Callable[[bytes], bytes] = bytes
 ) -> bytes:
-    """Return a result as JSON.
+    """Return a result as JSON, with the path of the swing's folder as written there.
 
-    Parameters
-    ----------
-    record : str
-        Path of the swing's folder as written in the file.
-    sign : callable
-        Returns the text of the head with its signatures.
+    ``sign`` returns the text of the head with its signatures.
     """
     names = result.names
     rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
@@ -326,10 +321,7 @@ def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
 def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Result:
     """Return the result that a file holds.
 
-    Parameters
-    ----------
-    locate : callable
-        Returns the folder of a swing by what is written.
+    ``locate`` returns the folder of a swing by what is written.
     """
     try:
         head = head_of(data)

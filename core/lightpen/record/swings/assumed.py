@@ -17,10 +17,7 @@ def assumption_entries(assumptions: Assumptions) -> dict[str, Plain]:
 def recorded_assumptions(settings: Mapping[str, Plain]) -> Assumptions:
     """Return the assumptions among settings; the usual one for each that is missing.
 
-    Raises
-    ------
-    ValueError
-        One makes no sense.
+    Raises `ValueError` if one makes no sense.
     """
     values = asdict(USUAL)
     for name in values:

@@ -173,11 +173,8 @@ def header_bytes(header: Header) -> bytes:
 def read_header(folder: Path) -> Header:
     """Read the header of a record and check its copies.
 
-    Raises
-    ------
-    FileError
-        It is damaged, or of a later version of the program, or one of the copies is not
-        as it was recorded.
+    Raises `FileError` if it is damaged, of a later version of the program, or a copy is
+    not as it was recorded.
     """
     path = folder / HEADER
     data = read_bytes(path, message("file.header"), HEADER_LIMIT)

@@ -149,12 +149,7 @@ def last_verdict(folder: Path) -> str | None:
     """Return the verdict at the end of the journal that no image follows.
 
     No more is read than its last lines, so that thousands of concluded records cost
-    little. That none is seen there does not mean that there is none.
-
-    Raises
-    ------
-    OSError
-        There is no journal, or it cannot be read.
+    little. That none is seen there does not mean that there is none. Raises `OSError`.
     """
     path = folder / JOURNAL
     if path.exists() and not path.is_file():  # a pipe would never be read to its end

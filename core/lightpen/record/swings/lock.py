@@ -19,17 +19,7 @@ PATIENCE = 0.5  # s, wait for a reader or a closing process to release the lock
 def lock_journal(journal: IO[bytes], folder: Path) -> None:
     """Keep other writers out until the journal is unlocked, or the process ends.
 
-    Parameters
-    ----------
-    journal : file
-        Open to be written.
-
-    Raises
-    ------
-    FileError
-        Another program writes to the record.
-    OSError
-        The disk fails.
+    Raises `FileError` if another program writes to the record.
     """
     if not _is_taken_over(journal.fileno(), shared=False):
         raise FileError("record.locked", folder=printable(str(folder)))
@@ -45,13 +35,7 @@ def unlock_journal(journal: IO[bytes]) -> None:
 
 
 def is_locked(path: Path) -> bool:
-    """Return whether a program writes to the record of a journal.
-
-    Raises
-    ------
-    OSError
-        The journal cannot be read.
-    """
+    """Return whether a program writes to the record of a journal."""
     with path.open("rb") as journal:
         if not _is_taken_over(journal.fileno(), shared=True):
             return True

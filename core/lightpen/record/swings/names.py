@@ -31,13 +31,7 @@ class Names:
 
 
 def folder_name(names: Names, now: datetime) -> str:
-    """Return the name of a swing's folder, by the time, the pen and the tip.
-
-    Parameters
-    ----------
-    names : Names
-        Whatever characters they have.
-    """
+    """Return the name of a swing's folder, by the time, the pen and the tip."""
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
     words = (f"{now:%Y%m%d-%H%M%S}", pen, tip)
     # Windows leaves dots at the end of a name out, and then finds the folder no more.

@@ -172,11 +172,8 @@ class Record:
 def open_record(folder: Path) -> Record:
     """Open a record, also after a crash of its writer.
 
-    Raises
-    ------
-    FileError
-        The folder is no record, or its files are damaged other than by a crash, or
-        written by a later version of the program.
+    Raises `FileError` if the folder is no record, or its files are damaged other than
+    by a crash, or written by a later version of the program.
     """
     header = read_header(folder)
     lines = read_lines(folder)
@@ -247,14 +244,9 @@ def missing_parts(folder: Path) -> tuple[str, ...]:
 
 
 def unacknowledged_images(record: Record) -> tuple[str, ...]:
-    """Return the images in the folder of a record that its journal does not name.
+    """Return the image files, in order, that the journal of a record does not name.
 
     A crash, or a journal that was cut, leaves them; they take no part.
-
-    Returns
-    -------
-    tuple of str
-        Files, from the folder of the record, in their order.
     """
     cameras = range(record.header.n_cameras)
     known = {image_name(image.number, c) for image in record.images for c in cameras}

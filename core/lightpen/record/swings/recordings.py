@@ -33,10 +33,7 @@ class FilesBeside:
 def files_beside(place: str) -> FilesBeside:
     """Return the camera and pen file in the folder of recorded images, or of a swing.
 
-    Parameters
-    ----------
-    place : str
-        Folder, pattern or video; or a camera file, which is offered itself.
+    The place is a folder, pattern or video; or a camera file, which is offered itself.
     """
     with suppress(OSError, ValueError, FileError):
         chosen = folder = Path(place)

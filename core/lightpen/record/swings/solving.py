@@ -88,17 +88,9 @@ def solve_record(
 ) -> Solution:
     """Solve a record.
 
-    Parameters
-    ----------
-    report : callable
-        Called with the fraction done, 0 to 1; what it raises ends the computation.
-
-    Raises
-    ------
-    FileError
-        No image, or not the camera or pen file, can be read.
-    CalibrationError
-        The images do not determine the tip; the text says what is missing.
+    ``report`` is called with the fraction done, 0 to 1; what it raises ends the
+    computation. Raises `FileError` if no image, or not the camera or pen file, can be
+    read, and `CalibrationError` if the images do not determine the tip.
     """
     if not record.images:
         raise CalibrationError("record.no-images", name=record.folder.name)
@@ -124,15 +116,8 @@ def solve_record(
 def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
     """Solve with other images excluded, from the same detections.
 
-    Parameters
-    ----------
-    taken_out : mapping of int to str
-        Numbers of all images that are not to take part, and why.
-
-    Raises
-    ------
-    CalibrationError
-        The rest does not determine the tip; the text says what is missing.
+    ``taken_out`` has the numbers of all images that are not to take part, and why.
+    Raises `CalibrationError` if the rest does not determine the tip.
     """
     seen = (solution.observations, *solution.others)
     return _solved(solution.source, solution.numbers, seen, taken_out)

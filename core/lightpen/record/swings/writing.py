@@ -82,15 +82,7 @@ class RecordWriter:
     def create(cls, folder: Path, header: Header, *, is_swing: bool = True) -> Self:
         """Create a record in a folder that does not exist or is empty.
 
-        Parameters
-        ----------
-        is_swing : bool
-            Whether the file manager opens it with the program: a swing, not touches.
-
-        Raises
-        ------
-        FileError
-            The folder holds something, or cannot be written.
+        The file manager opens a swing, not touches, with the program.
         """
         if folder.is_dir() and any(folder.iterdir()):
             raise FileError("record.not-empty", folder=printable(str(folder)))
@@ -124,11 +116,7 @@ class RecordWriter:
     def resume(cls, record: Record) -> Self:
         """Resume a record; incomplete data after a crash is overwritten.
 
-        Raises
-        ------
-        FileError
-            Another program writes to the record or did so since it was read, or it
-            cannot be written.
+        Raises `FileError` if another program writes to the record or did so since.
         """
         writer = cls(record.folder, record.next_number, record.length)
         for c in range(record.header.n_cameras):
@@ -137,13 +125,7 @@ class RecordWriter:
 
     @classmethod
     def of_damaged(cls, folder: Path) -> Self:
-        """Write into the journal of a record that cannot be read, to conclude it.
-
-        Raises
-        ------
-        FileError
-            Another program writes to the record, or it cannot be written.
-        """
+        """Write into the journal of a record that cannot be read, to conclude it."""
         length = sound_length(folder) if (folder / JOURNAL).exists() else 0
         return cls(folder, 1, length)
 
@@ -291,14 +273,9 @@ class RecordWriter:
 
 
 def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
-    """Make a folder for a record, with a name that none had.
+    """Make a folder for a record among the others, with a name that none had.
 
     Of two programs that do so in the same second each gets its own.
-
-    Parameters
-    ----------
-    root : Path
-        Folder of the records.
     """
     name = folder_name(names, now)
     try:
@@ -313,13 +290,7 @@ def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
 
 
 def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
-    """Note which images of a record take part from now on.
-
-    Parameters
-    ----------
-    taken_out : mapping of int to str
-        Numbers of all images that do not, and why.
-    """
+    """Note the numbers of all images of a record that take no part, and why."""
     record = open_record(folder)
     with RecordWriter.resume(record) as writer:
         if record.taken_out != taken_out:

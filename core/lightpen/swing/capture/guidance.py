@@ -63,20 +63,11 @@ class GuidanceInput:
 def next_posture(
     outlook: GuidanceInput, present: FloatArray, wanted: BoolArray | None = None
 ) -> Posture | None:
-    """Return the posture to lean the pen to.
+    """Return the posture to lean the pen to from ``present``, cam_from_pen (3, 3).
 
-    Parameters
-    ----------
-    present : (3, 3) array
-        Where the pen is, cam_from_pen.
-    wanted : (3, 8) array of bool, optional
-        Fields of the dial to choose from: upright (in the first column), leaning and
-        leaning far, by direction from the right. All unless given.
-
-    Returns
-    -------
-    Posture or None
-        None if the LEDs could be seen in none of the postures.
+    ``wanted`` (3, 8) are the fields of the dial to choose from, all unless given:
+    upright (in the first column), leaning and leaning far, by direction from the right.
+    None if the LEDs could be seen in none of the postures.
     """
     postures, rotations, fields = _candidates(outlook.pen)
     fit = _is_seen(outlook, rotations)
@@ -99,12 +90,9 @@ def visible_fields(outlook: GuidanceInput) -> BoolArray:
 
 
 def image_information(outlook: GuidanceInput, rotations: FloatArray) -> FloatArray:
-    """Predict the information of images about (tip, cone), (N, 6, 6), 1/mm^2.
+    """Predict the information (N, 6, 6), 1/mm^2, of images about (tip, cone).
 
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        cam_from_pen.
+    Their rotations (N, 3, 3) are those of cam_from_pen.
     """
     rig, pen = outlook.rig, outlook.pen
     none = np.zeros((len(rotations), rig.n_cameras, pen.n_leds, 2))

@@ -279,20 +279,10 @@ def distance_unit(kept: AcceptedImages) -> float:
 def without_slipped(
     rig: Rig, pen: Pen, kept: AcceptedImages, since: float = np.inf
 ) -> tuple[AcceptedImages, set[int]]:
-    """Exclude images with the tip out of the cone.
+    """Exclude images with the tip out of the cone; return the rest and the numbers.
 
-    Parameters
-    ----------
-    since : float
-        From this time on, s, an image need not be far out: it was taken when the tip
-        was about to leave.
-
-    Returns
-    -------
-    kept : AcceptedImages
-        The rest, with a new fit.
-    numbers : set of int
-        Of the images left out.
+    From the time ``since`` on, s, an image need not be far out: it was taken when the
+    tip was about to leave.
     """
     numbers = set[int]()
     for _ in range(MAX_PASSES):

@@ -37,17 +37,8 @@ class SimultaneousPoses(NamedTuple):
 def seen_by_rig(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
     """Return a detection with the pose by another camera where the first has none.
 
-    Unchanged if the first camera shows enough of the pen, or none does.
-
-    Parameters
-    ----------
-    detection : PenDetection
-        Detection of the first camera, with the simultaneous ones of the others.
-
-    Returns
-    -------
-    PenDetection
-        Its pose is rig_from_pen.
+    It is that of the first camera, with the simultaneous ones of the others. Unchanged
+    if the first camera shows enough of the pen, or none does.
     """
     for c, seen in enumerate((detection, *detection.others)):
         if seen.has_pose and seen.n_leds >= certain_leds(pen) and not seen.is_blurred:

@@ -96,18 +96,10 @@ class Transition:
 def advance_swing(
     setup: SwingSetup, state: SwingState, detection: PenDetection, time: float
 ) -> Transition:
-    """Take one more image.
+    """Take one more image at a time, s, that never goes back.
 
-    Parameters
-    ----------
-    time : float
-        When the image was taken, s; never goes back.
-
-    Returns
-    -------
-    Transition
-        An event `KEPT` asks for the image to be recorded under its number, before the
-        next image is taken; one of `SLIPPED` names kept images that are dropped.
+    An event `KEPT` asks for the image to be recorded under its number, before the next
+    image is taken; one of `SLIPPED` names kept images that are dropped.
     """
     state = _noticed(setup, state, detection, time)
     rule = _RULES.get(state.phase)
@@ -188,16 +180,9 @@ def stillness(state: SwingState) -> float:
 def start_again(
     setup: SwingSetup, kept: AcceptedImages, next_number: int, time: float = 0.0
 ) -> SwingState:
-    """Return an interrupted swing with its accepted images.
+    """Return an interrupted swing with its accepted images; see `kept_before`.
 
-    Parameters
-    ----------
-    kept : AcceptedImages
-        See `lightpen.swing.capture.kept_images.kept_before`.
-    next_number : int
-        Of the next image in the swing's record.
-    time : float
-        s.
+    ``next_number`` is that of the next image in the swing's record.
     """
     state = start_swing(setup, time)
     trace = trace_of(setup.rig, setup.pen, kept)

@@ -53,15 +53,7 @@ def tip_prior(pen: Pen) -> tuple[FloatArray, float]:
 def fit_seat(
     pen: Pen, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
 ) -> Seat:
-    """Fit tip and cone to poses and to a prior of the tip.
-
-    Parameters
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Poses cam_from_pen, mm.
-    covariances : (N, 6, 6) array
-        Of each pose's (theta, dt), rad and mm.
-    """
+    """Fit tip and cone to poses and to a prior of the tip; see `tip_distances`."""
     expected, sigma = tip_prior(pen)
     spread = tip_covariances(rotations, covariances, expected) + SEATING**2 * np.eye(3)
     A = contact_matrix(rotations)
@@ -84,19 +76,11 @@ def tip_offsets(
 def tip_distances(
     seat: Seat, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
 ) -> FloatArray:
-    """Return the distances of the tip from the cone, in standard deviations.
+    """Return the distances (N,) of the tip from the cone, in standard deviations.
 
-    Parameters
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Poses cam_from_pen, mm.
-    covariances : (N, 6, 6) array
-        Of each pose's (theta, dt), rad and mm.
-
-    Returns
-    -------
-    (N,) array
-        1.73 on average where the tip rests in the cone.
+    They are 1.73 on average where the tip rests in the cone. The poses cam_from_pen are
+    rotations (N, 3, 3) and translations (N, 3), mm; their covariances (N, 6, 6) are of
+    (theta, dt), rad and mm.
     """
     offsets = tip_offsets(seat, rotations, translations)
     A = contact_matrix(rotations)

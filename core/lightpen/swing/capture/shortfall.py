@@ -130,15 +130,7 @@ def out_of_reach(
 def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
     """Return the least and the greatest turn of a pen about its own axis, rad.
 
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        cam_from_pen.
-
-    Returns
-    -------
-    pair of float or None
-        None without any rotation.
+    None without any of the rotations cam_from_pen (N, 3, 3).
     """
     if not len(rotations):
         return None

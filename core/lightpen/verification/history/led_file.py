@@ -73,15 +73,7 @@ class ImprovedPen:
 def calibrate_again(
     calibration: CalibrationFile, camera: Camera, pen: Pen
 ) -> Calibration:
-    """Calibrate again from the LED centres of a calibration.
-
-    Raises
-    ------
-    UsageError
-        They are of several cameras.
-    CalibrationError
-        They do not determine the tip.
-    """
+    """Calibrate again from the LED centres of a calibration by one camera."""
     if calibration.is_of_rig:
         raise UsageError("led-file.of-rig", path=printable(str(calibration.path)))
     shown = shown_images(calibration.calibration)
@@ -106,20 +98,10 @@ def improve_pen(
 ) -> ImprovedPen:
     """Improve the LEDs of a pen by several swings; the last one has to confirm it.
 
-    Parameters
-    ----------
-    scale : Scale, optional
-        Scale of the pen from certified lengths.
-    report : callable, optional
-        Called with the fraction done, 0 to 1; what it raises ends the work.
-
-    Raises
-    ------
-    UsageError
-        The swings are of different pens.
-    CalibrationError
-        There are too few, an LED moved between them, or the last one does not confirm
-        the new LEDs.
+    The scale of the pen is from certified lengths; ``report`` is called with the
+    fraction done, 0 to 1; what it raises ends the work. Raises `UsageError` for
+    different pens, and `CalibrationError` if there are too few swings, an LED moved
+    between them, or the last one does not confirm the new LEDs.
     """
     require_one_pen(calibrations)
     if len(calibrations) < MIN_POOLED + 1:

@@ -93,21 +93,11 @@ class PenHealth:
 def examine_pen(
     calibrations: Sequence[CalibrationFile], camera: Camera | None, leds: FloatArray
 ) -> PenHealth:
-    """Examine a pen by its calibrations, the oldest first.
+    """Examine a pen by at least two calibrations, the oldest first.
 
-    Parameters
-    ----------
-    camera : Camera or None
-        Camera of all swings as in its file; without it the growth is not determined.
-    leds : (L, 3) array
-        As the pen file has them, mm.
-
-    Raises
-    ------
-    UsageError
-        They are of different pens.
-    CalibrationError
-        There are fewer than two.
+    The camera is that of all swings as in its file; without it the growth is not
+    determined. The LEDs (L, 3), mm, are those of the pen file. Raises `UsageError` for
+    different pens.
     """
     require_one_pen(calibrations)
     if len(calibrations) < MIN_SWINGS:
@@ -136,13 +126,7 @@ def examine_pen(
 
 
 def require_one_pen(calibrations: Sequence[CalibrationFile]) -> None:
-    """Refuse calibrations with different pen files.
-
-    Raises
-    ------
-    UsageError
-        Says which one differs from the first.
-    """
+    """Refuse calibrations with another pen file than the first."""
     for each in calibrations[1:]:
         if each.pen_sha256 != calibrations[0].pen_sha256:
             raise UsageError(

@@ -129,11 +129,6 @@ def improve_led_file(
     """Write an improved LED file; see `led_file.improve_pen`.
 
     The old file stays, and no file is replaced.
-
-    Raises
-    ------
-    CalibrationError
-        There are too few swings, or the one held out does not confirm it.
     """
     if pen.camera is None:
         raise ValueError("The camera of the swings must be chosen.")
@@ -156,17 +151,9 @@ def adjust_together(
     now: datetime,
     report: Tell = lambda _: None,
 ) -> NewLedFile:
-    """Write LED file and camera file by accepted swings with the files that are chosen.
+    """Write LED file and camera file by the accepted swings with the chosen results.
 
-    Parameters
-    ----------
-    chosen : collection of Path
-        Files of the results; those with other files take no part.
-
-    Raises
-    ------
-    CalibrationError, FileError
-        As of `improve_led_file`.
+    Results with other files take no part; see `improve_led_file`.
     """
     pen = read_pen_over_time(archive, preparation)
     swings = tuple(each for each in pen.swings if each.path in chosen)

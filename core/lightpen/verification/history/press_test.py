@@ -84,12 +84,8 @@ class PressTest:
 def press_test(usual: Calibration, firm: Calibration) -> PressTest:
     """Compare a swing with firm pressure with the usual one.
 
-    Raises
-    ------
-    UsageError
-        They are of different cameras or LEDs.
-    CalibrationError
-        The images of one do not fit the instrument of the other.
+    Raises `UsageError` if they are of different cameras or LEDs, and `CalibrationError`
+    if the images of one do not fit the instrument of the other.
     """
     one, other = usual.instrument, firm.instrument
     if one.rig.n_cameras != other.rig.n_cameras or one.pen.n_leds != other.pen.n_leds:

@@ -58,13 +58,7 @@ def read_fixed_point(path: Path) -> RepeatedPoint:
 
 
 def fixed_point_in(record: str) -> RepeatedPoint | None:
-    """Return the fixed point of a record; None for another task.
-
-    Parameters
-    ----------
-    record : str
-        Its JSON, which was checked before.
-    """
+    """Return the fixed point of a checked record in JSON; None for another task."""
     try:
         return _touched(
             parse_own_json(record.encode("utf-8", "surrogateescape"), _FixedPoint)

@@ -82,13 +82,7 @@ class Comparison:
 
 
 def trend_of(database: Database, wanted: EntryFilter) -> Trend:
-    """Return the trend of a pen and tip, of the newest calibrations if they are many.
-
-    Parameters
-    ----------
-    wanted : EntryFilter
-        Filter with a pen and a tip; only entries of calibrations are used.
-    """
+    """Return the trend of the pen and tip of a filter, of the newest if many."""
     accepted = replace(wanted, kinds=(Kind.ACCEPTED,))
     found = lines(database, accepted, 0, LONGEST)
     entries = tuple(
@@ -158,12 +152,8 @@ def repeatability_of(
 ) -> Repeatability | None:
     """Return the repeatability; None for fewer than two calibrations or several tips.
 
-    Parameters
-    ----------
-    entries : tuple of StoredEntry
-        Reinstated tips are ignored, since nothing was measured.
-    tolerance, reference, touched
-        As `measure_repeatability` takes them.
+    Reinstated tips are ignored, since nothing was measured; see
+    `measure_repeatability`.
     """
     measured = [e for e in entries if e.entry.event.kind is not Kind.RESTORED]
     if len(measured) < MIN_TIPS or len({_subject(each) for each in measured}) > 1:

@@ -76,17 +76,10 @@ class CurrentTip:
 
 
 def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> CurrentTip:
-    """Return the current tip of the pen and tip that are chosen.
+    """Return the current tip of the pen and tip that are chosen, with both files.
 
-    Parameters
-    ----------
-    preparation : Preparation
-        Preparation with names and both files.
-
-    Raises
-    ------
-    LightpenError
-        There is none, its result was changed, or it is of another LED file.
+    Raises `LightpenError` if there is none, its result was changed, or it is of another
+    LED file.
     """
     names, origin = preparation.names, preparation.origin
     pen_file = preparation.pen_file
@@ -125,10 +118,7 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
 def tip_at(tip: CurrentTip, place: ImageLocation) -> CurrentTip:
     """Return a tip before the camera of recorded images, if they bring one.
 
-    Raises
-    ------
-    UsageError
-        They are of another pen.
+    Raises `UsageError` if they are of another pen.
     """
     viewers, pen, pen_file = place.viewers, place.pen, place.pen_file
     if viewers is None or pen is None or pen_file is None:

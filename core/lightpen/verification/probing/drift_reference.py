@@ -166,10 +166,7 @@ def drift_of_images(
 ) -> LampDrift | None:
     """Return the drift of fixed lamps; None without one, or of too few images.
 
-    Parameters
-    ----------
-    focal_length : float
-        px.
+    The focal length is in px.
     """
     if not images.lights:
         return None
@@ -183,10 +180,7 @@ def drift_of_lamps(
 ) -> LampDrift | None:
     """Return the drift of lamps (N, K, 2), px; NaN where an image does not show one.
 
-    Parameters
-    ----------
-    scale : float
-        mm where the pen is for a pixel.
+    The scale is in mm where the pen is, for a pixel.
     """
     lamps = lamps[np.isfinite(lamps[..., 0]).any(axis=1)]
     n_images, n_lamps = lamps.shape[:2]

@@ -104,11 +104,7 @@ def read_viewers(camera_file: Path | None, rig_file: Path | None) -> PenCameras 
 def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation:
     """Return a place as `lightpen.formats.images.find_images` takes it, or a record.
 
-    Parameters
-    ----------
-    rig : Rig, optional
-        Rig of the images. The place then lists one place per camera, or is a folder
-        with one sub-folder per camera.
+    With a rig, it lists one place per camera, or is a folder with one sub-folder each.
     """
     folder = Path(where[0])
     if len(where) == 1 and is_record(folder):
@@ -164,13 +160,7 @@ def _of_each_camera(where: tuple[str, ...], rig: Rig) -> tuple[str, ...]:
 
 
 def runs_at(place: str, rig: Rig | None = None) -> tuple[str, ...]:
-    """Return the runs at a place: itself, or the folders in it if they hold the images.
-
-    Raises
-    ------
-    FileError
-        There are no images in any of them.
-    """
+    """Return the runs at a place: itself, or folders in it that hold the images."""
     folder = Path(place)
     if is_record(folder):
         return (place,)

@@ -214,11 +214,7 @@ def take_all(
 def read_rules(is_still: bool, n_frames: int) -> ProbingRules:
     """Return the probing rules for recorded images.
 
-    Parameters
-    ----------
-    is_still : bool
-        Whether the pen is held still through the images of a touch; else each image is
-        a touch.
+    The pen is held still through the images of a point, or each image is a point.
     """
     return ProbingRules(n_frames) if is_still else ONE_IMAGE
 

@@ -81,15 +81,10 @@ def lamp_drift_of(
 def instrument_of(
     calibration: CalibrationFile, viewers: PenCameras, pen: Pen, pen_file: Path
 ) -> Instrument:
-    """Return the instrument that a calibration left.
+    """Return the instrument that a calibration of the same pen left.
 
     Before other cameras than those of the calibration, tip and LEDs are as the swing
     left them and the cameras are as their files have them.
-
-    Raises
-    ------
-    UsageError
-        The calibration is of another pen.
     """
     record = calibration.calibration
     if sha256(pen_file) != calibration.pen_sha256 or pen.n_leds != len(record.leds):
@@ -148,14 +143,8 @@ def touch_run(
 
     With one image a touch, and none to settle, each image is a touch; else the pen must
     be held still through as many as the rules say. Images of which it is recorded what
-    touch they are of need no rules.
-
-    Raises
-    ------
-    FileError
-        No image can be read, or those of two cameras are of other moments.
-    CalibrationError
-        No image shows the pen, or its LEDs are not those of the pen.
+    touch they are of need no rules. Raises `CalibrationError` if no image shows the
+    pen, or its LEDs are not those of the pen.
     """
     seen = observe_place(place, instrument)
     return touches_of(place.name, seen, instrument, rules, place.touches)
@@ -164,13 +153,7 @@ def touch_run(
 def observe_place(
     place: ImageLocation, instrument: Instrument
 ) -> tuple[Observations, ...]:
-    """Find and label the LEDs in the images of each camera.
-
-    Raises
-    ------
-    FileError, CalibrationError
-        As of `touch_run`.
-    """
+    """Find and label the LEDs in the images of each camera; see `touch_run`."""
     rig, pen = instrument.rig, instrument.pen
     if len(place.images) != rig.n_cameras:
         raise _other_number(place, rig)
@@ -216,13 +199,7 @@ def touches_of(
 
 
 def require_leds_fit(name: str, touches: Sequence[ProbedPoint]) -> None:
-    """Reject touches with images of another pen.
-
-    Raises
-    ------
-    CalibrationError
-        The median residual of the touches is larger than that of this pen can be.
-    """
+    """Reject touches whose median residual is larger than that of this pen can be."""
     rms = float(np.median([touch.rms for touch in touches]))
     if rms > MAX_RMS:
         raise CalibrationError(

@@ -16,13 +16,7 @@ COLOURS = {"line": "#1f5fa8", "center": "#3a3a3a", "limit": "#b3261e"}
 
 
 def write_chart(found: Repeatability, path: Path) -> None:
-    """Write the control chart of a tip by the suffix of its name.
-
-    Raises
-    ------
-    UsageError
-        The name ends neither in .csv nor in .svg.
-    """
+    """Write the control chart of a tip as .csv or .svg, by the suffix of its name."""
     suffix = path.suffix.lower()
     if suffix == ".csv":
         text = _table(found)

@@ -23,22 +23,10 @@ def verification_record(
     inputs: Mapping[str, Any],
     rule: Message = BY_SIMPLE_ACCEPTANCE,
 ) -> dict[str, Any]:
-    """Return the record of a verification.
+    """Return the record of a verification of a kind, of its entries and input files.
 
-    Parameters
-    ----------
-    kind : str
-        Kind of the task.
-    entries : mapping
-        Results of the task.
-    assessment : VerificationAssessment or None
-        None of what is measured and not judged.
-    limits : mapping of str to float
-        That it was judged by, mm.
-    rule : Message
-        By which it was judged.
-    inputs : mapping
-        Input files.
+    The assessment is None of what is measured and not judged; the limits, mm, and the
+    rule are those that it was judged by.
     """
     record = {
         **record_heading(local_now()),

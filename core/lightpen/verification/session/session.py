@@ -118,15 +118,8 @@ def run_again(
 ) -> SessionState:
     """Return the state with an earlier run, with its options of that time.
 
-    Parameters
-    ----------
-    is_last : bool
-        Whether the task at hand ended with it.
-
-    Raises
-    ------
-    CalibrationError
-        It is none of the task at hand.
+    ``is_last``: the task at hand ended with it. Raises `CalibrationError` if it is none
+    of the task at hand.
     """
     state, task = replace(state, touches=touches), state.task(setup)
     if task is None:
@@ -161,25 +154,13 @@ def touch_again(
 
 
 def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
-    """Return the result of a task from its points.
-
-    Raises
-    ------
-    CalibrationError
-        They do not suffice.
-    """
+    """Return the result of a task from its points."""
     found: Found = task.measure(runs, setup.conditions, setup.choices.options_of(task))
     return found
 
 
 def measure_with_drift(setup: SessionSetup, done: RunsOfTask) -> Found:
-    """Return the result of a task, with the motion of the camera.
-
-    Raises
-    ------
-    CalibrationError
-        They do not suffice.
-    """
+    """Return the result of a task, with the motion of the camera."""
     by = with_drift(setup if done.setup is None else done.setup, done.drift)
     found = measure(by, done.task, done.runs)
     return replace(found, assessment=judged_with(found.assessment, done.lamps))
@@ -240,10 +221,7 @@ def without_last_touch(state: SessionState) -> SessionState:
 def with_moved_part(setup: SessionSetup, state: SessionState) -> SessionSetup:
     """Return the setup of a session in which part or camera was moved just now.
 
-    Raises
-    ------
-    CalibrationError
-        The runs so far have no datum points.
+    Raises `CalibrationError` if the runs so far have no datum points.
     """
     options = setup.choices.options_of(PART)
     moves = with_move(options, state.runs, setup.conditions).moves

@@ -147,13 +147,7 @@ class CheckpointFile:
         self._written: VerificationCheckpoint | None = None
 
     def hold(self) -> None:
-        """Keep other windows from offering it.
-
-        Raises
-        ------
-        FileError
-            Another window holds it, or it cannot be locked.
-        """
+        """Keep other windows from offering it; refuse if another one holds it."""
         if self._descriptor is not None:
             return
         make_folder(self._path.parent)

@@ -62,14 +62,9 @@ def conclusion_record(
     conclusion: Conclusion,
     files: tuple[InputFile, ...],
 ) -> dict[str, Any]:
-    """Return the record of a conclusion.
+    """Return the record of a conclusion on the result in ``tip_file``.
 
-    Parameters
-    ----------
-    tip_file : InputFile
-        The result that was verified.
-    files : tuple of InputFile
-        All records of the session.
+    ``files`` are all records of the session.
     """
     found = conclusion.found
     return {
@@ -97,12 +92,8 @@ def accepting_supervisor(
 ) -> tuple[str, SigningKey | None]:
     """Return name and key of the supervisor who accepts the tip.
 
-    An empty name and no key if none is needed.
-
-    Raises
-    ------
-    AcceptanceError
-        A supervisor is needed, and none signs or the password is wrong.
+    An empty name and no key if none is needed; `AcceptanceError` if one is, and none
+    signs or the password is wrong.
     """
     if not supervision.is_guarded and found.grade is not Grade.REPEAT:
         return "", None

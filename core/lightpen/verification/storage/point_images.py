@@ -167,13 +167,7 @@ class PointImages:
         self._runs = tuple(run for run in self._runs if run.task in kinds)
 
     def take_over(self, runs: Sequence[CountingRun], folder: Path) -> None:
-        """Continue after interrupted runs; an unfinished one is resumed.
-
-        Parameters
-        ----------
-        folder : Path
-            Folder of all records of touches.
-        """
+        """Continue after interrupted runs in the folder of all records."""
         self.forget_but(())
         done = []
         for run in runs:

@@ -53,11 +53,8 @@ def read_runs(
 ) -> ReadRuns:
     """Return the results from recorded images.
 
-    Parameters
-    ----------
-    setup : SessionSetup
-        Setup with the camera motion in between, if known; fixed lamps in the images are
-        used in addition.
+    The camera motion in between, if known, is in the setup; fixed lamps in the images
+    are used in addition.
     """
     rig = tip.viewers.rig
     places = [touch_place((run,), rig) for run in runs_at(place, rig)]

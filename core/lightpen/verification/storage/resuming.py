@@ -94,16 +94,9 @@ def resume_verification(
 ) -> ResumedVerification:
     """Return an interrupted verification with its results and touches.
 
-    Parameters
-    ----------
-    preparation : Preparation
-        Preparation with the names and files of the session.
-
-    Raises
-    ------
-    LightpenError
-        Another tip is in force by now, other files are chosen, or a record of touches
-        cannot be read.
+    The preparation has the names and files of the session. Raises `LightpenError` if
+    another tip is in force by now, other files are chosen, or a record of touches
+    cannot be read.
     """
     tip = read_tip_in_force(archive, preparation)
     _require_same(tip, under_way)

@@ -104,13 +104,7 @@ class SessionRecords:
         self._waiting.append((kept, self._files))
 
     def write(self) -> None:
-        """Write all queued records.
-
-        Raises
-        ------
-        FileError
-            One cannot be written; it and those after it stay pending.
-        """
+        """Write all queued records; what cannot be written stays pending."""
         while self._waiting:
             kept, files = self._waiting[0]
             self._write(kept, files)
@@ -276,13 +270,7 @@ class SessionKeeping:
         self._done = {}
 
     def write(self) -> None:
-        """Write pending records.
-
-        Raises
-        ------
-        LightpenError
-            Something cannot be written; it stays pending.
-        """
+        """Write pending records; what cannot be written stays pending."""
         self._records.write()
 
     def note(self, status: VerificationStatus) -> None:
@@ -317,18 +305,7 @@ class SessionKeeping:
     def take_over(
         self, path: Path, before: ResumedVerification, lamp_drift: LampDrift | None
     ) -> None:
-        """Continue an interrupted verification.
-
-        Parameters
-        ----------
-        path : Path
-            Its file.
-
-        Raises
-        ------
-        FileError
-            Another window has it, or a record cannot be read or written to.
-        """
+        """Continue an interrupted verification, unless another window has it."""
         under_way, file = before.under_way, CheckpointFile(path)
         file.hold()
         try:

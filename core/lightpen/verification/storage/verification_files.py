@@ -67,17 +67,8 @@ def keep_verification(
 ) -> Path:
     """Keep the record of a verification in a data folder, and return its file.
 
-    Where there is a supervisor password, it is signed by the station.
-
-    Parameters
-    ----------
-    supervisor : SigningKey, optional
-        Of the supervisor whom the record names.
-
-    Raises
-    ------
-    FileError
-        It cannot be written, or not be signed.
+    Where there is a supervisor password, it is signed by the station, and by the
+    supervisor whom the record names.
     """
     folder = verifications_folder(data, is_simulated=is_simulated)
     supervision = read_supervision(data)
@@ -104,13 +95,7 @@ def task_record(
     session: datetime,
     images: TaskImages,
 ) -> dict[str, Any]:
-    """Return the record of a task.
-
-    Parameters
-    ----------
-    session : datetime
-        When the verification began that it is part of.
-    """
+    """Return the record of a task in the verification that began at ``session``."""
     names, limits = tip.names, asdict(choices.limits)
     return verification_record(
         task.kind,

@@ -121,13 +121,9 @@ def measure_articulation(
 ) -> Articulation:
     """Measure the location error of a point.
 
-    A run is a posture; a single run holds five, one after the other.
-
-    Raises
-    ------
-    CalibrationError
-        There are fewer than five postures of five points, the postures are alike, or a
-        point is of another place.
+    A run is a posture; a single run holds five, one after the other. Raises
+    `CalibrationError` if there are fewer than five postures of five points, the
+    postures are alike, or a point is of another place.
     """
     postures = by_posture(runs)
     _require_enough(postures)
@@ -176,17 +172,9 @@ def by_posture(
 
 
 def smallest_diameters(points: FloatArray) -> FloatArray:
-    """Return the diameters of the smallest spheres about a few points each.
+    """Return the diameters (K,) of the smallest spheres about points (K, N, 3), mm.
 
-    Parameters
-    ----------
-    points : (K, N, 3) array
-        mm.
-
-    Returns
-    -------
-    (K,) array
-        mm. The smallest of the spheres through two to four points that hold all others.
+    They are the smallest of those through two to four points that hold all others.
     """
     best = np.full(len(points), np.inf)
     for size in (2, 3, 4):

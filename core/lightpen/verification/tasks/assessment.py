@@ -94,10 +94,8 @@ def judged_error(
 ) -> VerificationAssessment | None:
     """Return the assessment of an error with its U (k = 2), mm; None if it passes.
 
-    Parameters
-    ----------
-    blamed : VerificationAssessment
-        Reason and next step of a significant error; its grade is not used.
+    Reason and next step of a significant error are those of ``blamed``, its grade is
+    not.
     """
     grade = graded(error, uncertainty, limit, limits, n_values)
     if grade is Grade.PASS:

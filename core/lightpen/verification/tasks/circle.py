@@ -176,11 +176,8 @@ def measure_circle(
 
     The radius within a bore is larger than that of the tip centres by that of the ball,
     and round a boss smaller. It is off by as much as the camera moves halfway round.
-
-    Raises
-    ------
-    CalibrationError
-        Points are too few, no circle, or cover too little of it.
+    Raises `CalibrationError` if points are too few, no circle, or cover too little of
+    it.
     """
     instrument, drift = conditions.instrument, conditions.drift
     certified = options.radius

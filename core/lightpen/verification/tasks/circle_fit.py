@@ -71,13 +71,7 @@ class CircleFit:
 
 
 def fit_circle(points_cam: FloatArray) -> CircleFit:
-    """Fit a circle to points (N, 3), mm, that lie on one.
-
-    Raises
-    ------
-    CalibrationError
-        They lie in one place or on a line.
-    """
+    """Fit a circle to points (N, 3), mm, not in one place nor on a line."""
     middle = points_cam.mean(axis=0)
     extents = np.linalg.svd(points_cam - middle, compute_uv=False)
     if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (

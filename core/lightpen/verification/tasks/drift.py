@@ -91,13 +91,7 @@ class DriftOptions(TaskOptions, frozen=True, tag="drift"):
 def measure_drift(
     visits: Runs, conditions: Conditions, options: DriftOptions | None = None
 ) -> Drift:
-    """Measure how a drift reference moves from visit to visit, in the order of time.
-
-    Raises
-    ------
-    CalibrationError
-        There are fewer than two visits.
-    """
+    """Measure how a drift reference moves over two visits or more, in order."""
     if len(visits) < MIN_VISITS:
         raise CalibrationError("drift.too-few")
     first, *others = [mean_point(touches) for _, touches in visits]

@@ -145,10 +145,7 @@ def measure_fixed_point(
 ) -> FixedPoint:
     """Measure a fixed point by all runs, and judge the tip by its scatter.
 
-    Raises
-    ------
-    CalibrationError
-        There are too few points at one place.
+    Raises `CalibrationError` if there are too few points at one place.
     """
     instrument, cone_cam = conditions.instrument, conditions.cone_cam
     touches = [point for _, points in runs for point in points]

@@ -220,12 +220,8 @@ def measure_length(
     """Measure a length at one or several places.
 
     A run holds the points of both ends at one place. Inner faces lie farther out than
-    the centre of the ball by its radius, outer ones less.
-
-    Raises
-    ------
-    CalibrationError
-        The points of a place are not of two ends.
+    the centre of the ball by its radius, outer ones less. Raises `CalibrationError` if
+    the points of a place are not of two ends.
     """
     instrument, drift = conditions.instrument, conditions.drift
     certified, known = options.certified(len(runs))

@@ -129,15 +129,9 @@ class Part(Found):
 def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
     """Measure a part by its plan, as far as it was probed.
 
-    Parameters
-    ----------
-    runs : sequence of (str, touches)
-        Named after features, or in the order of the plan.
-
-    Raises
-    ------
-    CalibrationError
-        The touches of a feature are too few, show no side or do not determine it.
+    Runs are named after features, or in the order of the plan. Raises
+    `CalibrationError` if the touches of a feature are too few, show no side or do not
+    determine it.
     """
     if options.plan is None:
         raise CalibrationError("part.no-plan")
@@ -171,13 +165,7 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
 
 
 def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> None:
-    """Refuse the last of some runs if it does not determine its feature.
-
-    Raises
-    ------
-    CalibrationError
-        As of `measure_by_plan`.
-    """
+    """Refuse the last of some runs if it does not determine its feature."""
     if options.plan is None:
         return
     found = _owned(runs, options)

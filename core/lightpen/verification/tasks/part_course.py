@@ -85,13 +85,8 @@ def with_move(
 ) -> PartOptions:
     """Return the options with a new position of the part after the present runs.
 
-    Its datum points are the three features with a centre that span the largest
-    triangle.
-
-    Raises
-    ------
-    CalibrationError
-        No three features with a centre that are probed span a triangle.
+    Its datum points are the three probed features with a centre that span the largest
+    triangle (`CalibrationError` if there are none).
     """
     centres: dict[str, FloatArray] = {}
     for planned, points in zip(course(options), runs, strict=False):

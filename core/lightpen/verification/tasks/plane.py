@@ -158,10 +158,7 @@ def measure_plane(
 ) -> Flatness:
     """Measure the flatness of a plate by the points of all runs.
 
-    Raises
-    ------
-    CalibrationError
-        The points are too few, lie on a line, or on no plane.
+    Raises `CalibrationError` if they are too few, lie on a line, or on no plane.
     """
     points = [point for _, own in runs for point in own]
     places = np.array([point.point_cam for point in points]).reshape(-1, 3)
@@ -200,13 +197,7 @@ def measure_plane(
 
 
 def fit_plane(points_cam: FloatArray) -> PlaneFit:
-    """Fit a plane to points (N, 3), mm.
-
-    Raises
-    ------
-    CalibrationError
-        They lie in one place or on a line.
-    """
+    """Fit a plane to points (N, 3), mm, not in one place nor on a line."""
     center = points_cam.mean(axis=0)
     _, extents, axes = np.linalg.svd(points_cam - center, full_matrices=False)
     if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (

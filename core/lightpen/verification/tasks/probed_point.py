@@ -199,13 +199,9 @@ def on_surface(
 ) -> ProbedPoint:
     """Return a touch moved from the centre of its ball to the surface that it touched.
 
-    Parameters
-    ----------
-    ball_radius : float
-        mm; less than 0 against the direction.
-    direction_cam : (3,) array, optional
-        Unit vector from the ball to the surface; if not given, the approach, or along
-        the axis of the pen where none is known.
+    A ball radius, mm, below 0 moves it against the direction (3,) from the ball to the
+    surface; if not given, that is the approach, or along the axis of the pen where none
+    is known.
     """
     if direction_cam is None:
         direction_cam = touch.approach_cam

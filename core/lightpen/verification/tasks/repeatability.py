@@ -171,19 +171,10 @@ def measure_repeatability(
 ) -> Repeatability:
     """Return the repeatability of calibrations of one tip.
 
-    Parameters
-    ----------
-    tolerance : float, optional
-        Width of the tolerance of a coordinate, mm, to study the capability.
-    reference : (3,) array, optional
-        The tip by a better instrument, mm.
-    touched : RepeatedPoint, optional
-        A fixed point touched with the tip.
-
-    Raises
-    ------
-    CalibrationError
-        There are fewer than two tips.
+    A ``tolerance``, the width of that of a coordinate, mm, adds the capability C_g,
+    with a ``reference`` (3,), the tip by a better instrument, mm, also C_gk.
+    ``touched`` is a fixed point touched with the tip. Raises `CalibrationError` for
+    fewer than two tips.
     """
     if len(tips) < MIN_TIPS:
         raise CalibrationError("repeatability.too-few", n_tips=len(tips))
@@ -240,13 +231,7 @@ def _points_to(tip: FloatArray, n_tips: int, touched: RepeatedPoint) -> Message 
 
 
 def _is_larger(one: float, other: float, variance: float) -> bool:
-    """Return whether a deviation is larger by more than chance.
-
-    Parameters
-    ----------
-    variance : float
-        Variance of the logarithm of the variance ratio.
-    """
+    """Return whether a deviation is larger by more than chance, by its log variance."""
     if not (one > 0 and other > 0):
         return one > 0
     return 2 * float(np.log(one / other)) > (

@@ -183,10 +183,8 @@ def measure_sphere(
 ) -> Sphere:
     """Measure size and form of a sphere by the points of all runs.
 
-    Raises
-    ------
-    CalibrationError
-        The points are too few, cover too little, or lie on no sphere.
+    Raises `CalibrationError` if they are too few, cover too little, or lie on no
+    sphere.
     """
     points = [point for _, own in runs for point in own]
     places = np.array([point.point_cam for point in points]).reshape(-1, 3)
@@ -237,13 +235,7 @@ def measure_sphere(
 
 
 def fit_sphere(points_cam: FloatArray) -> SphereFit:
-    """Fit a sphere to points (N, 3), mm.
-
-    Raises
-    ------
-    CalibrationError
-        The points lie in a plane or determine no sphere.
-    """
+    """Fit a sphere to points (N, 3), mm, not in a plane."""
     try:
         found = fit_feature(FeatureKind.SPHERE, points_cam)
     except CalibrationError as error:

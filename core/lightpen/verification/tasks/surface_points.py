@@ -48,10 +48,7 @@ def split_points(
 def simulated_ranges(root: FloatArray, n_rows: int = 1) -> FloatArray:
     """Return ranges of normal residuals, the largest of some rows, (N_TRIALS,), mm.
 
-    Parameters
-    ----------
-    root : (m, k) array
-        Square root of their covariance; the rows follow each other.
+    ``root`` (m, k) is the square root of their covariance; the rows follow each other.
     """
     rng = np.random.default_rng(0)  # the same points give the same ranges
     off = rng.standard_normal((N_TRIALS, root.shape[1])) @ root.T

@@ -423,13 +423,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         )
 
     def headline(self, progress: TaskProgress, *, is_next: bool) -> Message:
-        """Return the instruction in a few words.
-
-        Parameters
-        ----------
-        is_next : bool
-            Whether a point was just recorded.
-        """
+        """Return the instruction in a few words, also just after a point."""
         if progress.points and (is_next or self.other_run):
             return self.another
         return self.other_run if progress.runs and self.other_run else self.first

@@ -230,10 +230,7 @@ def points_evidence(
 ) -> TipEvidence:
     """Return the evidence of points in one cone on the tip.
 
-    Parameters
-    ----------
-    drift : (3,) array
-        Standard uncertainty of a point by a camera that moved meanwhile, mm.
+    ``drift`` (3,) is the standard uncertainty of a point by a camera that moved, mm.
     """
     n = len(points)
     places = np.array([point.point_cam for point in points])

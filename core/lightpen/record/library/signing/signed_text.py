@@ -31,13 +31,7 @@ class Signers:
     supervisor: SigningKey | None = None
 
     def signed(self, text: bytes, place: str) -> bytes:
-        """Return the text of an object, without a checksum, with the signatures.
-
-        Parameters
-        ----------
-        place : str
-            Of the file from the data folder, as `place_in`.
-        """
+        """Return a JSON object without checksum with the signatures; see `place_in`."""
         body = text.rstrip().removesuffix(b"}").rstrip()
         if self.supervisor is not None:
             body = _with(body, _SUPERVISOR, self.supervisor, place)
