@@ -28,6 +28,9 @@ ZOOM_STEP = 1.25
 PAN_STEP = 0.1  # of what is seen
 CLICK_SLACK = 4  # px that a mouse may move while it clicks
 LEAST_RING = 6.0  # px, radius
+# px high: of higher images Qt has parts drawn by other threads and waits for them, which
+# keeps all other threads of Python waiting, too.
+STRIP = 64
 LABEL_DISTANCES = (3.0, 12.0)  # px from a ring to its label
 LABEL_TURNS = tuple(math.radians(15 * k) for k in sorted(range(-11, 13), key=abs))
 
@@ -192,23 +195,34 @@ class ImageView(Translated, QWidget):
             painter.drawText(box, flags, self._message)
             return
         target, scale = self._target()
-        smooth = 2 * scale < 1  # enlarged, the pixels themselves are of interest
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
-        painter.drawImage(
-            QRectF(target.topLeft(), self._shown.size() * 2 * scale), self._shown
-        )
+        self._draw_pixels(painter, target.topLeft(), 2 * scale)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        taken = [self._ring_box(marker, scale) for marker in self._markers]
         for marker in self._markers:
             self._draw_marker(painter, marker, scale)
-        for marker in self._markers:  # over the rings
-            if marker.label:
+        if labelled := [marker for marker in self._markers if marker.label]:
+            taken = [self._ring_box(marker, scale) for marker in self._markers]
+            for marker in labelled:  # over the rings
                 self._draw_label(painter, marker, scale, taken)
         if self._draws_circles and self._pressed is not None:
             painter.setPen(QPen(QColor(DARK.accent), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             radius = math.dist(self._pressed.toTuple(), self._dragged.toTuple())
             painter.drawEllipse(self._pressed, radius, radius)
+
+    def _draw_pixels(self, painter: QPainter, corner: QPointF, scale: float) -> None:
+        """Draw the image; ``scale`` is px of widget per pixel of it."""
+        pixels, shown = self._buffer, self._shown
+        assert pixels is not None
+        while 2 * scale < 1:
+            pixels, scale = pooled(pixels), 2 * scale
+            shown = _as_qimage(pixels)
+        smooth = scale < 1  # enlarged, the pixels themselves are of interest
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+        target = QRectF(corner, shown.size() * scale)
+        for y in range(0, self.height(), STRIP):
+            painter.setClipRect(0, y, self.width(), STRIP)
+            painter.drawImage(target, shown)
+        painter.setClipping(False)
 
     def _draw_marker(self, painter: QPainter, marker: Marker, scale: float) -> None:
         place = self.place_of(marker.x, marker.y)
@@ -322,12 +336,7 @@ class ImageView(Translated, QWidget):
         self._buffer = half
         self._size = size
         self._markers = markers
-        if half is None:
-            self._shown = QImage()
-        else:
-            height, width = half.shape
-            grey = QImage.Format.Format_Grayscale8
-            self._shown = QImage(half.data, width, height, half.strides[0], grey)
+        self._shown = QImage() if half is None else _as_qimage(half)
         if was_empty is not (half is None):
             self._retranslate()
         self.update()
@@ -353,6 +362,13 @@ class ImageView(Translated, QWidget):
             min(max(x, half_x), 1 - half_x), min(max(y, half_y), 1 - half_y)
         )
         self.update()
+
+
+def _as_qimage(pixels: Image) -> QImage:
+    """Return an image of pixels (H, W), whose memory must outlive it."""
+    height, width = pixels.shape
+    grey = QImage.Format.Format_Grayscale8
+    return QImage(pixels.data, width, height, pixels.strides[0], grey)
 
 
 def _label_box(ring: QRectF, angle: float, size: QSizeF, away: float) -> QRectF:

@@ -383,7 +383,9 @@ class TracePlot(Plot):
 
     def _show_numbers(self, shown: bool) -> None:
         for side in ("left", "bottom"):
-            self._item.getAxis(side).setStyle(showValues=shown)
+            axis = self._item.getAxis(side)
+            if axis.style["showValues"] is not shown:  # which draws the axis anew
+                axis.setStyle(showValues=shown)
 
     def _height(self, values: FloatArray) -> FloatArray:
         """Return the drawn values (N,)."""

@@ -40,7 +40,9 @@ def test_twelve_bits_are_shown_as_eight() -> None:
     assert pooled(image, bits=12)[0, 0] == 255
 
 
-def test_an_led_of_one_pixel_stays_visible(view: ImageView) -> None:
+@pytest.mark.parametrize("part", [4, 6, 11])
+def test_an_led_of_one_pixel_stays_visible(view: ImageView, part: int) -> None:
+    view.resize(WIDTH // part, HEIGHT // part)
     image = dark_image()
     image[800, 1200] = 255
     view.set_image(image)
@@ -54,6 +56,22 @@ def test_an_led_of_one_pixel_stays_visible(view: ImageView) -> None:
     ]
 
     assert max(near) > 50
+
+
+@pytest.mark.parametrize("part", [3, 2, 1])
+def test_an_image_has_no_seams(view: ImageView, part: int) -> None:
+    view.resize(WIDTH // part, HEIGHT // part)
+    image = np.repeat(np.arange(HEIGHT, dtype=np.uint32) // 9, WIDTH)
+    pixels = image.astype(np.uint8).reshape(HEIGHT, WIDTH)
+    view.set_image(pixels)
+
+    shown = view.grab().toImage()
+    inside = range(5, shown.height() - 5)
+    column = [shown.pixelColor(50, y).lightness() for y in inside]
+
+    assert set(np.diff(column)) <= {0, 1}
+    assert column[0] < 5
+    assert column[-1] > (HEIGHT - 1) // 9 - 5
 
 
 def test_a_ring_is_drawn_about_its_place(view: ImageView) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.theme import TextSize, font
+from lightpen_app.widgets.plot_canvas import Canvas
 from lightpen_app.widgets.plots import Axes, Curve, TracePlot
 
 
@@ -55,6 +56,21 @@ def test_the_first_values_do_not_hide_the_newest(qtbot: QtBot) -> None:
 
     assert left <= 1
     assert high < 2
+
+
+def test_axes_are_drawn_anew_only_when_their_range_changes(qtbot: QtBot) -> None:
+    plot = shown(qtbot, TracePlot(Axes("Tip / um"), [Curve("x_um")]))
+    canvas = plot.findChild(Canvas)
+    assert canvas is not None
+    axis = canvas.getPlotItem().getAxis("left")
+    drawn: list[object] = []
+    for n in (6, 7, 8):  # below ten images, the range is the same
+        plot.set_data(np.arange(1.0, n), np.arange(1.0, n) % 2)
+        plot.grab()
+        drawn.append(axis.picture)
+
+    assert drawn[0] is not None
+    assert drawn[0] is drawn[1] is drawn[2]
 
 
 def test_few_images_are_not_drawn_as_fractions(qtbot: QtBot) -> None:
