@@ -48,6 +48,7 @@ LEAST_TITLE = 9  # px
 SIDE = 0.045  # of many numbered items, beside the first and the last
 N_LEAST = 10  # a trace has room for whole multiples, so that its numbers are whole
 MARGIN = 0.06  # of the range, left free around the data
+LEAST_FILL = 0.6  # of a steady range that the data must take
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
 
 Column: TypeAlias = FloatArray | tuple[str, ...]
@@ -87,6 +88,7 @@ class Plot(QWidget):
         super().__init__(parent)
         self._columns: dict[str, Column] = {}
         self._title_px = 0
+        self._y_range = (0.0, 0.0)  # shown by `_fit`
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
         # Widgets
@@ -227,12 +229,12 @@ class Plot(QWidget):
         y: FloatArray,
         *,
         y_zero: bool = False,
-        is_rounded: bool = False,
+        is_steady: bool = False,
     ) -> None:
         """Show all of the data, and the zero of y if it is requested.
 
-        A rounded range of y stays as it is while the data change little: to draw axes
-        anew takes most of the time of a plot.
+        A steady range of y stays as it is while the data lie in it and fill it: to draw
+        axes anew takes most of the time of a plot.
         """
         x, y = x[np.isfinite(x)], y[np.isfinite(y)]
         if not (len(x) and len(y)):
@@ -243,10 +245,11 @@ class Plot(QWidget):
         margin = MARGIN * (high - low) or 0.5 * abs(high) or 1.0
         bottom = low if y_zero and low == 0 else low - margin
         top = high + margin
-        if is_rounded:
-            step = 10.0 ** (math.floor(math.log10(top - bottom)) - 1)
-            bottom = math.floor(bottom / step) * step
-            top = math.ceil(top / step) * step
+        before, after = self._y_range
+        is_filled = high - low > LEAST_FILL * (after - before)
+        if is_steady and before <= low and high <= after and is_filled:
+            bottom, top = before, after
+        self._y_range = bottom, top
         left, right = float(x.min()), float(x.max())
         self._item.setRange(
             xRange=(left, max(right, left + 1e-9)), yRange=(bottom, top), padding=0.01
@@ -370,7 +373,7 @@ class TracePlot(Plot):
             in_sight.append(self._height(np.array([self._limit_at])))
         n_steps = max(math.ceil((x.max() - x.min() + 1) / N_LEAST), 1)
         room = np.append(x, x.min() + n_steps * N_LEAST - 1)
-        self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero, is_rounded=True)
+        self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero, is_steady=True)
 
     def _show_nothing(self) -> None:
         """Show the axes without numbers, and the limit."""

@@ -35,5 +35,7 @@ class AskingBar(QFrame):
             self._had_focus = focused
         elif not visible and is_inside and before is not None and isValid(before):
             before.setFocus()
+        was_hidden = self.isHidden()
         super().setVisible(visible)
-        self.asking_changed.emit()
+        if self.isHidden() is not was_hidden:
+            self.asking_changed.emit()

@@ -106,3 +106,18 @@ def test_enter_without_a_reason_reaches_nothing_behind_the_bar(qtbot: QtBot) -> 
 
     assert page.keys == [Qt.Key.Key_PageDown]
     assert bar.isVisible()
+
+
+def test_a_bar_that_asks_nothing_reports_nothing(qtbot: QtBot) -> None:
+    bar = QuestionBar()
+    qtbot.addWidget(bar)
+    changes: list[None] = []
+    bar.asking_changed.connect(lambda: changes.append(None))
+
+    bar.refresh()
+    assert not changes
+
+    asked(bar)
+    bar.hide()
+    bar.refresh()
+    assert len(changes) == 2

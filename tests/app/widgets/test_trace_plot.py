@@ -63,14 +63,18 @@ def test_axes_are_drawn_anew_only_when_their_range_changes(qtbot: QtBot) -> None
     canvas = plot.findChild(Canvas)
     assert canvas is not None
     axis = canvas.getPlotItem().getAxis("left")
+    images = np.arange(1.0, 9.0)
     drawn: list[object] = []
-    for n in (6, 7, 8):  # below ten images, the range is the same
-        plot.set_data(np.arange(1.0, n), np.arange(1.0, n) % 2)
+    for values in (images, 0.8 * images + 1, images[::-1], 0.3 * images, 9 * images):
+        plot.set_data(images, values)
         plot.grab()
         drawn.append(axis.picture)
+        (_, _), (bottom, top) = plot.ranges()
+        assert bottom < values.min() < values.max() < top
 
     assert drawn[0] is not None
     assert drawn[0] is drawn[1] is drawn[2]
+    assert len(set(map(id, drawn))) == 3
 
 
 def test_few_images_are_not_drawn_as_fractions(qtbot: QtBot) -> None:
