@@ -234,7 +234,8 @@ def fit_bundle(
             used = inliers(_together(solved.residuals)).reshape(used.shape)
         state = unknowns.moved(now.state, solved.values, solved.turns)
         change = solved.values - now.values
-        is_same = components.sigmas == now.components.sigmas and np.all(used == now.used)
+        is_same = np.array_equal(used, now.used)
+        is_same &= components.sigmas == now.components.sigmas
         if n_pass > 1 and is_same and np.abs(change[:6]).max() < CONVERGED:
             return _bundle_of(unknowns, state, now.used, solved, weight_sigma)
         views = unknowns.views_at(state, pixels)
