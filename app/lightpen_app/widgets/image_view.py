@@ -28,8 +28,8 @@ ZOOM_STEP = 1.25
 PAN_STEP = 0.1  # of what is seen
 CLICK_SLACK = 4  # px that a mouse may move while it clicks
 LEAST_RING = 6.0  # px, radius
-# px high: of higher images Qt has parts drawn by other threads and waits for them, which
-# keeps all other threads of Python waiting, too.
+# Lines drawn at once. Of more Qt has parts drawn by other threads and waits for them,
+# and all other threads of Python wait, too.
 STRIP = 64
 LABEL_DISTANCES = (3.0, 12.0)  # px from a ring to its label
 LABEL_TURNS = tuple(math.radians(15 * k) for k in sorted(range(-11, 13), key=abs))
