@@ -16,11 +16,8 @@ from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.widgets.translated import Translated
 
 DISTANCES_M = (1, 2, 3, 4, 6)
-DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
-# Of the height, at most:
-INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.2
-NOTICE_SHARE, SMALL_SHARE, GAP_SHARE = 0.12, 0.04, 0.008
-BESIDE_NOTICE = 0.55  # of their share that instruction and hint have below a notice
+DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
+NOTICE_SHARE, SMALL_SHARE = 0.12, 0.06  # of the height, at most
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
 LEGEND_SHARE = 0.04  # of the height, at most, for the letters of the dial
 LEAST_LETTERS = 0.46  # of those that the distance asks for: 8 mm high at 3 m
@@ -103,25 +100,21 @@ class OperatorView(Translated, QWidget):
             spacing=(4 * GRID, GRID),
             margins=(4 * GRID, 3 * GRID, 4 * GRID, 3 * GRID),
         )
-        for widget in (self._subject, self._notice, self._instruction, self._hint):
-            layout.addWidget(widget, layout.rowCount(), 0, 1, 2)
-        row = layout.rowCount()
-        layout.addWidget(self._dial, row, 0)
-        self._side = vertical_layout(
+        layout.addWidget(self._subject, 0, 0, 1, 2)
+        layout.addWidget(self._notice, 1, 0, 1, 2)
+        layout.addWidget(self._dial, 2, 0)
+        vertical_layout(
             layout,
-            1,
-            self._count,
+            (self._instruction, 6),
+            (self._hint, 5),
+            (self._count, 3),
             self._progress,
-            self._time_left,
-            1,
-            self._banner,
-            1,
-            at=(row, 1),
-            spacing=-1,
+            (self._time_left, 2),
+            (self._banner, 5),
+            at=(2, 1),
         )
-        layout.addWidget(self._keys, row + 1, 0, 1, 2)
-        layout.setRowStretch(row, 1)
-        layout.setColumnStretch(0, DIAL_SHARE)
+        layout.addWidget(self._keys, 3, 0, 1, 2)
+        layout.setRowStretch(2, 1)
         layout.setColumnStretch(1, SIDE_SHARE)
 
         self._retranslate()
@@ -139,7 +132,8 @@ class OperatorView(Translated, QWidget):
         self._banner.set_value(value.state)
         self._count.set_text(value.count)
         self._time_left.set_text(value.time_left, Tone.QUIET, bold=False)
-        self._time_left.setVisible(bool(value.time_left))
+        for words in (self._count, self._time_left):
+            words.setVisible(bool(words.text()))
         self._progress.setVisible(value.fraction is not None)
         if value.fraction is not None:
             self._progress.setValue(round(1000 * value.fraction))
@@ -222,7 +216,6 @@ class OperatorView(Translated, QWidget):
 
     def _resize_letters(self) -> None:
         letters = max(self.letters(), self.height() * LEAST_SHARE)
-        self._side.setSpacing(min(3 * GRID, round(self.height() * GAP_SHARE)))
         self._instruction.set_largest(letters * 1.2)
         self._hint.set_largest(letters * 0.6)
         self._notice.set_largest(letters * LEAST_LETTERS)
@@ -234,21 +227,13 @@ class OperatorView(Translated, QWidget):
         self._count.set_largest(letters * (2.4 if is_digit else 1.2))
         has_room = self._value.dial is None
         self._banner.set_word_size(letters * (1.6 if has_room else 1.0))
-        # Else the dial, which wants to be square, would take the room of the words, and
-        # of these one that of another.
-        room = 1.0 if self._notice.isHidden() else BESIDE_NOTICE
         for widget, share in (
-            (self._instruction, room * INSTRUCTION_SHARE),
-            (self._hint, room * HINT_SHARE),
             (self._notice, NOTICE_SHARE),
             (self._subject, SMALL_SHARE),
-            (self._time_left, SMALL_SHARE),
             (self._keys, SMALL_SHARE),
-            (self._count, COUNT_SHARE),
-            (self._banner, STATE_SHARE),
         ):
-            wanted = widget.sizeHint().height()
-            widget.setMinimumHeight(min(wanted, round(self.height() * share)))
+            room = round(self.height() * share)
+            widget.setFixedHeight(min(widget.sizeHint().height(), room))
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Operator view"))

@@ -28,7 +28,8 @@ RING_EDGES = (0.24, 0.62, 1.0)  # of upright, leaning, leaning far; rim = 1
 RIM_SHARE = 0.435  # of the side, from the middle to the rim
 BAR_SHARE = 0.12  # of the side, for the bar of the turn
 LEAST_BAR = 2.8  # of the least letters
-LEGEND_SHARE, NUMBER_SHARE = 0.09, 0.17  # of the rim, for letters
+LEGEND_SHARE, NUMBER_SHARE = 0.09, 0.19  # of the rim, for letters
+NUMBERS = 1.4  # times the least letters, where they fit
 SECTOR = 2 * math.pi / N_DIRECTIONS
 
 
@@ -278,7 +279,7 @@ class PostureDial(Translated, QWidget):
         x, y = _center(place, self._value.heading)
         center = middle + QPointF(x, -y) * rim
         size = (0.13 if place.ring else 0.15) * rim
-        size = max(size, min(self._least_letters, NUMBER_SHARE * rim))
+        size = max(size, min(NUMBERS * self._least_letters, NUMBER_SHARE * rim))
         box = QRectF(center.x() - size, center.y() - size, 2 * size, 2 * size)
         if done:
             inset = 0.45 * size

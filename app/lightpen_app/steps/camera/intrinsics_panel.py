@@ -10,6 +10,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.camera_validity import unmodelled_effects_of
 from lightpen.record.swings.solving import Solution
 from lightpen_app.look.layouts import grid_layout, vertical_layout
+from lightpen_app.look.quantities import MAX_DECIMALS, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -225,7 +226,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             for i, value in enumerate(values)
         )
         distortion = ", ".join(
-            f"{name}\u00a0{value:.4g}"
+            f"{name}\u00a0{_coefficient_text(value)}"
             for name, value in zip(
                 camera.distortion_names, camera.distortion, strict=True
             )
@@ -251,6 +252,12 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
     def _size_text(self, width: int, height: int) -> str:
         return self.tr("{0} x {1}").format(width, height)
+
+
+def _coefficient_text(value: float) -> str:
+    """Return a coefficient by four digits, none smaller than moves a point."""
+    text = number_text(float(f"{value:.4g}"), MAX_DECIMALS)
+    return text.rstrip("0").rstrip(".")
 
 
 def _let_select(label: QLabel, selectable: bool) -> None:

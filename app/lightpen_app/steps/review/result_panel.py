@@ -21,7 +21,6 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import day_text, shortened
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
-from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -68,8 +67,6 @@ class ResultPanel(Translated, QFrame):
         # Widgets
         self._heading = text_label(TextSize.SMALL, Tone.QUIET)
         self._readout = TipReadout()
-        self._comparison = text_label(TextSize.SMALL, Tone.QUIET)
-        self._table = NumberTable()
         self._as_found = SignLabel()
         self._halves = SignLabel()
         self._self_check = SignLabel()
@@ -89,8 +86,6 @@ class ResultPanel(Translated, QFrame):
             self, self._heading, self._readout, spacing=GRID // 2, margins=2 * GRID
         )
         layout.addSpacing(GRID)
-        fill(layout, self._comparison, self._table)
-        layout.addSpacing(GRID // 2)
         fill(layout, self._as_found, self._halves, self._self_check, self._pressed)
         fill(layout, self._images)
         layout.addSpacing(GRID)
@@ -102,9 +97,7 @@ class ResultPanel(Translated, QFrame):
     def set_large(self, large: bool) -> None:
         """Show larger figures, and the postures, in a large window."""
         self._readout.set_large(large)
-        self._table.set_large(large)
-        for label in (self._heading, self._comparison):
-            set_size(label, TextSize.LEAD if large else TextSize.SMALL)
+        set_size(self._heading, TextSize.LEAD if large else TextSize.SMALL)
         for widget in (self._postures, self._dial):
             widget.setVisible(large)
 
@@ -131,8 +124,6 @@ class ResultPanel(Translated, QFrame):
             self._pressed.set_value(StatusMessage(text, *mark))
 
     def _retranslate(self) -> None:
-        self._comparison.setText(self.tr("Odd and even images / \xb5m"))
-        self._table.setAccessibleName(self.tr("Odd and even images"))
         self._postures.setText(self.tr("Postures of the included images"))
         self._show_pressed()
         self._refresh()
@@ -142,7 +133,6 @@ class ResultPanel(Translated, QFrame):
         self._heading.setText(self._heading_text(outcome))
         if outcome is None:
             self._readout.set_value(None)
-            self._table.set_value(Figures())
             self._as_found.set_value(StatusMessage())
             self._halves.set_value(StatusMessage())
             self._self_check.set_value(StatusMessage())
@@ -151,7 +141,6 @@ class ResultPanel(Translated, QFrame):
             return
         self._dial.set_value(_postures(outcome.solution.calibration.coverage))
         self._readout.set_value(_tip_value(outcome))
-        self._table.set_value(self._halves_figures(outcome.solution))
         self._as_found.set_value(self._as_found_message(outcome.assessment))
         self._halves.set_value(self._halves_message(outcome.solution))
         check = outcome.solution.calibration.self_check
@@ -172,12 +161,6 @@ class ResultPanel(Translated, QFrame):
         text = self.tr("Tip {0} in the frame of pen {1}, U\xa0(k\xa0=\xa02)")
         return text.format(shortened(outcome.names.tip), shortened(outcome.names.pen))
 
-    def _halves_figures(self, solution: Solution) -> Figures:
-        halves = solution.calibration.halves
-        u = halves.expanded_uncertainty
-        rows = self.tr("Odd - even"), self.tr("U (k = 2)")
-        return Figures(AXES, rows, (_texts(halves.difference), _texts(u)))
-
     def _as_found_message(self, assessment: SwingAssessment) -> StatusMessage:
         """Return the deviation of the tip as found, with its limit."""
         change, last, limit = assessment.change, assessment.last, assessment.max_change
@@ -185,9 +168,7 @@ class ResultPanel(Translated, QFrame):
             return StatusMessage(self.tr("No earlier result"), Sign.RING, Tone.PLAIN)
         off = mm_text(change.distance)
         if limit is None:
-            text = self.tr(
-                "As found: {0} mm from the previous calibration (no limit set)"
-            )
+            text = self.tr("As found: {0} mm from the previous calibration")
             return StatusMessage(text.format(off), Sign.RING, Tone.PLAIN)
         text = self.tr(
             "As found: {0} mm from the previous calibration, limit {1} mm"
@@ -200,11 +181,16 @@ class ResultPanel(Translated, QFrame):
         )
 
     def _halves_message(self, solution: Solution) -> StatusMessage:
-        if halves_agree(solution.calibration.halves):
-            text = self.tr("Odd and even images agree")
-            return StatusMessage(text, Sign.CHECK, Tone.GOOD)
-        text = self.tr("Odd and even images differ significantly")
-        return StatusMessage(text, Sign.WARNING, Tone.WARN)
+        halves = solution.calibration.halves
+        agree = halves_agree(halves)
+        figures = _with_u(halves.difference, halves.expanded_uncertainty)
+        text = (
+            self.tr("Odd and even images agree: {0} \xb5m")
+            if agree
+            else self.tr("Odd and even images differ significantly: {0} \xb5m")
+        ).format(", ".join(map(" ".join, zip(AXES, figures, strict=True))))
+        sign, tone = (Sign.CHECK, Tone.GOOD) if agree else (Sign.WARNING, Tone.WARN)
+        return StatusMessage(text, sign, tone)
 
     def _self_check_message(self, check: SelfCheck | None) -> StatusMessage:
         """Return the cross-validation of the LEDs: each predicted by the others."""

@@ -230,7 +230,7 @@ class InterruptedControl(QObject):
             self._run.runner.ask(lambda workflow: workflow.go_on(swing))
 
     def _take_over(self, swing: Resumable) -> None:
-        """Select the item of the swing and the cameras of its station and its own."""
+        """Select the item of the swing, its station and, if others are, its sources."""
         selection, header = self._selection, swing.record.header
         station = selection.preparation.names.station
         self._go_to_station(header.station)
@@ -239,8 +239,10 @@ class InterruptedControl(QObject):
         now = replace(
             selection.preparation, names=names, nominal_tip=header.nominal_tip
         )
-        if not swing.is_of(now.sources):
-            now = now.with_second(next(iter(swing.source_choices[1:]), None))
+        sources = swing.source_choices
+        if sources and not swing.is_of(now.sources):
+            now = now.with_source(sources[0])
+            now = now.with_second(next(iter(sources[1:]), None))
         if now.second is not None and now.rig_file is None:
             now = now.with_rig(swing.rig_file)
         selection.set_preparation(now)

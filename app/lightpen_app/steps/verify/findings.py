@@ -1,7 +1,7 @@
 """Results of a task, and its points during probing: tables and a picture."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
@@ -29,6 +29,7 @@ from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 
 MOST_TABLES = 2  # of a task; others are only printed
+HEAD_HEIGHT, ROW_HEIGHT = 7 * GRID, 3 * GRID  # px, of the points during probing
 NOWHERE = Qt.AlignmentFlag(0)  # but all over
 LEAST_HEIGHT = 16 * GRID  # px, of the results
 DIAL_SIZE = 22 * GRID  # px
@@ -198,8 +199,13 @@ class TaskFinding(ResponsiveLayout, QWidget):
         if found is not None:
             return task.tables(found, setup.conditions)
         options = setup.choices.options_of(task)
-        return task.figures_so_far(
+        tables = task.figures_so_far(
             options, state.progress(setup, task), setup.conditions
+        )
+        latest = max((self.height() - HEAD_HEIGHT) // ROW_HEIGHT, 1)
+        return tuple(
+            replace(each, rows=each.rows[-latest:]) if _is_of_points(each) else each
+            for each in tables
         )
 
     @override

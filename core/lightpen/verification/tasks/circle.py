@@ -42,7 +42,6 @@ from lightpen.verification.tasks.probed_point import (
     point_entries,
 )
 from lightpen.verification.tasks.surface_points import (
-    LATEST,
     MAX_LEFT_OUT,
     away_from_cones,
     form_by_noise,
@@ -459,7 +458,7 @@ def _figures_so_far(
         for i, off in enumerate(residuals_of(fit, [p.point_cam for p in points]), 1)
     )
     columns = message("circle.radial"), message("circle.axial")
-    return (ResultTable(title, columns, rows[-LATEST:]),)
+    return (ResultTable(title, columns, rows),)
 
 
 def _fraction(options: CircleOptions, progress: TaskProgress) -> float:

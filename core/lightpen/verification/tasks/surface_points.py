@@ -1,7 +1,6 @@
 """What the tasks share that probe a ring, a sphere or a plate at many points."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -27,7 +26,6 @@ MAX_LEFT_OUT = 0.25  # of the points
 IN_CONE = 5.0  # mm from the bottom of a cone that was probed before
 N_TRIALS = 4000
 UNUSUAL = 0.001  # chance that an ideal surface shows more form
-LATEST = 6  # points whose residuals are shown
 
 
 def lie_near(distances: FloatArray) -> BoolArray:
@@ -110,12 +108,11 @@ def residuals_so_far(
     residuals_of: Callable[[FloatArray], FloatArray],
     least: int,
 ) -> tuple[ResultTable, ...]:
-    """Return the residuals of the latest points, as soon as there are so many."""
+    """Return the residuals of all points, as soon as there are so many."""
     if len(points) < least:
         return (ResultTable(title),)
     try:
         residuals = residuals_of(np.array([point.point_cam for point in points]))
     except CalibrationError:  # they do not determine the surface yet
         return (ResultTable(title),)
-    table = residuals_table(title, column, points, residuals)
-    return (replace(table, rows=table.rows[-LATEST:]),)
+    return (residuals_table(title, column, points, residuals),)

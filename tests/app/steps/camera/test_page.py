@@ -395,6 +395,7 @@ def test_date_and_uncertainty_of_the_intrinsics_are_shown(
     path = intrinsics(
         workbench,
         tmp_path,
+        distortion=np.array([-0.082, 0.105, 3.0004e-4, -2e-4, -2.075e-12]),
         covariance=np.diag([0.25, 0.16, 0.04, 0.09, *[0.0] * 5]),
         calibrated_on=date(2025, 8, 14),
     )
@@ -402,6 +403,8 @@ def test_date_and_uncertainty_of_the_intrinsics_are_shown(
     live.enter("Intrinsics file", str(path))
 
     live.wait("2319.10 \u00b1 1.00 and 2318.55 \u00b1 0.80 px (k = 2)")
+    of_lens = "k1 -0.082, k2 0.105, p1 0.0003, p2 -0.0002, k3 0\n"
+    assert of_lens in live.words.replace("\xa0", " ")
     assert "14" in live.words
     assert "2025" in live.words
     assert "no uncertainty" not in live.words

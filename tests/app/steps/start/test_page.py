@@ -991,46 +991,30 @@ def test_a_closed_camera_is_opened_for_the_swing(
     assert workbench.live.is_open
 
 
-def test_without_a_camera_it_is_reported_where_to_choose_one(
-    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
-) -> None:
-    interrupted(workbench, "a")
-    recorded = SourceChoice(SourceKind.RECORDED)
-    workbench.selection.set_preparation(
-        replace(workbench.selection.preparation, source=recorded)
-    )
-    start = show(workbench)
-
-    start.press("Resume")
-    qtbot.wait_until(lambda: bool(start.notices))
-
-    assert start.notices[-1].startswith("No camera is open. Choose the image source")
-    assert "at the step Camera: Simulated pen. Then" in start.notices[-1]
-    assert start.steps == []
-    assert workbench.run.status.state is None
-
-
-@pytest.mark.slow
-def test_a_swing_of_another_source_names_the_source_that_it_wants(
+@pytest.mark.parametrize("is_recorded", [False, True])
+def test_a_swing_goes_on_with_its_own_source(
     show: Callable[[Workbench], Opened],
     workbench: Workbench,
     qtbot: QtBot,
     tmp_path: Path,
+    is_recorded: bool,
 ) -> None:
     simulated = workbench.selection.preparation
     recorded = SourceChoice(SourceKind.RECORDED, str(tmp_path / "monday"))
-    workbench.selection.set_preparation(replace(simulated, source=recorded))
+    (tmp_path / "monday").mkdir()
+    chosen = [simulated, replace(simulated, source=recorded)]
+    workbench.selection.set_preparation(chosen[is_recorded])
     interrupted(workbench, "a")
-    workbench.selection.set_preparation(simulated)
+    workbench.selection.set_preparation(chosen[not is_recorded])
     workbench.camera.open()
     start = show(workbench)
 
     start.press("Resume")
-    qtbot.wait_until(lambda: bool(start.notices))
+    qtbot.wait_until(lambda: bool(start.steps))
 
-    wanted = f"another image source: Recorded images, {tmp_path / 'monday'}."
-    assert wanted in start.notices[-1]
-    assert start.steps == []
+    assert start.steps == ["swing"]
+    assert workbench.selection.preparation.source == chosen[is_recorded].source
+    assert workbench.run.status.state is not None
 
 
 @pytest.mark.slow
