@@ -3,19 +3,19 @@
 import re
 
 from PySide6.QtCore import QLocale, Qt
-from PySide6.QtGui import QKeyEvent, QValidator, QWheelEvent
+from PySide6.QtGui import QValidator, QWheelEvent
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
-from lightpen_app.widgets.keys import PAGE_KEYS
+from lightpen_app.widgets.keys import LeavesPageKeys
 
 LONGEST = 9  # digits before the point
 NUMBER = re.compile(rf"[+-]?\d{{1,{LONGEST}}}(\.\d*)?")
 INSET = 13  # px; a style sheet cannot pad the text of a spin box
 
 
-class NumberField(QDoubleSpinBox):
+class NumberField(LeavesPageKeys, QDoubleSpinBox):
     """A spin box with a decimal point and the margins of other fields.
 
     A decimal comma that is typed becomes a point; it would be passed over otherwise,
@@ -85,14 +85,6 @@ class NumberField(QDoubleSpinBox):
         """Set the unit; an unchanged one keeps the text being typed."""
         if suffix != self.suffix():
             super().setSuffix(suffix)
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave the page keys, which a presenter's remote sends, to the window."""
-        if event.key() in PAGE_KEYS:
-            event.ignore()
-        else:
-            super().keyPressEvent(event)
 
     @override
     def wheelEvent(self, event: QWheelEvent) -> None:

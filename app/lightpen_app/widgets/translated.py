@@ -7,12 +7,12 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 if TYPE_CHECKING:
-    _Base = QWidget
+    WidgetMixin = QWidget
 else:  # a class of Qt's cannot be a base twice
-    _Base = object
+    WidgetMixin = object
 
 
-class Translated(_Base):
+class Translated(WidgetMixin):
     """Put before the base of a widget, it sets the texts again at a change of language.
 
     The constructor of the widget arranges it once.

@@ -14,7 +14,7 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
 from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
+from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import StatusMessage
@@ -147,11 +147,9 @@ class StationField(ChoiceField):
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Open the list by an arrow; the page keys lead through the steps."""
+        """Open the list by an arrow."""
         if event.key() in ARROWS:
             self.showPopup()
-        elif event.key() in PAGE_KEYS:
-            event.ignore()
         else:
             super().keyPressEvent(event)
 
