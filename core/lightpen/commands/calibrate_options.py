@@ -39,10 +39,8 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "--from-record",
         type=Path,
         metavar="FILE.json",
-        help=(
-            "calibration record (from --json) or accepted result instead of IMAGES; "
-            "recomputes the tip from it"
-        ),
+        help="calibration record (from --json) or accepted result instead of IMAGES; "
+        "recomputes the tip from it",
     )
     add_cameras_and_pen(
         parser, "give IMAGES (or FILE.csv) once per camera, in the order of this file"
@@ -56,29 +54,23 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "--camera-sigma",
         type=_share,
         metavar="SHARE",
-        help=(
-            "standard uncertainty of the focal length, for example 0.5%%, if the "
-            "camera file states none; other intrinsics are scaled with it"
-        ),
+        help="standard uncertainty of the focal length, for example 0.5%%, if the "
+        "camera file states none; other intrinsics are scaled with it",
     )
     parser.add_argument(
         "--scale-sigma",
         type=_share,
         metavar="SHARE",
-        help=(
-            "standard uncertainty of the scale of the pen, for example 20e-6, if "
-            "the LED file states none"
-        ),
+        help="standard uncertainty of the scale of the pen, for example 20e-6, if "
+        "the LED file states none",
     )
     add_conditions(parser, "--temperature", meaning="for thermal expansion")
     parser.add_argument(
         "--temperature-sigma",
         type=number_from(0.001, 50.0, "uncertainty", "K"),
         metavar="K",
-        help=(
-            "standard uncertainty of the temperature (0.5), or without "
-            "--temperature the temperature difference from the LED measurement (1.5)"
-        ),
+        help="standard uncertainty of the temperature (0.5), or without "
+        "--temperature the temperature difference from the LED measurement (1.5)",
     )
     parser.add_argument(
         "--form-error",
@@ -90,10 +82,8 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "--compliance",
         type=number_from(1e-7, 1.0, "compliance", "mm"),
         metavar="MM",
-        help=(
-            "standard uncertainty of the deflection of stylus, seat and stand, which "
-            "is in proportion to the sine of the tilt (0.004)"
-        ),
+        help="standard uncertainty of the deflection of stylus, seat and stand, which "
+        "is in proportion to the sine of the tilt (0.004)",
     )
     parser.add_argument(
         "--center-bias",
@@ -104,10 +94,8 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--second-cone",
         metavar="IMAGES",
-        help=(
-            "images of a swing in a second cone, given like those of the first; the "
-            "camera must not have moved"
-        ),
+        help="images of a swing in a second cone, given like those of the first; the "
+        "camera must not have moved",
     )
     parser.add_argument(
         "--distance",

@@ -117,10 +117,8 @@ def add_extrinsics(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("rig.json"),
         metavar="FILE.json",
-        help=(
-            "rig file to write (rig.json); without --cameras the camera files are "
-            "written next to it"
-        ),
+        help="rig file to write (rig.json); without --cameras the camera files are "
+        "written next to it",
     )
     _add_temperature(parser)
     add_json(parser)

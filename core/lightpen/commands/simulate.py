@@ -81,10 +81,8 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         type=int,
         choices=range(1, MAX_RIG + 1),
         default=1,
-        help=(
-            "number of cameras in a row, each facing the pen; with several, OUT "
-            "gets one folder per camera, and rig.json"
-        ),
+        help="number of cameras in a row, each facing the pen; with several, OUT "
+        "gets one folder per camera, and rig.json",
     )
     parser.add_argument(
         "--baseline",

@@ -53,10 +53,8 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "place",
         metavar="PLACE",
-        help=(
-            "image folder, file name pattern, video or record of a swing; for a "
-            "camera its serial number"
-        ),
+        help="image folder, file name pattern, video or record of a swing; for a "
+        "camera its serial number",
     )
     parser.add_argument(
         "--source",

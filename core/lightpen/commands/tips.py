@@ -34,9 +34,8 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     )
     spun = actions.add_parser(
         "spin",
-        help=(
-            "determine the axis of a stylus from images of its pen rotated in the cone"
-        ),
+        help="determine the axis of a stylus from images of its pen rotated in the "
+        "cone",
     )
     for action in (listed, added, changed, retired, returned, shared, spun):
         action.add_argument(
@@ -143,10 +142,8 @@ def _add_author(action: argparse.ArgumentParser) -> None:
     who.add_argument(
         "--supervisor",
         metavar="NAME",
-        help=(
-            "supervisor who signs, if the data folder has a supervisor password; "
-            "the password is requested, or read from LIGHTPEN_PASSWORD"
-        ),
+        help="supervisor who signs, if the data folder has a supervisor password; "
+        "the password is requested, or read from LIGHTPEN_PASSWORD",
     )
 
 

@@ -145,10 +145,8 @@ def _add_touches(parser: argparse.ArgumentParser) -> None:
         "--along",
         choices=("approach", "axis"),
         default="approach",
-        help=(
-            "direction from the ball centre to the surface: approach direction if "
-            "the images show it, else the pen axis; or always the pen axis"
-        ),
+        help="direction from the ball centre to the surface: approach direction if "
+        "the images show it, else the pen axis; or always the pen axis",
     )
     _add_common(parser)
     add_conditions(parser)
