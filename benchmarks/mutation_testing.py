@@ -410,7 +410,10 @@ def is_noticed(mutant: Mutant, calls: Calls, seconds: float) -> bool:
         return run_tests(tests, "-x")
 
     status = in_child(run, 3 * seconds + 20)
-    if status == pytest.ExitCode.USAGE_ERROR:
+    # Also where the fault keeps conftest.py from being imported.
+    if status == pytest.ExitCode.USAGE_ERROR and in_child(
+        lambda: run_tests(tests, "--collect-only"), 3 * seconds + 20
+    ):
         sys.exit("Tests were moved or removed since --calls was written. Delete it.")
     return status != 0
 
