@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +32,7 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.history.led_file import improve_pen
+from lightpen.verification.history.led_file import _is_better, improve_pen
 from lightpen.verification.history.pen_health import examine_pen
 from lightpen.verification.reports.records import pen_health_entries
 from lightpen.verification.reports.summaries import improved_pen_text, pen_health_text
@@ -100,17 +102,20 @@ def test_a_warm_pen_is_distinguished_from_a_knocked_one(swing: Swing) -> None:
     assert found.assessment.reason.code == "pen-health.grown"
 
 
-def test_a_growth_within_its_uncertainty_is_not_called_one(swing: Swing) -> None:
+@pytest.mark.parametrize("sigma", [1e-4, 5e-5])  # the growth is 0.6 or 1.2 times its U
+def test_a_growth_within_its_uncertainty_is_not_called_one(
+    swing: Swing, sigma: float
+) -> None:
     pen = true_pen()
     warm = swing(pen, 3, growth=WARMTH)
-    unsure = structs.replace(warm.calibration.uncertainty, distance_repeatability=1e-4)
+    unsure = structs.replace(warm.calibration.uncertainty, distance_repeatability=sigma)
     record = structs.replace(warm.calibration, uncertainty=unsure)
     swings = [swing(pen, 1), replace(warm, calibration=record)]
 
     found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
 
     assert found.growth is not None
-    assert found.growth.uncertainty == pytest.approx(2e-4, rel=0.05)
+    assert found.growth.uncertainty == pytest.approx(2 * sigma, rel=0.05)
     assert found.assessment.grade is Grade.PASS
 
 
@@ -153,7 +158,11 @@ def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> N
     pen = true_pen()
     swings = [swing(pen, number) for number in (1, 2, 3, 4)]
 
-    found = improve_pen(swings, paper_camera(), PEN_FILE)
+    done = list[float]()
+
+    found = improve_pen(swings, paper_camera(), PEN_FILE, report=done.append)
+
+    assert done == [0.25, 0.5, 0.75, 1.0]
 
     def errors(leds: np.ndarray) -> np.ndarray:
         """Errors but for those of the frame, by the differences between LEDs."""
@@ -249,6 +258,17 @@ def test_swings_of_before_and_after_a_knock_are_not_pooled(swing: Swing) -> None
 
     with pytest.raises(CalibrationError, match=r"swing 1\.json and swing 2\.json"):
         improve_pen(swings, paper_camera(), PEN_FILE)
+
+
+def test_a_fit_is_better_by_the_size_of_its_residuals_whatever_their_sign() -> None:
+    def fit(size: float, sign: int) -> Any:
+        residuals = np.random.default_rng(3).uniform(0.5, 1.0, (N_IMAGES, 8, 2))
+        used = np.ones(residuals.shape[:2], dtype=bool)
+        return SimpleNamespace(used=used, residuals=sign * size * residuals)
+
+    for sign in (1, -1):
+        assert _is_better(fit(2.0, sign), fit(1.0, sign))
+        assert not _is_better(fit(1.0, sign), fit(2.0, sign))
 
 
 def test_too_few_swings_are_refused(swing: Swing) -> None:

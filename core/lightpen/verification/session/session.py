@@ -248,7 +248,7 @@ def with_other_choices(
     if now is not None and DRIFT.kind in state.found:  # it was of others
         found = {k: each for k, each in state.found.items() if k != DRIFT.kind}
         state = replace(without_touches(state), found=found)
-    if state.pending and not state.awaits_drift(setup):
+    if not state.awaits_drift(setup):
         state = replace(state, pending=())
     return setup, state
 

@@ -147,6 +147,22 @@ def test_a_lens_field_shows_that_residuals_hide() -> None:
     assert rms < 1.2 * NOISE
 
 
+def test_images_that_lack_an_led_take_no_part() -> None:
+    _, pixels, calibration = good()
+    state, is_whole = calibration.bundle.state, np.arange(N_IMAGES) % 10 > 0
+    hidden = np.where(
+        is_whole[:, None, None] | (np.arange(PEN.n_leds) != 2)[:, None], pixels, np.nan
+    )
+    used = np.isfinite(hidden[:, None, :, 0])
+    (view,) = views_at(state, hidden[:, None])
+    residuals, noise = view.residuals[:, None], np.ones(used.shape[1:])
+
+    whole = replace(state, rotations=state.rotations[is_whole])
+    found = check_prediction(state, residuals, used, noise)
+    assert found == check_prediction(whole, residuals[is_whole], used[is_whole], noise)
+    assert found is not None
+
+
 def test_few_images_are_not_checked() -> None:
     _, pixels, _ = good()
     assert calibrated(pixels[:20]).self_check is None

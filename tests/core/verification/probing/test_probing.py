@@ -1,6 +1,7 @@
 """Tests of `lightpen.verification.probing.probing`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from lightpen.verification.probing.probing import (
     ProbingPhase,
     ProbingRules,
     ProbingState,
+    _seen,
     advance_touch,
     at_rest,
 )
@@ -194,3 +196,14 @@ def test_the_same_posture_counts_once_where_postures_count(
 def test_rules_that_take_nothing_are_refused() -> None:
     with pytest.raises(ValueError, match="Nothing can be touched"):
         ProbingRules(n_frames=0)
+
+
+def test_the_noise_of_a_point_is_that_of_its_image(instrument: Instrument) -> None:
+    ((name, detection),) = detections(instrument, [HELD])
+    noise = [
+        np.diag(_seen(instrument, name, replace(detection, sigma=sigma)).noise)
+        for sigma in (0.0, 2 * instrument.sigma, 4 * instrument.sigma)
+    ]
+
+    assert noise[1] == pytest.approx(4 * noise[0])  # never below that of the swing
+    assert noise[2] == pytest.approx(16 * noise[0])

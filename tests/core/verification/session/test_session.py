@@ -23,6 +23,7 @@ from lightpen.verification.session.session import (
     advance_session,
     end_task,
     touched_anew,
+    with_other_choices,
 )
 from lightpen.verification.session.session_state import (
     SessionSetup,
@@ -229,6 +230,19 @@ def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_reported_so(
     session.touch(first)
     assert len(session.state.touches) == 1
     assert session.says() == "session.touch-cone"
+
+
+@pytest.mark.parametrize(("n_images", "is_reported"), [(4, False), (5, True)])
+def test_a_touch_is_broken_off_once_half_of_its_images_are_held(
+    session: Session, n_images: int, is_reported: bool
+) -> None:
+    session.setup = replace(
+        session.setup, choices=replace(session.setup.choices, n_frames=4)
+    )
+    session.see(session.holder.still(leant(4)[0], n_images))
+    session.see(session.holder.away())
+
+    assert bool(session.events) == is_reported  # from 3 + 4 / 2 images on
 
 
 def test_a_pen_that_was_laid_down_is_no_touch_of_the_cone(session: Session) -> None:
@@ -461,6 +475,25 @@ def test_a_task_done_anew_is_witnessed_anew(witnessed: Session) -> None:
 
     assert DRIFT.kind in witnessed.state.found
     assert len(found_by(witnessed.state, DRIFT).names) == 4
+
+
+def test_what_waits_for_a_visit_waits_with_other_choices_until_none_is_needed(
+    witnessed: Session,
+) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    assert witnessed.state.pending
+    setup, choices = witnessed.setup, witnessed.setup.choices
+
+    _, waiting = with_other_choices(
+        setup, witnessed.state, choices.with_options(FixedPointOptions(n_touches=5))
+    )
+    _, done = with_other_choices(
+        setup, witnessed.state, replace(choices, kinds=(FIXED_POINT.kind, LENGTH.kind))
+    )
+
+    assert waiting.pending == witnessed.state.pending
+    assert not done.pending
 
 
 def test_a_witness_alone_is_visited_twice(session: Session) -> None:
