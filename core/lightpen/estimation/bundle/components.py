@@ -40,7 +40,8 @@ class Components(NamedTuple):
     @property
     def sigmas(self) -> list[float]:
         """Standard deviations by which the unknowns are fitted, mm."""
-        found = (self.leds, *self.seat, self.oval, self.drift, *self.effects)
+        found: list[Component | EffectComponent] = [self.leds, *self.seat, self.oval]
+        found += [self.drift, *self.effects]
         jitter = self.jitter.covariance
         by_axis = [] if jitter is None else np.sqrt(np.diag(jitter)).tolist()
         return [*(each.sigma for each in found), *by_axis]
