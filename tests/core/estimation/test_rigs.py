@@ -19,7 +19,12 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import Grade, judge
-from lightpen.estimation.rigs.synchrony import PenRotations, measure_lag, relative_turn
+from lightpen.estimation.rigs.synchrony import (
+    PenRotations,
+    RelativeRotation,
+    measure_lag,
+    relative_turn,
+)
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.hashes import InputFile, Inputs, RigInputs
 from lightpen.formats.observation_files import Centers
@@ -230,7 +235,7 @@ def in_metres(R: FloatArray, t: FloatArray) -> Rig:
 
 
 def of_others(R: FloatArray, t: FloatArray) -> Rig:
-    return placed(rotation_from_vector(np.array([0.0, 0.6, 0.0])) @ R, t)
+    return placed(rotation_from_vector(np.array([0.0, 0.3, 0.0])) @ R, t)
 
 
 @pytest.mark.parametrize(
@@ -323,6 +328,21 @@ def test_a_lag_is_found_and_scatters_by_its_standard_deviation() -> None:
     assert np.mean(values) == pytest.approx(0.2, abs=0.02)
     # 50 draws fix a standard deviation to 10 %.
     assert np.std(values) == pytest.approx(np.mean(sigmas), rel=0.3)
+
+
+def test_the_deviation_of_a_lag_is_that_of_the_slope_of_a_line_through_zero() -> None:
+    speeds = np.outer(np.linspace(0.05, 0.2, 22), [1.0, 0.0, 0.0])
+    rotations = rotation_from_vector(np.cumsum(speeds, axis=0))
+    seen = PenRotations(rotations, np.full(22, 3e-4), np.ones(22, bool))
+    off = np.random.default_rng(1).normal(0, 0.01, (22, 3))
+
+    lag = measure_lag(seen, seen, RelativeRotation(np.eye(3), np.arange(22), off, 0.01))
+
+    assert lag is not None
+    x, y = ((speeds[1:-1] + speeds[2:]) / 2).ravel(), off[1:-1].ravel()
+    (slope,), (left,), *_ = np.linalg.lstsq(x[:, None], y)
+    assert lag.value == pytest.approx(slope)
+    assert lag.sigma == pytest.approx(np.sqrt(left / (x.size - 1) / (x @ x)))
 
 
 @pytest.mark.slow

@@ -7,7 +7,12 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.pivot.pivot import contact_matrix, fit_pivot, tip_covariances
+from lightpen.estimation.pivot.pivot import (
+    agreeing_solution,
+    contact_matrix,
+    fit_pivot,
+    tip_covariances,
+)
 from lightpen.formats.observation_files import PoseTable, read_poses
 from lightpen.model.coverage import require_spread
 from lightpen.model.rigid import rotation_from_vector
@@ -185,6 +190,19 @@ def test_without_covariances_outliers_are_reported_by_the_scatter_of_the_rest() 
     t[slipped] += [1.2, 0.0, 0.0]
 
     np.testing.assert_array_equal(~fit_pivot(R, t).used, slipped)
+
+
+def test_the_solution_of_a_share_of_the_poses_is_that_of_the_nearest_ones() -> None:
+    R, t = pivoting_poses(noise=0.3, seed=8)
+    t[:24] += R[:24] @ [0.0, 5.0, 0.0]  # another tip
+
+    solution = agreeing_solution(R, t, 0.5)
+
+    offs = np.linalg.norm(R @ solution[:3] + t - solution[3:], axis=1)
+    nearest = np.argsort(offs)[:30]
+    again = fit_pivot(R[nearest], t[nearest], robust=False)
+    np.testing.assert_allclose(again.tip_pen, solution[:3], atol=1e-9)
+    np.testing.assert_allclose(again.pivot_cam, solution[3:], atol=1e-9)
 
 
 def test_the_covariance_of_few_poses_is_not_too_small() -> None:
