@@ -47,7 +47,7 @@ COMMANDS = (
     ("measure", "measure a part by a plan", "measure:add_measure"),
     (
         "discover",
-        "tip, pen and camera from one swing and one length",
+        "find tip, pen and camera from one swing and one length",
         "discover:add_discover",
     ),
     (
@@ -200,15 +200,17 @@ def _parser(
     parser.set_defaults(verbose=False, log_level=None, log_folder=None)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
+
+    def added(name: str, help_text: str) -> argparse.ArgumentParser:
+        sentence = f"{help_text[0].upper()}{help_text[1:]}."
+        return commands.add_parser(name, help=help_text, description=sentence)
+
     if desktop is not None:
         add_desktop(parser, desktop)
-        add_open(commands.add_parser("open", help="open a recorded swing"), desktop)
-        add_report(
-            commands.add_parser("report", help="write the calibration report as PDF"),
-            desktop,
-        )
+        add_open(added("open", "open a recorded swing"), desktop)
+        add_report(added("report", "write the calibration report as PDF"), desktop)
     for name, help_text, function in COMMANDS:
-        command = commands.add_parser(name, help=help_text)
+        command = added(name, help_text)
         command.set_defaults(log_folder=usual_data_folder)
         if name in given:
             resolve_name(f"lightpen.commands.{function}")(command)
@@ -217,7 +219,7 @@ def _parser(
         ("archive", "check, list, export and import entries", add_archive),
         ("tips", "manage the library of pens, tips and cones", add_tips),
     ):
-        command = commands.add_parser(name, help=help_text)
+        command = added(name, help_text)
         command.set_defaults(log_folder=usual_data_folder)
         if name in given:
             add(command, data_folder)
