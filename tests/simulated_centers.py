@@ -54,13 +54,7 @@ def simulate_rig_centers(
 def drop_centers(
     centers: FloatArray, n_missing: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Return centres with ``n_missing`` random LEDs missing (NaN) in every frame.
-
-    Parameters
-    ----------
-    centers : (F, L, 2) array
-        px.
-    """
+    """Return centres (F, L, 2) with random LEDs missing (NaN) in every frame."""
     order = np.argsort(rng.random(centers.shape[:-1]), axis=-1)
     return np.where((order < n_missing)[..., None], np.nan, centers)
 
@@ -68,16 +62,9 @@ def drop_centers(
 def displace_centers(
     centers: FloatArray, fraction: float, distance: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Return centres with one LED displaced in a fraction of the frames.
+    """Return centres (F, L, 2) with one LED displaced in a fraction of the frames.
 
-    Parameters
-    ----------
-    centers : (F, L, 2) array
-        px.
-    fraction : float
-        Of the frames, 0 to 1.
-    distance : float
-        Of the displaced LED from where it was, px, in a random direction.
+    The distance is in px, in a random direction.
     """
     n_frames, n_leds, _ = centers.shape
     hit = rng.permutation(n_frames)[: round(fraction * n_frames)]
@@ -92,15 +79,7 @@ def displace_centers(
 def swap_centers(
     centers: FloatArray, fraction: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Return centres with two LEDs exchanged in a fraction of the frames.
-
-    Parameters
-    ----------
-    centers : (F, L, 2) array
-        px.
-    fraction : float
-        Of the frames, 0 to 1.
-    """
+    """Return centres (F, L, 2) with two LEDs exchanged in a fraction of the frames."""
     n_frames, n_leds, _ = centers.shape
     swapped = centers.copy()
     for frame in rng.permutation(n_frames)[: round(fraction * n_frames)]:

@@ -233,15 +233,8 @@ def make_application(arguments: Sequence[str]) -> QApplication:
 def run(make_pages: MakePages, swing: Path | None = None) -> int:
     """Show the wizard until its window closes, and return the exit status.
 
-    Parameters
-    ----------
-    swing : Path, optional
-        The swing to show, see `lightpen.record.results.opening`.
-
-    Raises
-    ------
-    UsageError
-        There is no display to show it on.
+    The swing is shown, see `lightpen.record.results.opening`. Raises `UsageError` if
+    there is no display.
     """
     if not has_display():
         raise UsageError("application.no-display")

@@ -59,13 +59,7 @@ REFRESHERS = {"update-desktop-database": "applications", "update-mime-database":
 
 
 def install_entry() -> int:
-    """Write the entry, the icon and the file type; return the exit status.
-
-    Raises
-    ------
-    UsageError
-        The system is no Linux.
-    """
+    """Write the entry, the icon and the file type on Linux; return the exit status."""
     data = _data_folder()
     program = Path(sys.argv[0]).absolute()  # a link, such as that of pipx, stays one
     entry = ENTRY.format(
@@ -81,13 +75,7 @@ def install_entry() -> int:
 
 
 def remove_entry() -> int:
-    """Remove what `install_entry` wrote; return the exit status.
-
-    Raises
-    ------
-    UsageError
-        The system is no Linux.
-    """
+    """Remove what `install_entry` wrote; return the exit status."""
     data = _data_folder()
     for name in (ENTRY_FILE, TYPES_FILE, ICON_FILE):
         try:

@@ -22,25 +22,11 @@ from lightpen_app.work.settings import Settings, settings_file
 
 
 def write_paper(result: Path, out: Path | None, language: str) -> Path:
-    """Write the report of a calibration or a verification as PDF.
+    """Write the report of a calibration or a verification as PDF; return its file.
 
-    Parameters
-    ----------
-    result : Path
-        An accepted result, or what ``lightpen calibrate``, ``verify`` or
-        ``repeatability`` wrote.
-    out : Path or None
-        Output file; None for a default name in the current folder.
-
-    Returns
-    -------
-    Path
-        Where it is.
-
-    Raises
-    ------
-    UsageError
-        The file holds no calibration, or not all that is put on paper.
+    The result is an accepted one, or what ``lightpen calibrate``, ``verify`` or
+    ``repeatability`` wrote; a file without all that is put on paper is refused. By
+    default the report has a name of its own in the current folder.
     """
     if is_verification(read_bytes(result, A_FILE, LARGEST_RECORD)):
         return _write_verification(result, out, language)

@@ -29,14 +29,7 @@ def arrow_lines(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the ends of shafts and heads as pairs, for one curve of them all.
 
-    Parameters
-    ----------
-    points, vectors : (N, 2) array
-        Where arrows begin, and where they go from there.
-
-    Returns
-    -------
-    x, y : (6 N,) array
+    Arrows lead from points (N, 2) by vectors (N, 2); x and y are (6 N,).
     """
     tips = points + vectors
     ahead = vectors * 0.3

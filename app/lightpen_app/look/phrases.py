@@ -216,15 +216,10 @@ _SIDES = (
 
 
 def phrase(message: Message, heading: float | None = None) -> Instruction:
-    """Return the words of a message.
+    """Return the words of a message of `lightpen.swing_messages`.
 
-    Parameters
-    ----------
-    message : Message
-        One of `lightpen.swing_messages`.
-    heading : float, optional
-        The operator's right as the camera sees it, rad; without it sides are reported
-        as the camera sees them.
+    ``heading`` is the operator's right as the camera sees it, rad; without it sides are
+    reported as the camera sees them.
     """
     code = Code(message.code)
     if code is Code.TOO_LITTLE_TILT and heading is not None:
@@ -239,14 +234,9 @@ def phrase(message: Message, heading: float | None = None) -> Instruction:
 def lean_phrase(
     target: Posture, present: Posture | None, heading: float
 ) -> Instruction:
-    """Return the words that lead to a posture.
+    """Return the words that lead to a posture from the present one, if that is seen.
 
-    Parameters
-    ----------
-    present : Posture or None
-        Current posture, if the pen is detected.
-    heading : float
-        The operator's right as the camera sees it, rad.
+    ``heading`` is the operator's right as the camera sees it, rad.
     """
     ring = int(np.digitize(target.tilt, TILT_RINGS))
     eighth = 2 * math.pi / N_DIRECTIONS

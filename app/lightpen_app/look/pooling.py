@@ -6,19 +6,10 @@ from lightpen.arrays import Image
 
 
 def pooled(image: Image, bits: int = 8) -> Image:
-    """Return an image of half the size, each pixel the brightest of four.
+    """Return an 8-bit image of half the size, each pixel the brightest of four.
 
-    A small LED stays as bright as it was, which averaging would not leave it.
-
-    Parameters
-    ----------
-    image : (H, W) array of uint8 or uint16
-    bits : int
-        Bits in use; more than 8 are shifted down.
-
-    Returns
-    -------
-    (H // 2, W // 2) array of uint8
+    A small LED stays as bright as it was, which averaging would not leave it. Of an
+    image with more than 8 bits in use the upper 8 are taken.
     """
     height, width = (size // 2 * 2 for size in image.shape)
     rows = np.maximum(image[0:height:2], image[1:height:2])

@@ -167,13 +167,7 @@ def table(
     strong: Sequence[int] = (),
     size: float = PrintSize.BODY,
 ) -> tuple[Block, ...]:
-    """Return a table whose header is repeated on each page.
-
-    Parameters
-    ----------
-    strong : sequence of int
-        Rows in bold letters.
-    """
+    """Return a table whose header is repeated on each page; strong rows are bold."""
     if not rows:
         return ()
     widths = _widths(columns)

@@ -59,12 +59,8 @@ class ReportContent:
 def read_calibration_file(file: Path) -> ReportContent:
     """Read what a report contains.
 
-    Raises
-    ------
-    FileError
-        The calibration cannot be read, or is not the one that was entered.
-    UsageError
-        The file holds no calibration, or not all that is put on paper.
+    Raises `FileError` if the calibration is not the one that was entered, `UsageError`
+    if the file holds none, or not all that is put on paper.
     """
     calibration_file = with_status(read_calibration(file), local_now())
     reestimated = reestimate_poses(calibration_file.calibration)
@@ -83,13 +79,7 @@ class KeptVerification(NamedTuple):
 
 
 def read_kept_verification(path: Path) -> KeptVerification:
-    """Read what the report of a verification contains.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or is not the one that was entered.
-    """
+    """Read what the report of a verification, as it was entered, contains."""
     file = with_content(path)
     done = read_verification(file.content or b"", path)
     data = data_folder_of_verification(path)

@@ -102,13 +102,7 @@ def lay_out(
 
 
 def paint_page(paper: PrintReport, number: int, painter: QPainter) -> None:
-    """Draw a page.
-
-    Parameters
-    ----------
-    painter : QPainter
-        One unit of it is a dot; its origin is the corner of the paper.
-    """
+    """Draw a page in dots, from the corner of the paper."""
     painter.save()
     painter.translate(LEFT_MARGIN, 0)
     _paint_header(paper.margins, painter)

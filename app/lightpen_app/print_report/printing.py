@@ -50,14 +50,8 @@ def paper_of(
 ) -> PrintReport:
     """Return the pages of a record, in the language that is chosen.
 
-    Parameters
-    ----------
-    reestimated : ReestimatedPoses or None
-        The images of the calibration; some plots are left out without.
-    entered : ArchivePlace, optional
-        Archive entry of the calibration.
-    laboratory : Laboratory, optional
-        Where it was made.
+    Without the reestimated images some plots are left out. ``entered`` is the archive
+    entry of the calibration, the laboratory where it was made.
     """
     blocks = all_sections(calibration_file, reestimated, entered, laboratory)
     return PrintReport(

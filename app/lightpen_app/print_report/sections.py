@@ -291,13 +291,7 @@ def _binding(name: str, sha256: str, entered: ArchivePlace | None) -> Iterable[B
 
 
 def signature_blocks(by: str) -> Iterable[Block]:
-    """Return the fields for signatures, and the end mark.
-
-    Parameters
-    ----------
-    by : str
-        Title of the first field.
-    """
+    """Return the fields for signatures, the first with a title, and the end mark."""
     names = (by, translate("paper", "Checked by"))
     below = translate("paper", "Name, date, signature")
     width, height = WIDTH / 2 - 100, 24 * MM

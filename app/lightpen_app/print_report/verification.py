@@ -68,14 +68,7 @@ def verification_paper(
 ) -> PrintReport:
     """Return the pages of a verification, in the language that is chosen.
 
-    Parameters
-    ----------
-    file : InputFile
-        Its file with the content.
-    traced : sequence of TracedItem
-        What was verified and measured with.
-    laboratory : Laboratory, optional
-        Where it was made.
+    ``traced`` is what was verified and measured with, the laboratory where.
     """
     record: dict[str, Any] = json.loads(file.content or b"{}")
     is_part = done.verification == PART.kind

@@ -136,15 +136,8 @@ SCENE = Scene(n_images=N_IMAGES, camera=paper_camera(binning=2), led_noise=0.0)
 def record_swing(folder: Path, files: Path) -> None:
     """Render the images of `SCENE` and record them with their detections.
 
-    Parameters
-    ----------
-    files : Path
-        Folder for the files of camera and pen.
-
-    Raises
-    ------
-    SelfTestError
-        The pen is not found in an image.
+    The files of camera and pen are written to a folder. Raises `SelfTestError` if the
+    pen is not found in an image.
     """
     written = write_sample_files(SCENE, files)
     preparation = Preparation(

@@ -48,10 +48,7 @@ def draw_camera(
 ) -> None:
     """Draw a camera that faces a dial, with a label inside a rectangle.
 
-    Parameters
-    ----------
-    size : float
-        Font size, px.
+    The font size is in px.
     """
     radius = stand.radius
     body = 0.055 * radius

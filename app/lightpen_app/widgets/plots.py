@@ -121,13 +121,7 @@ class Plot(QWidget):
         self.titled.emit()
 
     def png(self, mark: str = "") -> bytes:
-        """Return the plot as a picture, at twice the size on the screen.
-
-        Parameters
-        ----------
-        mark : str
-            Stands below it, as what its images are of.
-        """
+        """Return the plot, with a mark below it, as a picture at twice the size."""
         self.grab()  # what was never shown gets its size, and room for its numbers
         below = MARK_HEIGHT if mark else 0
         colors = colors_of(self.palette())

@@ -107,13 +107,10 @@ class ReasonBar(AskingBar):
         no: str,
         reasons: Sequence[str] | None = None,
     ) -> None:
-        """Change the question, the name of its field, and its answers.
+        """Change the question, the name of its field, its answers, and its reasons.
 
-        Parameters
-        ----------
-        reasons : sequence of str, optional
-            A list to choose from. What is typed in place of them must have at least
-            `LEAST_LETTERS`; without a list, anything will do.
+        What is typed in place of these must have at least `LEAST_LETTERS`; without a
+        list, anything will do.
         """
         self._least = 1 if reasons is None else LEAST_LETTERS
         self._usual.setVisible(reasons is not None)

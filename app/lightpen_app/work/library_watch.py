@@ -147,10 +147,7 @@ class LibraryWatch(QObject):
     def change(self, asked: object, change: Change) -> None:
         """Make a change of the library in its turn, and enter it in the archive.
 
-        Parameters
-        ----------
-        asked : object
-            Identifies the request in the signals about its outcome.
+        ``asked`` identifies the request in the signals about its outcome.
         """
         self._asked.append((asked, change))
         if self._changing is None:

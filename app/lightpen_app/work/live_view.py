@@ -229,10 +229,7 @@ class LiveView(QObject):
     def await_closed(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Wait until all closed cameras have released their devices.
 
-        Returns
-        -------
-        bool
-            Whether all have; the others continue closing.
+        Returns whether all have; the others continue closing.
         """
         deadline = monotonic() + timeout_s
         for thread in self._closing:

@@ -72,13 +72,7 @@ def with_changes(content: Content, changes: Changes) -> Content:
 
 
 def save(file: Path, content: Content, changes: Changes) -> Message | None:
-    """Write changes and return a message if needed.
-
-    Parameters
-    ----------
-    content : mapping
-        All that is in force, for a file that has nothing to be kept.
-    """
+    """Write changes to the content of a file, and return a message if needed."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with folder_locked(file.parent, PATIENCE) as is_alone:

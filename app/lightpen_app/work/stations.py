@@ -113,13 +113,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
 def station_of(
     preparation: Preparation, choices: VerificationChoices, unread: FilePaths
 ) -> Station:
-    """Return the stored form of a station.
-
-    Parameters
-    ----------
-    unread : FilePaths
-        Paths of files that are still being read; they are kept.
-    """
+    """Return the stored form of a station, with the paths of files still being read."""
     second, tip = preparation.second, preparation.nominal_tip
     camera_file, pen_file = preparation.camera_file, preparation.pen_file
     rig_file = preparation.rig_file

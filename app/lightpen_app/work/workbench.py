@@ -146,13 +146,10 @@ class Workbench(QObject):
         self.camera.open()
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
-        """Close the camera, cancel running jobs and wait for their end.
+        """Close the camera, cancel the jobs of all pages and wait for their end.
 
-        Returns
-        -------
-        bool
-            Whether it has, the jobs of all pages included. What continues may be left
-            behind: all that was acknowledged is on the disk.
+        Returns whether all ended. What continues may be left behind: all that was
+        acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
         for view in (self.run, self.verification, self.measuring):

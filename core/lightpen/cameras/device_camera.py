@@ -80,12 +80,7 @@ class Device(Protocol):
         """The features of the open camera."""
 
     def open(self) -> None:
-        """Open the camera.
-
-        Raises
-        ------
-        DeviceNotFound, DeviceBusy
-        """
+        """Open the camera, or raise `DeviceNotFound` or `DeviceBusy`."""
 
     def close(self) -> None:
         """Release everything; safe to call twice and on a lost camera."""
@@ -138,7 +133,7 @@ class DeviceCamera:
         return self._capabilities
 
     def open(self) -> None:
-        """Find and open the camera; no-op if it is open."""
+        """Open the camera, or raise `DeviceNotFound` or `DeviceBusy`."""
         if self._capabilities is None:
             self._device.open()
             self._refresh()

@@ -171,13 +171,7 @@ class BoardForm(Translated, QWidget):
         self._retranslate()
 
     def board(self) -> Board:
-        """Return the board of the fields.
-
-        Raises
-        ------
-        UsageError
-            There is no such board.
-        """
+        """Return the board of the fields, or raise `UsageError`."""
         kind = BoardKind(self._kind.currentData())
         entered = Board(
             kind=kind,

@@ -50,7 +50,7 @@ class MaskControl(QObject):
         self._images.set_extra_markers((*masked, *found))
 
     def end(self) -> None:
-        """Search and draw no longer; the step is left."""
+        """End searching and drawing, as the step is left."""
         self._panel.give_up()
         self._panel.end_drawing()
         self._panel.uncover()

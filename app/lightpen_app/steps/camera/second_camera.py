@@ -55,13 +55,7 @@ class SecondCameraChoice(QWidget):
         return self._source
 
     def show_step(self, seen: LiveImage) -> None:
-        """Show whether two cameras take their images simultaneously.
-
-        Parameters
-        ----------
-        seen : LiveImage
-            The newest image, which shows how far away the pen is.
-        """
+        """Show by the newest image whether two cameras are synchronised."""
         live = self._live
         if live.n_cameras == 1:
             return

@@ -25,18 +25,7 @@ def keep_study(
     limits: VerificationLimits,
     operator: str,
 ) -> Path:
-    """Keep a study as a verification of a data folder, and return its file.
-
-    Parameters
-    ----------
-    entries : sequence of StoredEntry
-        Of the tips.
-
-    Raises
-    ------
-    FileError
-        It cannot be written, or not be signed.
-    """
+    """Keep a study of tips as a verification of a data folder, and return its file."""
     events = [each.entry.event for each in entries]
     results = [each.result for each in events if each.result is not None]
     record = verification_record(

@@ -159,7 +159,7 @@ class LedDraft(QObject):
         self.show(draft)
 
     def edit(self, draft: PenDraft) -> None:
-        """Show another draft, from which the way back is open."""
+        """Show another draft; the change can be undone."""
         self.edits.push(DraftEdit(self.show, self._state.draft, draft))
 
     def show(self, draft: PenDraft) -> None:

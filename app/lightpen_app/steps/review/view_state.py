@@ -63,15 +63,7 @@ class ReviewPageState:
 def review_page_state(
     status: SwingStatus, named: Names, main: MainAction
 ) -> ReviewPageState:
-    """Return the view state of the page.
-
-    Parameters
-    ----------
-    named : Names
-        Selection at the step Start.
-    main : MainAction
-        Action of the main button.
-    """
+    """Return the view state of the page, by the selection at the step Start."""
     translate, verdict = QCoreApplication.translate, status.verdict
     why_locked, is_accepted = why_not_changed(status), status.result is not None
     goes_on = all_read = not_swung = not_accepted = ""

@@ -204,10 +204,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
     def set_value(self, statuses: StationStatus, pen: str, *, is_guarded: bool) -> None:
         """Show the status of all items; tips of a pen, if one is selected.
 
-        Parameters
-        ----------
-        is_guarded : bool
-            Whether a supervisor has to sign each change.
+        If guarded, a supervisor has to sign each change.
         """
         self._statuses, self._pen, self._is_guarded = statuses, pen, is_guarded
         self._fill()

@@ -48,13 +48,7 @@ class SpinRecorder(QObject):
             self._live.image_shown.disconnect(self._on_image_shown)
 
     def fit(self) -> SpinFit:
-        """Return the axis from the spin.
-
-        Raises
-        ------
-        CalibrationError
-            The spin does not show it.
-        """
+        """Return the axis from the spin."""
         return fit_spin(np.array(self._rotations).reshape(-1, 3, 3))
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:

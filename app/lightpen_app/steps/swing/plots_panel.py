@@ -69,14 +69,9 @@ class SwingPlots(Translated, QWidget):
         return self._misfit, self._scatter, self._estimate, self._uncertainty
 
     def show_next(self, state: SwingState, max_uncertainty: float) -> None:
-        """Update one plot, in turn.
+        """Update one plot, in turn; the limit of U is in mm.
 
         One at a time, so that the window is never held up by all of them.
-
-        Parameters
-        ----------
-        max_uncertainty : float
-            The limit of U, mm.
         """
         plot, show = self._turns[0]
         self._turns.rotate(-1)

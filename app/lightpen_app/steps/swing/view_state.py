@@ -409,13 +409,7 @@ class SwingWords(QObject):
 
 
 def images_period(times: FloatArray) -> float | None:
-    """Return the interval between accepted images, s; None for too few.
-
-    Parameters
-    ----------
-    times : (N,) array
-        Of the last images, s.
-    """
+    """Return the interval between images at times (N,), s; None for too few."""
     if len(times) < N_PACING:
         return None
     return float(times[-1] - times[0]) / (len(times) - 1)

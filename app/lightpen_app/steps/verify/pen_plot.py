@@ -23,10 +23,7 @@ class LedMovesPlot(Plot):
     def set_data(self, moves: FloatArray, moved: tuple[int, ...]) -> None:
         """Show the shifts of LEDs (N, L) at each swing, mm, NaN where not seen.
 
-        Parameters
-        ----------
-        moved : tuple of int
-            Numbers of those that moved against the others, from 1.
+        ``moved`` are the numbers of those that moved against the others, from 1.
         """
         n_swings, n_leds = moves.shape
         while len(self._lines) < n_leds:

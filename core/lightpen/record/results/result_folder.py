@@ -74,7 +74,7 @@ class FolderArchive:
 
     @property
     def folder(self) -> Path:
-        """That the files of real pens are in."""
+        """Folder of the results of real pens."""
         return self._data / RESULTS
 
     def store(self, result: Result, supervisor: SigningKey | None = None) -> None:
