@@ -50,6 +50,7 @@ OTHER_CENTER = 0.005  # shift of the principal point, of that side
 OTHER_ASPECT = 0.002  # of fx/fy, relative
 OTHER_DISTORTION = 0.002  # of the distortion, rms over the image, of that side
 SIGMAS = 3.0
+SKEW_ALONE = 0.8  # of the rms without a skew; a lens field hardly looks like one
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one
 
@@ -61,6 +62,7 @@ def explain(
     change: CameraChange | None,
     released: BoardTolerances | None = None,
     lessened: float = LESSENED,
+    apart: BoolArray | None = None,
 ) -> CalibrationError | None:
     """Return why views do not fit one camera, if an alternative does explain it.
 
@@ -74,6 +76,8 @@ def explain(
         Of another board than it is said to be; that explains the views, too.
     lessened : float
         Share of the residuals by one camera, below which an alternative explains them.
+    apart : (V,) array of bool, optional
+        Views that differ from the others by more than one lens explains.
     """
     near = fitted.state.cameras[0]
     n = 2 * int(views.seen.sum()) / CORRELATED
@@ -92,14 +96,6 @@ def explain(
         found.append((n * np.log(max(rms, FINEST) ** 2) + cost, rms, error))
 
     useless: CalibrationError | None = None
-    turned = _turned(views, tolerances, near)
-    if turned is not None and nothing**2 - turned[1] ** 2 > LEAST_EFFECT**2:
-        which, rms = turned
-        names, n_named = _fewer(views, which)
-        turned_error = CalibrationError(
-            "intrinsics.turned", names=names, n_named=n_named, n_views=views.n_views
-        )
-        consider(rms, cost_of_groups, turned_error)
     if change is not None:
         order = np.arange(views.n_views)
         first = views.names.index(change.name) if change.name else views.n_views // 2
@@ -110,12 +106,29 @@ def explain(
                 error = CalibrationError(message_on_change(change))
             cost = cost_of_camera + 2 * np.log(views.n_views)
             consider(parted.rms, cost, error)
-            if change.in_image > USELESS * max(views.image_sizes[0]):
+            if matters(change, views):
                 useless = error
-    groups = _best_groups(views, tolerances, near)
+    if apart is not None:
+        groups = _two_cameras(views, tolerances, near, apart, rounds=0)
+    else:  # what differs less is rather what the lens does beyond its model
+        groups = _best_groups(views, tolerances, near)
+        groups = groups if groups and groups.rms < HALVED * nothing else None
     if groups is not None and _differ(groups):
         error = _groups_error(views, groups)
         consider(groups.rms, cost_of_camera + cost_of_groups, error)
+        if apart is not None:
+            useless = useless or error
+    turned, enough = _turned(views, tolerances, near), HALVED * nothing
+    if groups is not None:  # turned images show all by which these differ
+        enough = groups.rms / LESSENED
+    if turned is not None and nothing**2 - turned[1] ** 2 > LEAST_EFFECT**2:
+        which, rms = turned
+        names, n_named = _fewer(views, which)
+        turned_error = CalibrationError(
+            "intrinsics.turned", names=names, n_named=n_named, n_views=views.n_views
+        )
+        if rms < enough:
+            consider(rms, cost_of_groups, turned_error)
     skewed = _skewed(views, tolerances, near)
     height, longer = views.image_sizes[0][1], max(views.image_sizes[0])
     # Less is also a lens's field, unless there is a board to be blamed for it.
@@ -125,7 +138,8 @@ def explain(
         skewed_error = CalibrationError(
             "intrinsics.skewed", degrees=float(np.degrees(skew))
         )
-        consider(rms, np.log(n), skewed_error if abs(skew) > least else None)
+        is_sure = rms < SKEW_ALONE * nothing and abs(skew) > least
+        consider(rms, np.log(n), skewed_error if is_sure else None)
     if released is not None:
         rms = _rms_by(views, released, near)
         consider(rms, N_SHAPE * np.log(n), None)
@@ -154,6 +168,11 @@ class _Groups(NamedTuple):
     def cameras(self) -> tuple[Camera, Camera]:
         one, other = self.fits
         return one.state.cameras[0], other.state.cameras[0]
+
+
+def matters(change: CameraChange, views: Views) -> bool:
+    """Return whether a change moves the image so far that the views are useless."""
+    return change.in_image > USELESS * max(views.image_sizes[0])
 
 
 def _differ(groups: _Groups) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.formats.camera_checks import folds
-from lightpen.intrinsics.alternatives import HALVED, explain
+from lightpen.intrinsics.alternatives import HALVED, explain, matters
 from lightpen.intrinsics.board_findings import (
     board_contradictions,
     messages_on_board,
@@ -29,6 +29,7 @@ from lightpen.intrinsics.camera_change import (
     changed_camera,
     detectable_zoom,
     find_alternation,
+    find_apart,
     find_change,
     message_on_alternation,
     message_on_change,
@@ -46,7 +47,11 @@ from lightpen.intrinsics.distortion import (
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty, moved_in_image
-from lightpen.intrinsics.variance_components import MixedFit, fit_effects
+from lightpen.intrinsics.variance_components import (
+    MixedFit,
+    fit_effects,
+    without_fields,
+)
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
@@ -68,6 +73,7 @@ LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CLUSTERED = 2.0  # times the variance that views of one camera scatter by
 UNEVEN_LENS = 10.0  # times the noise: a residual field that is no lens'
 LEAST_NOISE = 0.01  # px: beside less, usual fields and blur look large
+SKEW_ALONE = 0.1  # of a field's squares, that a skew of the image may leave
 UNEVEN_VIEWS = 2.0  # times the noise: a smooth error of views that is no blur
 
 
@@ -190,9 +196,18 @@ def calibrate_camera(
         raise (better or error) from error
     change = find_change(found.effects, found.views.names)
     alternation = find_alternation(found.effects)
-    if change is not None or alternation is not None or found.is_suspicious:
+    taken = np.isin(views.names, found.views.names)
+    apart = find_apart(found.effects, taken)
+    if apart is None and alternation is not None and matters(alternation, views):
+        apart = np.zeros(views.n_views, dtype=np.bool_)
+        apart[np.flatnonzero(taken)[1::2]] = True
+    changes = (change, alternation, apart)
+    if found.is_suspicious or any(each is not None for each in changes):
         released = released_tolerances(tolerances) if found.denied.any() else None
-        better = explain(views, tolerances, found.adjustment, change, released)
+        even = _without_lens_field(views, found.effects)
+        better = explain(
+            even, tolerances, found.adjustment, change, released, apart=apart
+        )
         if better is not None:
             raise better
     require_plausible_bend(found.adjustment)
@@ -234,6 +249,20 @@ def calibrate_camera(
         halves=_halves(found.effects),
         remarks=tuple(remarks),
     )
+
+
+def _without_lens_field(views: Views, effects: MixedFit) -> Views:
+    """Return the views without what the lens does in all of them alike.
+
+    A field that is nothing but a skew of the image stays: no lens makes one.
+    """
+    even = without_fields(views, effects.fields)
+    at = views.pixels[views.seen]
+    moves = at - even.pixels[views.seen]
+    moves -= moves.mean(axis=0)
+    affine = np.linalg.lstsq(at - at.mean(axis=0), moves, rcond=None)
+    is_skew = affine[1].sum() < SKEW_ALONE * float(np.sum(moves**2))
+    return views if is_skew else even
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,19 +325,21 @@ def _fit_unfolded(
     views: Views, tolerances: BoardTolerances, choice: Choice, fitted: BoardFit
 ) -> tuple[Choice, MixedFit]:
     """Return the fit with effects; they may fold the image where the fit does not."""
-    effects = fit_effects(views, fitted)
-    near = fitted.state.cameras[0]
-    for pull in PULLS:
-        if choice.n_coefficients not in FOLDING:
-            break
-        if not folds(effects.adjustment.state.cameras[0]):
-            break
-        if choice.pull is not None and pull >= choice.pull:
+    near, given = fitted.state.cameras[0], choice.pull
+    pulls = PULLS if choice.n_coefficients in FOLDING else ()
+    stronger = [pull for pull in pulls if given is None or pull < given]
+    for pull in (given, *stronger):
+        if pull != given:
+            fitted = fit_camera(views, tolerances, near, pull)
+        try:
+            effects = fit_effects(views, fitted)
+        except CalibrationError as error:
+            if error.message.code != "camera.distortion-folds":
+                raise
             continue
-        choice = replace(choice, pull=pull)
-        effects = fit_effects(views, fit_camera(views, tolerances, near, pull))
-    _require_no_fold(effects.adjustment.state.cameras[0])
-    return choice, effects
+        if not folds(effects.adjustment.state.cameras[0]):
+            return replace(choice, pull=pull), effects
+    raise CalibrationError("intrinsics.folds")
 
 
 def _before(views: Views, camera: Camera) -> Views:

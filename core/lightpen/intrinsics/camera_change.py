@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.intrinsics.uncertainty_map import moved_in_image
 from lightpen.intrinsics.variance_components import MixedFit
 from lightpen.messages import Message, message
@@ -65,8 +65,51 @@ def find_alternation(mixed: MixedFit) -> CameraChange | None:
     return None if found is None else CameraChange("", *found[1:])
 
 
+def find_apart(mixed: MixedFit, taken: BoolArray) -> BoolArray | None:
+    """Return views that differ from the others by more than one lens explains, (W,).
+
+    View by view goes to the other group as long as that increases the difference of fx
+    fy cx cy; the chance that it must not have is that of all ways of parting the views.
+
+    Parameters
+    ----------
+    taken : (W,) array of bool
+        Which views took part in the fit; the others stay with the first.
+    """
+    at = mixed.adjustment.of_intrinsics(0)
+    n_views = len(mixed.scores.scores)
+    way = np.eye(at.stop - at.start)[:, :4]
+
+    def size(which: BoolArray) -> float:
+        if min(which.sum(), (~which).sum()) < FEWEST:
+            return 0.0
+        score, information = mixed.scores.change(which.astype(np.float64))
+        return _fitted_change(score[at], information[at, at], way)[1]
+
+    order = np.arange(n_views)
+    sigmas = np.sqrt(np.diag(mixed.scores.covariance)[at])
+    main = np.linalg.svd(mixed.scores.scores[:, at] * sigmas, full_matrices=False)[0]
+    best, most = np.zeros(n_views, dtype=np.bool_), 0.0
+    for which in (order >= n_views // 2, order % 2 == 1, main[:, 0] > 0):
+        reached, is_rising = size(which), True
+        while is_rising:
+            others = [which ^ (order == v) for v in range(n_views)]
+            sizes = [size(other) for other in others]
+            is_rising = max(sizes) > reached
+            if is_rising:
+                which, reached = others[int(np.argmax(sizes))], max(sizes)
+        if reached > most:
+            best, most = which, reached
+    share = best.astype(np.float64)
+    if _most_significant(mixed, [share], CHANCE / 2**n_views) is None:
+        return None
+    found = np.zeros(len(taken), dtype=np.bool_)
+    found[taken] = best
+    return found
+
+
 def _most_significant(
-    mixed: MixedFit, shares: list[FloatArray]
+    mixed: MixedFit, shares: list[FloatArray], chance: float = CHANCE
 ) -> tuple[int, FloatArray, float] | None:
     """Return number, difference and px in the image of the most significant change.
 
@@ -79,16 +122,18 @@ def _most_significant(
     at = mixed.adjustment.of_intrinsics(0)
     n = at.stop - at.start
     ways = (_zoom(camera), np.eye(n)[:, :4], np.eye(n))
-    chance = CHANCE / (len(shares) * N_WAYS)
-    clustering = max(mixed.scores.clustering, 1.0)
+    chance /= len(shares) * N_WAYS
     best, most = None, 1.0
     for number, share in enumerate(shares):
         score, information = mixed.scores.change(share)
         for way in ways:
             difference, squares = _fitted_change(score[at], information[at, at], way)
-            least = clustering * chi_square_quantile(way.shape[1], chance)
-            if squares > most * least:
-                most = squares / least
+            ratio = squares / chi_square_quantile(way.shape[1], chance)
+            if ratio > most:  # a change scatters the scores itself
+                rest = mixed.scores.without(share, at, difference)
+                ratio /= max(rest.clustering, 1.0)
+            if ratio > most:
+                most = ratio
                 best = number, difference, moved_in_image(camera, difference)
     return best
 

@@ -1,6 +1,6 @@
 """Score (gradient of the likelihood) of each view, to compare groups of views."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,27 @@ class ViewScores:
         n = len(score)
         known = own[:n] - first.T @ self.covariance @ first
         return score, 0.5 * (known + known.T)
+
+    def without(
+        self, weights: FloatArray, at: slice, difference: FloatArray
+    ) -> "ViewScores":
+        """Return the scores of views after a change that they have a share in.
+
+        Parameters
+        ----------
+        weights : (V,) array
+            The share.
+        at : slice
+            Indices of the changed parameters.
+        difference : array
+            Of these.
+        """
+        moved = weights[:, None] * (self.information[..., at] @ difference)
+        drawn = self.covariance @ moved.sum(axis=0)
+        n = self.scores.shape[1]
+        left = self.scores - moved[:, :n]
+        left += np.einsum("vqs,q->vs", self.information, drawn)
+        return replace(self, scores=left)
 
     @property
     def clustering(self) -> float:

@@ -10,12 +10,15 @@ from benchmarks import board_trials
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics import alternatives
+from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.camera_change import find_change
 from lightpen.intrinsics.distortion import fit_camera
 from lightpen.intrinsics.variance_components import fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.messages import Message
 from lightpen.model.camera import Camera
+from lightpen.simulator.boards import simulate_board_poses
 
 MakeViews = Callable[..., Views]
 NOISE = 0.03  # px
@@ -136,7 +139,7 @@ def test_halves_that_differ_are_a_finding(
     make_views: MakeViews, camera: Camera
 ) -> None:
     odd = np.arange(24) % 2 == 1
-    other = make_views(n_views=24, of=zoomed(camera, 1.003))
+    other = make_views(n_views=24, of=zoomed(camera, 1.0015))
     found = calibrated(merged(make_views(n_views=24), other, odd))
 
     assert [each.code for each in found.remarks] == ["intrinsics.halves"]
@@ -181,6 +184,17 @@ def test_two_settings_in_turns_are_not_taken_for_two_cameras(
 
     with pytest.raises(CalibrationError, match="two settings of zoom or focus"):
         calibrated(merged(make_views(n_views=20), other, odd))
+
+
+@pytest.mark.slow
+def test_a_small_zoom_in_turns_is_refused(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    odd = np.arange(24) % 2 == 1
+    other = make_views(n_views=24, of=zoomed(camera, 1.004))
+
+    with pytest.raises(CalibrationError, match="two settings of zoom or focus"):
+        calibrated(merged(make_views(n_views=24), other, odd))
 
 
 @pytest.mark.slow
@@ -266,6 +280,54 @@ def test_a_board_bent_as_none_is_refused(
 ) -> None:
     with pytest.raises(CalibrationError, match="bent by"):
         calibrated(make_views(shape=np.array([0, 0, *bend])))
+
+
+def before_a_field(
+    seed: int, amplitude: float, other: Camera = board_trials.CAMERA
+) -> tuple[Views, BoolArray]:
+    """Return views before a lens with a field, some of another camera, and which."""
+    camera, board = board_trials.CAMERA, parse_board(board_trials.BOARD)
+    rng = np.random.default_rng([board_trials.STREAM, 5, seed])
+    n_views = int(rng.integers(*board_trials.N_VIEWS, endpoint=True))
+    poses = simulate_board_poses(camera, board, n_views, rng)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(board_trials, "FIELD", (amplitude, amplitude))
+        field = board_trials.draw_field(rng, camera)
+    true = board.points.copy()
+    true[:, :2] += board_trials.draw_uneven(board, rng)
+    noise = int(rng.integers(1 << 30))
+    pixels = [
+        board_trials.observe_points(
+            each, board, true, poses, field, np.random.default_rng(noise)
+        )
+        for each in (camera, other)
+    ]
+    is_other = np.random.default_rng([4, seed]).permutation(n_views) < n_views // 2
+    mixed = np.where(is_other[:, None, None], pixels[1], pixels[0])
+    names = tuple(map(str, range(n_views)))
+    return Views(board, names, mixed[:, None], (camera.image_size,)), is_other
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_correct_set_before_a_lens_with_a_large_field_is_accepted(seed: int) -> None:
+    views, _ = before_a_field(seed, 0.25)
+
+    assert calibrated(views).change is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 12])  # taken for rotated images, and accepted
+def test_two_cameras_behind_a_lens_field_are_found(seed: int) -> None:
+    other = replace(board_trials.CAMERA, fx=575.0, fy=574.2, cx=197.3, cy=152.1)
+    views, is_other = before_a_field(seed, 0.08, other)
+
+    with pytest.raises(CalibrationError, match=r"two (cameras|settings)") as caught:
+        calibrated(views)
+    one = caught.value.message.values["one"]
+    assert isinstance(one, Message)
+    n_first = one.values["n_views"]
+    assert min(abs(n_first - n) for n in (is_other.sum(), (~is_other).sum())) <= 1
 
 
 @pytest.mark.slow

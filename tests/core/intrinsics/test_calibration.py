@@ -7,18 +7,22 @@ from datetime import date
 import numpy as np
 import pytest
 
+from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.intrinsics import calibration
+from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import (
     MIN_VIEWS,
     CameraCalibration,
     calibrate_camera,
 )
 from lightpen.intrinsics.coverage import cover
-from lightpen.intrinsics.distortion import choose_distortion, fit_camera
+from lightpen.intrinsics.distortion import PULLS, choose_distortion, fit_camera
 from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.report import measure_regions
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 
@@ -249,3 +253,21 @@ def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
     assert found.adjustment.rms < 1.1 * NOISE * 2**0.5
     assert found.camera.covariance is not None
     assert np.isfinite(map_uncertainty(found.camera, found.camera.covariance).worst)
+
+
+def test_effects_that_fold_the_image_are_fitted_again_with_a_weaker_lens(
+    make_views: MakeViews, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[FloatArray] = []
+
+    def fit_or_fold(views: Views, fitted: BoardFit) -> MixedFit:
+        tried.append(np.diag(fitted.prior))
+        if len(tried) == 1:
+            raise CalibrationError("camera.distortion-folds")
+        return fit_effects(views, fitted)
+
+    monkeypatch.setattr(calibration, "fit_effects", fit_or_fold)
+    found = calibrate_camera(make_views(), BoardTolerances())
+
+    assert found.choice.pull == PULLS[0]
+    assert tried[1][8] == PULLS[0] ** -2  # of k3

@@ -175,3 +175,7 @@ def test_a_change_of_the_camera_is_in_the_scores_of_the_views_after_it(
 
     assert abs(difference[2] - 3.0) < 3 * np.sqrt(covariance[2, 2])
     assert difference[2] > 3 * np.sqrt(covariance[2, 2])
+    rest = found.scores.without(which[:, 0, 0, 0].astype(float), at, difference)
+    left, _ = rest.change(which[:, 0, 0, 0].astype(float))
+    np.testing.assert_allclose(left[at], 0.0, atol=1e-6 * np.abs(score[at]).max())
+    assert rest.clustering < found.scores.clustering
