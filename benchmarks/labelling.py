@@ -142,4 +142,5 @@ def spots_at(centers: FloatArray, shapes: FloatArray) -> Spots:
         edge_widths=np.full(n, 2.0),
         flaws=np.zeros(n, dtype=np.int64),
         sigmas=np.full(n, 0.01),
+        offsets=np.zeros((n, 2)),
     )

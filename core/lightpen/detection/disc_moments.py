@@ -338,7 +338,7 @@ def with_rims(
 
 
 def _known(disc: Disc, before: Sequence[EdgeStart]) -> EdgeStart:
-    """Return the start of an edge fit: the nearest previous shape, if any."""
+    """Return the start of an edge fit: as the nearest previous disc, if any."""
     assert disc.rim is not None
     if not before:
         return disc.rim
@@ -346,11 +346,9 @@ def _known(disc: Disc, before: Sequence[EdgeStart]) -> EdgeStart:
     near = min(before, key=lambda one: hypot(one.center[0] - x, one.center[1] - y))
     size = sqrt(float(np.trace(near.shape)))
     gap = hypot(near.center[0] - x, near.center[1] - y)
-    return (
-        disc.rim._replace(shape=near.shape, sigma=near.sigma)
-        if gap < 2 * size
-        else disc.rim
-    )
+    if gap > 2 * size:
+        return disc.rim
+    return near._replace(center=disc.rim.center - near.offset)
 
 
 def _separate(

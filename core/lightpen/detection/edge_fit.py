@@ -42,8 +42,9 @@ MIN_RAYS, MAX_RAYS = 32, 128
 # astray; in the end the blur is held.
 SHARPNESS = 4
 ROUNDS = 3 * [[0, 1, 2, 3, 4]] + 2 * [[0, 1, 2, 3, 4, 5]] + 2 * [[0, 1, 2, 3, 5]]
-# From the image before, whose shape and blur a disc still has nearly.
-KNOWN_ROUNDS = ROUNDS[4:6]
+# From the image before, whose shape and blur a disc still has nearly; the last is left
+# out where the rim is at rest.
+KNOWN_ROUNDS = ROUNDS[4:]
 RIDGE = 1e-12  # of the normal matrix, which no disc of many may spoil
 LONGEST_STEP = 1.5  # px, of the rim in one round
 CONVERGED = 0.05  # px
@@ -101,11 +102,15 @@ class EdgeStart(NamedTuple):
     sigma : float or None
         Blur of the same disc in the image before, px, whose shape this is then; None
         for a disc seen for the first time.
+    offset : (2,) array
+        By how much the region's centre was off the disc's there, px, as by light
+        reflected beside it.
     """
 
     center: FloatArray
     shape: FloatArray
     sigma: float | None = None
+    offset: FloatArray = np.zeros(2)
 
 
 class _Ellipses(NamedTuple):
@@ -210,12 +215,13 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
     if not len(left):
         return found
     ellipses = _Ellipses(centers[left], np.linalg.cholesky(4 * shapes[left]))
-    if starts[0].sigma is None:
-        rounds = ROUNDS
-        ellipses, sigmas = _onto_steepest(image, ellipses)
-    else:
+    is_known = starts[0].sigma is not None
+    if is_known:
         rounds = KNOWN_ROUNDS
         sigmas = np.array([starts[i].sigma for i in left.tolist()], dtype=np.float64)
+    else:
+        rounds = ROUNDS
+        ellipses, sigmas = _onto_steepest(image, ellipses)
     for n, unknowns in enumerate(rounds, start=1):
         shorter = ellipses.semi_axes[1]
         sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
@@ -228,12 +234,15 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
         alive = edges.are_lit & (shorter > MIN_SEMI_AXIS) & np.isfinite(longest)
         shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
         ellipses = _moved(ellipses, steps * shares[:, None])
-        if n == len(rounds):
+        at_rest = longest < CONVERGED
+        ends = is_known and SHARPNESS not in unknowns
+        ended = alive & ((at_rest & ends) | (n == len(rounds)))
+        if ended.any():
             are_even = _are_even(edges.places - moves, shorter) & ~edges.are_dark
-            are_whole = are_even & (longest < CONVERGED)
-            for d in np.flatnonzero(alive & (sigmas < MAX_SIGMA * shorter)).tolist():
+            are_whole = are_even & at_rest
+            for d in np.flatnonzero(ended & (sigmas < MAX_SIGMA * shorter)).tolist():
                 found[left[d]] = _rim(ellipses, sigmas, d, bool(are_whole[d]))
-            break
+            alive &= ~ended
         sigmas = sigmas + edges.blurs
         if not alive.all():
             left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
@@ -319,7 +328,9 @@ def _edges(
     weights = np.minimum(np.maximum(brightness / usual, DARK), BRIGHTEST) ** 2
     blurs = np.zeros(len(s))
     if SHARPNESS in unknowns:
-        each = np.clip(fitted[..., 4] / divisor, -1, 1)
+        # To second order, a rim d px further out looks d^2 / (2 sigma) more blurred.
+        moved = places**2 / (2 * sigmas[:, None])
+        each = np.clip(fitted[..., 4] / divisor - moved, -1, 1)
         blurs = (weights * each).sum(axis=1) / weights.sum(axis=1)
         blurs = np.maximum(blurs, -LARGEST_SHARPENING * sigmas)
     return _Edges(places, weights, blurs, np.asarray(~lit.all(axis=1)), are_lit)

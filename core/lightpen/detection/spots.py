@@ -110,6 +110,8 @@ class Spots:
     sigmas : (N,) array
         Standard deviation of one coordinate of each centre, px, by the estimator that
         found it; `EXACT_SIGMA` for discs that are wide enough to have a rim.
+    offsets : (N, 2) array
+        By how much the centre of the bright region is off that of the disc, px.
     has_smears : bool
         Whether there is light, but no spot: discs moved by many times their size during
         the exposure leave streaks, a dark image leaves nothing.
@@ -125,6 +127,7 @@ class Spots:
     edge_widths: FloatArray
     flaws: IntArray
     sigmas: FloatArray
+    offsets: FloatArray
     has_smears: bool = False
     tiny_width: float = float("nan")
 
@@ -140,6 +143,7 @@ class Spots:
             edge_widths=nothing,
             flaws=np.zeros(0, dtype=np.int64),
             sigmas=nothing,
+            offsets=np.zeros((0, 2)),
         )
 
     def __len__(self) -> int:
@@ -156,10 +160,10 @@ class Spots:
             Pixel of this image where the next one, a part of the sensor, begins, px.
         """
         return [
-            EdgeStart(center - corner, shape, width / GAUSSIAN_RISE)
-            for center, shape, width, flaws in zip(
+            EdgeStart(center - corner, shape, width / GAUSSIAN_RISE, offset)
+            for center, shape, width, offset, flaws in zip(
                 *(self.centers, self.shapes, self.edge_widths.tolist()),
-                self.flaws.tolist(),
+                *(self.offsets, self.flaws.tolist()),
                 strict=True,
             )
             if not flaws & (SpotFlaw.MERGED | SpotFlaw.CUT)
@@ -516,8 +520,13 @@ def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
     whole = [disc.moments.area for disc in discs if disc.is_whole]
     usual_area = median(whole) if whole else None
     moments = [disc.moments for disc in discs]
+    centers = np.array([(m.x, m.y) for m in moments]).reshape(-1, 2)
+    regions = [
+        center if disc.rim is None else disc.rim.center
+        for disc, center in zip(discs, centers, strict=True)
+    ]
     return Spots(
-        np.array([(m.x, m.y) for m in moments]).reshape(-1, 2),
+        centers,
         np.array([(m.var_x, m.cov_xy, m.cov_xy, m.var_y) for m in moments]).reshape(
             -1, 2, 2
         ),
@@ -528,6 +537,7 @@ def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
             [_flaws(disc, usual_area, full_scale, noise) for disc in discs], np.int64
         ),
         np.full(len(discs), EXACT_SIGMA),
+        np.array(regions).reshape(-1, 2) - centers,
     )
 
 

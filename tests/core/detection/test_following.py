@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from tests.simulated_plans import live_plan
 
 from lightpen.detection.following import Followed, follow_spots
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.simulator.image_plans import render_plan
-from lightpen.simulator.scenes import Scene
+from lightpen.simulator.scenes import LEDS, Scene
 
 SCENE = Scene()
 
@@ -82,11 +83,26 @@ def test_a_cut_spot_on_its_led_is_labelled_but_not_used() -> None:
     assert not found.labels.whole[led]
 
 
-def test_rims_found_from_the_image_before_are_those_found_anew() -> None:
-    scene = replace(SCENE, faces="hot-spot")
+@pytest.mark.parametrize("look", ["hot-spot", "dome"])
+def test_rims_found_from_the_image_before_are_those_found_anew(look: str) -> None:
+    scene = replace(SCENE, faces=LEDS[look].faces)
     first, second = (render_plan(scene, live_plan(scene, 0, t)) for t in (1.0, 1.05))
     before = detect_spots(first)
     anew, known = detect_spots(second), detect_spots(second, before=before)
     np.testing.assert_array_equal(known.flaws, anew.flaws)
     np.testing.assert_allclose(known.centers, anew.centers, atol=0.003)
     np.testing.assert_allclose(known.areas, anew.areas, rtol=1e-3)
+    assert abs(np.mean(known.areas / anew.areas) - 1) < 3e-4
+
+
+@pytest.mark.parametrize("look", ["hot-spot", "board"])
+def test_rims_beside_a_shining_board_are_found_from_the_image_before(
+    look: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = replace(SCENE, faces=LEDS[look].faces, optics=LEDS[look].optics)
+    first, second = (render_plan(scene, live_plan(scene, 0, t)) for t in (1.0, 1.05))
+    before, anew = detect_spots(first), detect_spots(second)
+    monkeypatch.delattr("lightpen.detection.edge_fit._onto_steepest")
+    known = detect_spots(second, before=before)
+
+    np.testing.assert_allclose(known.centers, anew.centers, atol=0.01)

@@ -15,6 +15,7 @@ SPOTS = Spots(
     edge_widths=np.full(2, 2.0),
     flaws=np.zeros(2, dtype=np.int64),
     sigmas=np.full(2, 0.01),
+    offsets=np.zeros((2, 2)),
 )
 
 

@@ -55,6 +55,7 @@ def seen(
         edge_widths=np.full(n, 2.0),
         flaws=np.zeros(n, dtype=np.int64),
         sigmas=np.full(n, 0.01),
+        offsets=np.zeros((n, 2)),
     )
 
 
@@ -280,7 +281,7 @@ def test_smeared_and_nearly_empty_images_are_passed_over() -> None:
     empty = Spots(
         *(spots.centers[:2], spots.shapes[:2], spots.areas[:2]),
         *(spots.contrasts[:2], spots.edge_widths[:2], spots.flaws[:2]),
-        spots.sigmas[:2],
+        *(spots.sigmas[:2], spots.offsets[:2]),
     )
 
     assert add_view((), smeared) == ()
