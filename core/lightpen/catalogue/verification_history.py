@@ -2,10 +2,10 @@
 
 MESSAGES = {
     "led-file.changed-meanwhile": "LED {led} moved by {distance:.3f} mm between the swings {first} and {swing}; no LED file fits both. Give only later swings.",
-    "led-file.own-images": "The files of camera and pen were found from the images of {swing}, which would count twice. Remove it.",
     "led-file.of-rig": "{path} has several cameras; only calibrations of a single camera can be recomputed. Remove it.",
     "led-file.too-few": "Swings given: {n_swings}. {needed} are needed for pooling, and one more for confirmation, all with one camera and the same files of camera and LEDs.",
     "led-file.not-confirmed": "The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.",
+    "led-file.contradicted": "The swing {swing} contradicts the others by {times:.0f} standard deviations. Check that pen, zoom and focus were the same in all swings.",
     "press-test.steady": "Press test: under firm pressure the tip moves by {change:+.4f} mm along the pen (U {uncertainty:.4f} mm): no significant change.",
     "press-test.gives-way": "Press test: under firm pressure the tip moves by {change:.4f} mm along the pen (U {uncertainty:.4f} mm): the stylus, its thread or the seat gives way.",
     "press-test.cone-moved": "Press test: the cone or the camera moved by {distance:.4f} mm (U {uncertainty:.4f} mm) between the two swings.",

@@ -108,7 +108,9 @@ def _improve_pen(options: argparse.Namespace) -> None:
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     camera = read_camera(options.camera)
     scale = None if options.length is None else read_scale(options.length)
-    found = improve_pen(swings, camera, pen, scale)
+    found = improve_pen(
+        swings, camera, pen, scale, must_gain=options.out_camera is None
+    )
     write_pen(found.pen, options.out, sha256(options.pen))
     if options.out_camera is not None:
         write_camera(found.camera, options.out_camera)

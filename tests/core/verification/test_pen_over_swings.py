@@ -22,7 +22,7 @@ from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
-from lightpen.model.self_calibration import FoundPen, marks_of
+from lightpen.model.self_calibration import EXACT_SCALE, FoundPen, marks_of
 from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
 from lightpen.simulator.swings import (
     PAPER_TIP,
@@ -231,13 +231,39 @@ def test_what_no_swing_shows_stays_as_uncertain_as_the_file_states(
     assert of_shape.max() < 0.005**2
 
 
-def test_swings_that_the_files_were_found_from_are_not_pooled(swing: Swing) -> None:
-    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
-    shown = shown_images(swings[1].calibration)
-    known = FoundPen(marks_of(shown.pixels), 10.0, np.eye(PEN_FILE.leds.size))
+def test_the_swing_that_the_file_was_found_from_counts_once(swing: Swing) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3)]
+    marks = [marks_of(shown_images(each.calibration).pixels) for each in swings]
+    before = FoundPen(marks[0], PEN_FILE.diameter, 0.05**2 * np.eye(PEN_FILE.leds.size))
+    wide = replace(PEN_FILE, led_sigma=None, led_covariance=before.led_covariance)
+    wide = replace(wide, scale_sigma=EXACT_SCALE, expansion=0.0)
+    exact = replace(wide, led_covariance=1e-8 * before.led_covariance, found=before)
 
-    with pytest.raises(CalibrationError, match=r"found from the images of swing 2\."):
-        improve_pen(swings, paper_camera(), replace(PEN_FILE, found=known))
+    by_exact, by_wide = (
+        improve_pen(swings, paper_camera(), each, must_gain=False).pen
+        for each in (exact, wide)
+    )
+
+    np.testing.assert_allclose(by_exact.leds, by_wide.leds, atol=1e-6)
+    assert by_exact.led_covariance is not None
+    assert by_wide.led_covariance is not None
+    np.testing.assert_allclose(
+        by_exact.led_covariance, by_wide.led_covariance, rtol=0.01, atol=1e-9
+    )
+    assert by_exact.found is not None
+    np.testing.assert_array_equal(
+        by_exact.found.marks, np.concatenate([marks[0], *marks[:2]])
+    )
+
+
+def test_a_swing_held_out_that_contradicts_the_others_is_named(swing: Swing) -> None:
+    pen = true_pen()
+    leds = pen.leds.copy()
+    leds[6, 0] += 0.013  # less than what is called a move
+    swings = [swing(pen, 1), swing(pen, 2), swing(replace(pen, leds=leds), 3)]
+
+    with pytest.raises(CalibrationError, match=r"swing 3\.json contradicts the others"):
+        improve_pen(swings, paper_camera(), PEN_FILE, must_gain=False)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 from lightpen.archive.chains.entries import StoredEntry
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen.verification.history.led_file import MIN_POOLED
+from lightpen.verification.history.led_file import MIN_JOINT
 from lightpen.verification.history.trend import (
     Comparison,
     Trend,
@@ -153,8 +153,8 @@ class SelectionPanel(Translated, QWidget):
         self._adjust.setToolTip(
             self.tr("LED file and camera file by all selected swings of a pen")
         )
-        too_few = self.tr("Select {0} or more calibrations.").format(MIN_POOLED + 1)
-        why_not = too_few if len(self._selected) <= MIN_POOLED else ""
+        too_few = self.tr("Select {0} or more calibrations.").format(MIN_JOINT + 1)
+        why_not = too_few if len(self._selected) <= MIN_JOINT else ""
         self._adjust.set_why_not(why_not)
         if why_not or self._adjusted.value().sign is Sign.RING:
             self._adjusted.set_value(StatusMessage(why_not, Sign.RING, Tone.QUIET))

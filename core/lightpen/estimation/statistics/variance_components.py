@@ -31,6 +31,7 @@ SELDOM = 0.02  # mm; few images cannot exclude larger ones, which are the less l
 OBSERVABLE = 1e-9  # of the largest eigenvalue; less is rounding
 MAX_PASSES = 12
 NO_JITTER = 1e-5  # mm, along an axis; a covariance is to be inverted
+LEAST_AXIS = 1e-9  # variance of an axis over the largest
 COARSE = 4  # one in so many scales is tried first
 SETTLED = 1e-2  # relative, of a standard deviation
 LEAST_FREE = 4.0  # degrees of freedom; fewer leave a variance without a mean
@@ -218,6 +219,7 @@ def find_jitter(
 
 
 def _not_negative(covariance: FloatArray) -> FloatArray:
-    """Return a covariance with negative eigenvalues set to zero."""
+    """Return a covariance with eigenvalues so large that it can be inverted."""
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    return np.asarray((vectors * np.maximum(values, NO_JITTER**2)) @ vectors.T)
+    least = max(NO_JITTER**2, LEAST_AXIS * values[-1])
+    return np.asarray((vectors * np.maximum(values, least)) @ vectors.T)

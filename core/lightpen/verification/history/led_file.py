@@ -14,6 +14,7 @@ References
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,12 +32,17 @@ from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.quantiles import normal_quantile
-from lightpen.model.rig import Rig
+from lightpen.model.rig import Rig, rig_of
+from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
 from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
 from lightpen.verification.history.pen_health import MOVED, examine_pen, require_one_pen
 from lightpen.verification.tasks.length import Scale
 
+FoundT = TypeVar("FoundT", FoundPen, FoundCamera)
+
 MIN_POOLED = 3  # swings, beside the one held out
+MIN_JOINT = 2  # the same, of an adjustment that needs to gain nothing
+CONTRADICTING = 4.0  # standard deviations of a swing held out
 CONFIRMED = 0.01  # chance that such a gain is none
 FINEST = 1e-4  # mm, to which no LED file is known beforehand
 
@@ -95,41 +101,54 @@ def improve_pen(
     pen: Pen,
     scale: Scale | None = None,
     report: Callable[[float], None] = lambda fraction: None,
+    *,
+    must_gain: bool = True,
 ) -> ImprovedPen:
     """Improve the LEDs of a pen by several swings; the last one has to confirm it.
 
-    The scale of the pen is from certified lengths; ``report`` is called with the
-    fraction done, 0 to 1; what it raises ends the work. Raises `UsageError` for
-    different pens, and `CalibrationError` if there are too few swings, an LED moved
-    between them, or the last one does not confirm the new LEDs.
+    If the files were found from one of the swings, all is begun from what was known
+    before, so that each swing counts once. The scale of the pen is from certified
+    lengths; ``report`` is called with the fraction done, 0 to 1; what it raises ends
+    the work. With ``must_gain`` the last swing has to fit the new LEDs better than the
+    old ones; without, it has to agree with the others within its uncertainty. Raises
+    `UsageError` for different pens, and `CalibrationError` if there are too few swings,
+    an LED moved between them, or the last one does not confirm the new LEDs.
     """
     require_one_pen(calibrations)
-    if len(calibrations) < MIN_POOLED + 1:
+    needed = MIN_POOLED if must_gain else MIN_JOINT
+    if len(calibrations) < needed + 1:
         raise CalibrationError(
-            "led-file.too-few", n_swings=len(calibrations), needed=MIN_POOLED
+            "led-file.too-few", n_swings=len(calibrations), needed=needed
         )
     _require_unchanged(calibrations, pen)
     *pooled, held_out = calibrations
+    known_camera, known_pen = _known_before(calibrations, camera, pen)
     again = []
     for n, calibration in enumerate(calibrations, start=1):
-        each = calibrate_again(calibration, camera, pen)
-        if each.shares_images:
-            raise CalibrationError("led-file.own-images", swing=calibration.path.name)
-        again.append(each)
+        again.append(calibrate_again(calibration, known_camera, known_pen))
         report(n / len(calibrations))
-    (improved, refined), confirming = _pooled(again[:-1], camera, pen, scale), again[-1]
-    rig = confirming.instrument.rig
-    before, after = (fit_held(confirming, rig, each) for each in (pen, improved))
-    if not _is_better(before, after):
+    *others, confirming = again
+    joint = _pooled(others, known_camera, known_pen, scale)
+    improved, refined = joint.pen, joint.camera
+    rigs = [confirming.instrument.rig] * 2
+    if not must_gain:
+        rigs = [rig_of(camera), rig_of(refined)]
+        _require_agreement(joint, confirming.bundle, held_out.path.name)
+    before, after = (
+        fit_held(confirming, rig, each)
+        for rig, each in zip(rigs, (pen, improved), strict=True)
+    )
+    if must_gain and not _is_better(before, after):
         raise CalibrationError(
             "led-file.not-confirmed",
             swing=held_out.path.name,
             before=before.sigma,
             after=after.sigma,
         )
+    marks = [marks_of(shown_images(each.calibration).pixels) for each in pooled]
     return ImprovedPen(
-        pen=improved,
-        camera=refined,
+        pen=replace(improved, found=_with_marks(pen.found, marks)),
+        camera=replace(refined, found=_with_marks(camera.found, marks)),
         moves=improved.leds - pen.leds,
         pooled=tuple(each.path.name for each in pooled),
         held_out=held_out.path.name,
@@ -157,9 +176,46 @@ def _require_unchanged(calibrations: Sequence[CalibrationFile], pen: Pen) -> Non
     )
 
 
+def _known_before(
+    calibrations: Sequence[CalibrationFile], camera: Camera, pen: Pen
+) -> tuple[Camera, Pen]:
+    """Return camera and pen without what their files found from one of the swings."""
+    for each in calibrations:
+        pixels = shown_images(each.calibration).pixels
+        if camera.is_found_from(pixels) or pen.is_found_from(pixels):
+            return camera.before_images(), pen.before_images()
+    return camera, pen
+
+
+def _with_marks(found: FoundT | None, marks: Sequence[FloatArray]) -> FoundT | None:
+    """Return what was known before, for the images with these marks, too."""
+    if found is None:
+        return None
+    return replace(found, marks=np.concatenate([found.marks, *marks]))
+
+
+class _Joint(NamedTuple):
+    """Pen and camera by all swings, and the shared unknowns with their covariance."""
+
+    pen: Pen
+    camera: Camera
+    values: FloatArray
+    covariance: FloatArray
+
+
+def _require_agreement(joint: _Joint, bundle: Bundle, name: str) -> None:
+    """Refuse a swing that contradicts the others in an unknown they share."""
+    common = _common_to_swings(bundle)
+    off = np.abs(bundle.values[common] - joint.values)
+    variances = np.diag(bundle.covariance)[common] + np.diag(joint.covariance)
+    worst = float((off / np.sqrt(variances)).max())
+    if worst > CONTRADICTING:
+        raise CalibrationError("led-file.contradicted", swing=name, times=worst)
+
+
 def _pooled(
     calibrations: Sequence[Calibration], camera: Camera, pen: Pen, scale: Scale | None
-) -> tuple[Pen, Camera]:
+) -> _Joint:
     first = calibrations[0].bundle
     at = first.layout
     common = _common_to_swings(first)
@@ -205,7 +261,7 @@ def _pooled(
         scale_sigma=float(np.sqrt(covariance[at_scale, at_scale])),
         diameter_sigma=float(np.sqrt(covariance[at_diameter, at_diameter])),
     )
-    return better, refined
+    return _Joint(better, refined, values, covariance)
 
 
 def _common_to_swings(bundle: Bundle) -> IntArray:

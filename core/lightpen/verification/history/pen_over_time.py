@@ -125,6 +125,8 @@ def improve_led_file(
     scale: Scale | None,
     now: datetime,
     report: Tell = lambda _: None,
+    *,
+    must_gain: bool = True,
 ) -> NewLedFile:
     """Write an improved LED file; see `led_file.improve_pen`.
 
@@ -132,7 +134,9 @@ def improve_led_file(
     """
     if pen.camera is None:
         raise ValueError("The camera of the swings must be chosen.")
-    improved = improve_pen(pen.poolable, pen.camera, pen.pen, scale, report)
+    improved = improve_pen(
+        *(pen.poolable, pen.camera, pen.pen, scale, report), must_gain=must_gain
+    )
     folder = (data / SIMULATED if pen.is_simulated else data) / LED_FILES
     make_folder(folder)
     stem = folder_name(Names(pen=pen.names.pen), now)
@@ -157,6 +161,5 @@ def adjust_together(
     """
     pen = read_pen_over_time(archive, preparation)
     swings = tuple(each for each in pen.swings if each.path in chosen)
-    return improve_led_file(
-        archive.folder, replace(pen, swings=swings), None, now, report
-    )
+    pen = replace(pen, swings=swings)
+    return improve_led_file(archive.folder, pen, None, now, report, must_gain=False)

@@ -118,3 +118,10 @@ def test_what_is_expected_of_errors_is_what_they_are() -> None:
     found = [find_component(*observed(24, 0.02, seed)) for seed in range(N_RUNS)]
     expected = np.sqrt(np.mean([component.expected_sigma**2 for component in found]))
     assert expected == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_large_jitter_along_a_line_has_an_inverse() -> None:
+    root = 20.0 * np.diag([1.0, 0.0, 0.0])
+    jitter = find_jitter(*shaken(60, root, 1)).covariance
+    assert jitter is not None
+    assert np.linalg.cond(jitter) < 2e9  # double precision has 1e16, squared in a fit
