@@ -133,7 +133,7 @@ class DeviceCamera:
         return self._capabilities
 
     def open(self) -> None:
-        """Open the camera, or raise `DeviceNotFound` or `DeviceBusy`."""
+        """Find and open the camera; no-op if it is open."""
         if self._capabilities is None:
             self._device.open()
             self._refresh()

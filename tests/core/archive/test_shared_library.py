@@ -111,15 +111,21 @@ def test_tips_changes_and_retirements_reach_other_stations_and_do_not_come_back(
     assert (one.share(), other.share()) == ((), ())
 
 
-def test_of_two_changes_the_later_one_counts_at_both_stations(
-    site: Callable[[str], Site],
-) -> None:
+def both_changed(site: Callable[[str], Site]) -> tuple[Site, Site]:
+    """Return a station whose change is the later one, shared, and another station."""
     one, other = site("one"), site("other")
     for each, hours in ((one, 2), (other, 1)):
         add_item(each.data, structs.replace(TIP, note=each.data.name), each.by, NOON)
         changed = structs.replace(TIP, note=f"{each.data.name}, changed")
         change_item(each.data, changed, each.by, NOON + hours * HOUR)
     one.share()
+    return one, other
+
+
+def test_of_two_changes_the_later_one_counts_at_both_stations(
+    site: Callable[[str], Site],
+) -> None:
+    one, other = both_changed(site)
     (taken,) = other.share()
 
     assert one.share() == ()
@@ -141,12 +147,7 @@ def shared_since_start(site: Site) -> tuple[str, ...]:
 def test_a_running_station_takes_over_by_itself_and_tells_whose_change_is_replaced(
     site: Callable[[str], Site],
 ) -> None:
-    one, other = site("one"), site("other")
-    for each, hours in ((one, 2), (other, 1)):
-        add_item(each.data, structs.replace(TIP, note=each.data.name), each.by, NOON)
-        changed = structs.replace(TIP, note=f"{each.data.name}, changed")
-        change_item(each.data, changed, each.by, NOON + hours * HOUR)
-    one.share()
+    _, other = both_changed(site)
 
     (reported,) = shared_since_start(other)
     assert reported.startswith("Taken over from another station: tip T-10, one Ann, ")

@@ -320,7 +320,7 @@ def test_a_lag_is_found_and_scatters_by_its_standard_deviation() -> None:
                 turned(moments + 0.2) @ rotation_from_vector(noise),
             )
         ]
-        lag = measure_lag(seen_by[0], seen_by[1], relative_turn(*seen_by))
+        lag = measure_lag(seen_by[0], relative_turn(*seen_by))
         assert lag is not None
         lags.append((lag.value, lag.sigma))
     values, sigmas = np.array(lags).T
@@ -336,7 +336,7 @@ def test_the_deviation_of_a_lag_is_that_of_the_slope_of_a_line_through_zero() ->
     seen = PenRotations(rotations, np.full(22, 3e-4), np.ones(22, bool))
     off = np.random.default_rng(1).normal(0, 0.01, (22, 3))
 
-    lag = measure_lag(seen, seen, RelativeRotation(np.eye(3), np.arange(22), off, 0.01))
+    lag = measure_lag(seen, RelativeRotation(np.eye(3), np.arange(22), off, 0.01))
 
     assert lag is not None
     x, y = ((speeds[1:-1] + speeds[2:]) / 2).ravel(), off[1:-1].ravel()

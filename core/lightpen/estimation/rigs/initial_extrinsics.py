@@ -72,7 +72,7 @@ def find_initial_extrinsics(
         c = max(left, key=lambda each: np.sum(seen.known & turns[each].known))
         left.remove(c)
         found = require_same_moments(seen, turns[c], rig.names[c])
-        lags[c] = measure_lag(seen, turns[c], found)
+        lags[c] = measure_lag(seen, found)
         apart[found.apart, c] = True
         rotations[c] = found.rotation
         # By the cone, which all images of a camera tell, and not by single poses.

@@ -186,15 +186,10 @@ def require_same_moments(
     return found
 
 
-def measure_lag(
-    one: PenRotations, other: PenRotations, found: RelativeRotation
-) -> TimeLag | None:
+def measure_lag(one: PenRotations, found: RelativeRotation) -> TimeLag | None:
     """Estimate the time lag of the other camera.
 
-    Returns
-    -------
-    Lag or None
-        None where the pen turns too far between two images to tell.
+    None where the pen turns too far between two images to tell.
     """
     inner = found.pairs[(found.pairs > 0) & (found.pairs < len(one.known) - 1)]
     inner = inner[one.known[inner - 1] & one.known[inner + 1]]
