@@ -219,7 +219,8 @@ def _begin(connection: Connection) -> None:
 def known_version(database: Database) -> str | None:
     """Return the version of a database; None if it is empty.
 
-    Raises `ArchiveError` if it is of another program or a later version, and closes it.
+    Raises `ArchiveError` if it is of another program or of a later version of this one,
+    and closes it.
     """
     try:
         with database.reading() as connection:
@@ -239,7 +240,7 @@ def _is_known(version: str) -> bool:
 
 
 def update_tables(database: Database) -> Database:
-    """Make the tables, or update those of an earlier version, or close it."""
+    """Make the tables, or update those of an earlier version; close it on failure."""
     known_version(database)
     try:
         with database.writing() as connection:
