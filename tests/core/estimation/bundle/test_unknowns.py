@@ -13,7 +13,7 @@ from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import fit_joint
 from lightpen.estimation.statistics.variance_components import Component
-from lightpen.estimation.uncertainty.budget import SHARES_OF_EFFECTS, ContributionName
+from lightpen.estimation.uncertainty.budget import ContributionName, contributions_of
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
@@ -139,9 +139,14 @@ def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
         )
         errors.append(error_of(result, measured))
         plain.append(held.tip_pen - (result.joint.tip_pen - errors[-1]))
-        # What seat, lens and mechanics may do besides is counted, not drawn.
-        besides = {ContributionName.SEAT, *SHARES_OF_EFFECTS.values()}
-        drawn = [s for s in result.budget.shares if s.name not in besides]
+        # What mechanics may do is not drawn: the estimate holds them at 0.
+        bundle = result.bundle
+        shares = contributions_of(
+            *(bundle, result.priors, len(swing.rotations)),
+            noise=bundle.independent_noise,
+            shift=np.zeros(6),
+        )
+        drawn = [s for s in shares if s.name is not ContributionName.SEAT]
         variances = [s.standard_uncertainty[:3] ** 2 for s in drawn]
         predicted.append(np.sum(variances, axis=0))
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(predicted, axis=0))
