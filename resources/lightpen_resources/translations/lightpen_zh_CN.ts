@@ -3863,14 +3863,6 @@ needed</source>
 <context>
     <name>ResultPanel</name>
     <message>
-        <source>Odd and even images / µm</source>
-        <translation>奇偶图像 / µm</translation>
-    </message>
-    <message>
-        <source>Odd and even images</source>
-        <translation>奇偶图像</translation>
-    </message>
-    <message>
         <source>Postures of the included images</source>
         <translation>所计入图像的姿态</translation>
     </message>
@@ -3879,20 +3871,24 @@ needed</source>
         <translation>计入 {0} / {1} 幅图像</translation>
     </message>
     <message>
-        <source>U (k = 2)</source>
-        <translation>U (k = 2)</translation>
-    </message>
-    <message>
         <source>No earlier result</source>
         <translation>无更早结果</translation>
     </message>
     <message>
-        <source>Self-check of the LEDs: {0}, limit {1}</source>
-        <translation>LED 自检：{0}，限值 {1}</translation>
+        <source>As found: {0} mm from the previous calibration</source>
+        <translation>标定前状态：与上次标定相差 {0} mm</translation>
     </message>
     <message>
-        <source>Odd - even</source>
-        <translation>奇数 - 偶数</translation>
+        <source>Odd and even images agree: {0} µm</source>
+        <translation>奇数与偶数图像一致：{0} µm</translation>
+    </message>
+    <message>
+        <source>Odd and even images differ significantly: {0} µm</source>
+        <translation>奇数与偶数图像有显著差异：{0} µm</translation>
+    </message>
+    <message>
+        <source>Self-check of the LEDs: {0}, limit {1}</source>
+        <translation>LED 自检：{0}，限值 {1}</translation>
     </message>
     <message>
         <source>Tip in the pen frame, U (k = 2)</source>
@@ -3903,20 +3899,8 @@ needed</source>
         <translation>测头 {0} 在光笔 {1} 坐标系中的中心，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
     </message>
     <message>
-        <source>As found: {0} mm from the previous calibration (no limit set)</source>
-        <translation>标定前状态：与上次标定相差 {0} mm（未设限值）</translation>
-    </message>
-    <message>
         <source>As found: {0} mm from the previous calibration, limit {1} mm</source>
         <translation>标定前状态：与上次标定相差 {0} mm，限值 {1} mm</translation>
-    </message>
-    <message>
-        <source>Odd and even images differ significantly</source>
-        <translation>奇数与偶数图像差异显著</translation>
-    </message>
-    <message>
-        <source>Odd and even images agree</source>
-        <translation>奇数与偶数图像一致</translation>
     </message>
 </context>
 <context>
@@ -5370,8 +5354,8 @@ mm</translation>
 <context>
     <name>UncertaintyPanel</name>
     <message>
-        <source>Uncertainty budget U (k = 2) / µm</source>
-        <translation>不确定度报告 U (k = 2) / µm</translation>
+        <source>U (k = 2) by source / µm</source>
+        <translation>各来源的 U (k = 2) / µm</translation>
     </message>
     <message>
         <source>Postures: tilt / °</source>
@@ -7289,8 +7273,8 @@ mm</translation>
         <translation>{place} 处没有文件夹、视频或图像。请检查名称。</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip is {uncertainty:.4f} mm.</source>
-        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction.</source>
+        <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
     </message>
     <message>
         <source>a cell is empty where a number is needed.</source>
@@ -9477,8 +9461,8 @@ mm</translation>
         <translation>测头沿最弱方向的 U (k = 2) 按简单接受规则（ILAC-G8:09/2019，4.2.1；JCGM 106:2012，8.2）与限值 {limit:.4f} mm 比较：被判定的量就是 U 本身，因此保护带为零。U 不超过限值判为“合格”，超过判为“需检查”，超过 {far:.4f} mm（限值的 {times:g} 倍）判为“重新摆动”。</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm. Capture more images in other postures.</source>
-        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。请以不同姿态继续采集。</translation>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm. Capture more images in other postures.</source>
+        <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。请以不同姿态继续采集。</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm due to {advice}. More images hardly help.</source>
@@ -10466,7 +10450,7 @@ mm</translation>
     </message>
     <message>
         <source>Uncertainty budget U (k = 2) / µm</source>
-        <translation>不确定度报告 U (k = 2) / µm</translation>
+        <translation>各来源的 U (k = 2) / µm</translation>
     </message>
     <message>
         <source>Residuals over the image × {0}</source>

@@ -14,6 +14,7 @@ from lightpen.archive.chains.entries import (
 )
 from lightpen.archive.history.history import Line, TipState
 from lightpen.record.library.supervision import Signature
+from lightpen.verification.history.trend import VERIFIED
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -255,6 +256,6 @@ def _why_of(event: Event) -> str:
         return PARTED.join(filter(None, (item_text(event), event.reason)))
     why = worded(event.why)
     settings = event.settings.items() if event.kind in BESIDE_SWINGS else ()
-    values = (f"{name} {value}" for name, value in settings)
+    values = (f"{name} {value}" for name, value in settings if name != VERIFIED)
     words = (verdict_text(event.grade), why, event.reason, *values)
     return PARTED.join(filter(None, words))

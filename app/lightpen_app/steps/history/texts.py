@@ -81,7 +81,8 @@ def what_text(line: Line) -> str:
         words.append(_translated(_KEPT))
     elif line.state is not TipState.NONE:
         words.append(_translated(_STATES[line.state]))
-    if event.outcome is not None:
+    is_usual = (event.outcome, event.grade) == (TrialOutcome.ACCEPTED, Grade.PASS)
+    if event.outcome is not None and not is_usual:
         words.append(_translated(_OUTCOMES[event.outcome]))
     if line.is_foreign:
         words.append(_translated(_FOREIGN))

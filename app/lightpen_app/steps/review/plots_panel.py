@@ -248,7 +248,7 @@ class UncertaintyPanel(PlotsPanel):
 
     @override
     def _retranslate(self) -> None:
-        self._budget.set_axes(Axes(self.tr("Uncertainty budget U (k = 2) / µm")))
+        self._budget.set_axes(Axes(self.tr("U (k = 2) by source / µm")))
         self._postures.set_axes(
             Axes(
                 self.tr("Postures: tilt / \xb0"),

@@ -188,7 +188,7 @@ class ResultPanel(Translated, QFrame):
             self.tr("Odd and even images agree: {0} \xb5m")
             if agree
             else self.tr("Odd and even images differ significantly: {0} \xb5m")
-        ).format(", ".join(map(" ".join, zip(AXES, figures, strict=True))))
+        ).format(", ".join(map("\xa0".join, zip(AXES, figures, strict=True))))
         sign, tone = (Sign.CHECK, Tone.GOOD) if agree else (Sign.WARNING, Tone.WARN)
         return StatusMessage(text, sign, tone)
 
@@ -241,7 +241,7 @@ def _postures(coverage: Coverage) -> DialValue:
 def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:
     """Return lengths in micrometres, each with its U."""
     pairs = zip(_texts(values), _texts(u), strict=True)
-    return tuple(f"{value} \N{PLUS-MINUS SIGN} {within}" for value, within in pairs)
+    return tuple(map("\xa0\N{PLUS-MINUS SIGN}\xa0".join, pairs))
 
 
 def _in_mm(values: FloatArray) -> tuple[str, ...]:

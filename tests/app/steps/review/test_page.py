@@ -464,7 +464,7 @@ def test_a_good_swing_passes_with_its_reason_and_the_next_step(
 ) -> None:
     state = banner(page)
     assert state.word == "PASS: Within limits"
-    assert re.match(r"U \(k = 2\) of the tip is 0\.\d{4} mm\.", state.detail)
+    assert re.match(r"U \(k = 2\) of the tip is 0\.\d{4} mm in its", state.detail)
     assert page.lead().startswith("Next: accept the tip.")
     assert page.why_closed() == ""
     assert page.main_action() == MainAction("Accept", at_screen=True)
@@ -539,8 +539,10 @@ def test_without_an_earlier_result_that_is_reported(page: ReviewPage) -> None:
     assert readout(page).previous == readout(page).change == ()
     assert "No earlier result" in reported_of_result(page)
     assert page.lead() == "Next: accept the tip."  # none is in force until then
-    figure = r"-?\d\.\d \u00b1 \d\.\d"
-    agree = f"Odd and even images agree: x {figure}, y {figure}, z {figure} \u00b5m"
+    figure = r"-?\d\.\d\s\u00b1\s\d\.\d"
+    agree = (
+        f"Odd and even images agree: x\\s{figure}, y\\s{figure}, z\\s{figure} \u00b5m"
+    )
     assert re.search(agree, reported_of_result(page)), reported_of_result(page)
     assert remarks(page) == ""
 
