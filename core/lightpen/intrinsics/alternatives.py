@@ -108,11 +108,13 @@ def explain(
             consider(parted.rms, cost, error)
             if matters(change, views):
                 useless = error
+    groups = _best_groups(views, tolerances, near, apart)
     if apart is not None:
-        groups = _two_cameras(views, tolerances, near, apart, rounds=0)
-    else:  # what differs less is rather what the lens does beyond its model
-        groups = _best_groups(views, tolerances, near)
-        groups = groups if groups and groups.rms < HALVED * nothing else None
+        by_scores = _two_cameras(views, tolerances, near, apart, rounds=0)
+        if not groups or (by_scores and groups.rms > LESSENED * by_scores.rms):
+            groups = by_scores
+    elif groups and groups.rms > HALVED * nothing:
+        groups = None  # what differs less is rather what the lens does
     if groups is not None and _differ(groups):
         error = _groups_error(views, groups)
         consider(groups.rms, cost_of_camera + cost_of_groups, error)
@@ -319,16 +321,24 @@ def _turned(
         tried = tried[order[: len(order) // 2] if turn == 0 else order]
     if which.sum() > views.n_views / 2:
         which = ~which
-    return (which, least) if which.any() else None
+    found = _fitted(turned(which), tolerances, near) if which.any() else None
+    if found is None:
+        return None
+    return which, float(np.sqrt(np.nanmean(np.square(found.residuals))))
 
 
 def _best_groups(
-    views: Views, tolerances: BoardTolerances, near: Camera
+    views: Views,
+    tolerances: BoardTolerances,
+    near: Camera,
+    apart: BoolArray | None = None,
 ) -> _Groups | None:
     """Return the best of some ways of taking the views for those of two cameras."""
     alone = _fitted(views, tolerances, near)
     order = np.arange(views.n_views)
     starts = [order >= views.n_views // 2, order % 2 == 0]
+    if apart is not None:
+        starts.append(apart)
     if alone is not None:
         sizes = alone.view_rms[:, 0]
         starts.append(sizes > np.median(sizes))

@@ -27,6 +27,14 @@ OTHER = Camera(
     *(640, 480, 870.0, 869.0, 310.0, 251.0),
     distortion=np.array([-0.15, 0.1, -5e-4, 3e-4, 0.0]),
 )
+ONE = Camera(
+    *(640, 360, 700.0, 699.7, 325.2, 174.3),
+    distortion=np.array([-0.12, 0.08, 3e-4, -2e-4, 0.02]),
+)
+TWO = Camera(
+    *(640, 360, 730.0, 729.2, 312.2, 186.3),
+    distortion=np.array([-0.16, 0.1, -3e-4, 2e-4, 0.0]),
+)
 
 
 def calibrated(views: Views) -> CameraCalibration:
@@ -161,6 +169,25 @@ def test_two_cameras_in_one_set_are_named_as_such(make_views: MakeViews) -> None
     said = str(caught.value)
     assert "13 views (view_01.png, view_03.png, view_04.png" in said
     assert "7 views (view_02.png, view_05.png, view_08.png" in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 77])
+def test_each_image_of_two_cameras_is_named_with_its_own(seed: int) -> None:
+    board, rng = parse_board("chessboard:8x6:20"), np.random.default_rng(seed)
+    poses = simulate_board_poses(ONE, board, 20, rng)
+    points = board.points @ np.swapaxes(poses.rotations, 1, 2)
+    points += poses.translations[:, None]
+    is_other = np.arange(20) % 3 == 0
+    pixels = np.where(is_other[:, None, None], TWO.project(points), ONE.project(points))
+    pixels += rng.normal(0, 0.005, pixels.shape)
+    names = tuple(f"{v:02}" for v in range(20))
+
+    with pytest.raises(CalibrationError, match="from two cameras") as caught:
+        calibrated(Views(board, names, pixels[:, None], (ONE.image_size,)))
+    one = caught.value.message.values["one"]
+    assert isinstance(one, Message)
+    assert one.values["names"] == "00, 03, 06, 09, 12, 15 ..."
 
 
 @pytest.mark.slow
