@@ -15,7 +15,7 @@ MESSAGES = {
     "intrinsics.misfit": "The points are {rms:.2f} px from those of a flat board {board}: its squares differ from the description, it is bent, or the images are not from one camera with one focus. Count and measure its squares again.",
     "intrinsics.board-stretched": "The board does not match {board}: lengths along the rows are {stretch:+.2%} longer than along the columns, and right angles deviate by {shear:+.2f}°. It may have been scaled in printing. Print it at true scale, or measure it again.",
     "intrinsics.board-bent": "The board is bent by {bend:.2f} mm; {stated:.2f} mm was assumed. The bend is taken into account; mount the board on a flat plate.",
-    "intrinsics.duplicates": "{n_duplicates} views repeat the board position of another view and do not count; {n_views} views remain: {names}. Move the board between views.",
+    "intrinsics.duplicates": "{n_duplicates} views repeat the board position of another view and do not count: {names}. {n_views} views remain. Move the board between views.",
     "intrinsics.few-distinct": "Different poses of the board: {n_views}; at least {least} are needed, 15 are better. Move and tilt the board between views.",
     "intrinsics.turned": "{n_named} of {n_views} images are rotated by 180°: {names}. Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.",
     "intrinsics.setting": "fx {fx:.1f}, cx {cx:.1f}, cy {cy:.1f} px in {n_views} views ({names})",

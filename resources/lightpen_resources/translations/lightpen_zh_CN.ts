@@ -6973,8 +6973,8 @@ mm</translation>
         <translation>{kind}，{side}</translation>
     </message>
     <message>
-        <source>{n_duplicates} views repeat the board position of another view and do not count; {n_views} views remain: {names}. Move the board between views.</source>
-        <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入；剩余 {n_views} 个视图：{names}。请在视图之间移动标定板。</translation>
+        <source>{n_duplicates} views repeat the board position of another view and do not count: {names}. {n_views} views remain. Move the board between views.</source>
+        <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入：{names}。剩余 {n_views} 个视图。请在视图之间移动标定板。</translation>
     </message>
     <message>
         <source>{n_found} LEDs are found; the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>

@@ -72,7 +72,7 @@ def test_views_copied_six_times_count_once(
 
     np.testing.assert_allclose(expanded(found), expanded(ten))
     assert len(found.duplicates) == 50
-    assert "50 views repeat the board position" in str(found.remarks[0])
+    assert "do not count: 1-view_01.png, 1-view_02.png" in str(found.remarks[0])
 
 
 @pytest.mark.slow
