@@ -119,6 +119,7 @@ class PostureDial(Translated, QWidget):
         self._value = DialValue()
         self._ground = QPixmap()
         self._ground_shows: tuple[object, ...] = ()
+        self._drawn_images: dict[_Field, tuple[int, int]] = {}  # of each field drawn
         self._least_letters: float = TextSize.SMALL
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         policy.setHeightForWidth(True)
@@ -182,53 +183,59 @@ class PostureDial(Translated, QWidget):
         self._draw_turn(painter, bar, colors)
 
     def _drawn_ground(self, colors: Colors) -> QPixmap:
-        """Return camera and fields, which change less often than the posture."""
+        """Return camera and fields, of which only those that changed are drawn anew."""
         value, scale = self._value, self.devicePixelRatio()
-        camera, legend = self.tr("camera"), self.tr("images\nneeded")
+        legend = self.tr("images\nneeded") if value.n_full < value.n_fields else ""
         shows = (
             self.size().toTuple(),
             scale,
             colors,
-            camera,
+            camera := self.tr("camera"),
             legend,
             self._least_letters,
             value.heading,
-            value.counts.tobytes(),
-            value.needed.tobytes(),
-            value.n_upright,
-            value.n_upright_needed,
         )
-        if shows == self._ground_shows:
+        if shows != self._ground_shows:
+            self._ground = QPixmap(self.size() * scale)
+            self._ground.setDevicePixelRatio(scale)
+            self._ground.fill(Qt.GlobalColor.transparent)
+            self._drawn_images.clear()
+        images = {place: self._images(place) for place in _fields()}
+        changed = [at for at in images if images[at] != self._drawn_images.get(at)]
+        if not changed:
             return self._ground
-        ground = QPixmap(self.size() * scale)
-        ground.setDevicePixelRatio(scale)
-        ground.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(ground)
+        painter = QPainter(self._ground)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, rim, bar = self._places()
-        size = max(LEGEND_SHARE * rim, self._least_letters)
-        draw_camera(
-            painter,
-            QRectF(0, 0, self.width(), bar.top()),
-            CameraPosition(middle, rim, value.heading - math.pi / 2),
-            camera,
-            size,
-            QColor(colors.muted),
-        )
-        for place in _fields():
+        if shows != self._ground_shows:
+            size = max(LEGEND_SHARE * rim, self._least_letters)
+            draw_camera(
+                painter,
+                QRectF(0, 0, self.width(), bar.top()),
+                CameraPosition(middle, rim, value.heading - math.pi / 2),
+                camera,
+                size,
+                QColor(colors.muted),
+            )
+            self._draw_legend(painter, middle, rim, legend, size)
+        for place in changed:
             self._draw_field(painter, middle, rim, place, colors)
-        if value.n_full < value.n_fields:
-            painter.setPen(QColor(colors.muted))
-            painter.setFont(font(size))
-            words = painter.fontMetrics().size(0, legend)
-            top = max(1 - words.height() / rim, 0.0)  # rim = 1; the legend ends there
-            right = middle.x() - math.sqrt(1 - top**2) * rim
-            left = min(middle.x() - 1.15 * rim, right - words.width())
-            corner = QRectF(max(left, 0.0), middle.y() - rim, rim, rim)
-            painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, legend)
         painter.end()
-        self._ground, self._ground_shows = ground, shows
-        return ground
+        self._ground_shows, self._drawn_images = shows, images
+        return self._ground
+
+    def _draw_legend(
+        self, painter: QPainter, middle: QPointF, rim: float, text: str, size: float
+    ) -> None:
+        """Draw a text beside the rim, to the left above."""
+        painter.setPen(QColor(colors_of(self.palette()).muted))
+        painter.setFont(font(size))
+        words = painter.fontMetrics().size(0, text)
+        top = max(1 - words.height() / rim, 0.0)  # rim = 1; the legend ends there
+        right = middle.x() - math.sqrt(1 - top**2) * rim
+        left = min(middle.x() - 1.15 * rim, right - words.width())
+        corner = QRectF(max(left, 0.0), middle.y() - rim, rim, rim)
+        painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, text)
 
     def _places(self) -> tuple[QPointF, float, QRectF]:
         """Return the middle of the dial, its radius, and the bar of the turn, px."""
@@ -267,6 +274,12 @@ class PostureDial(Translated, QWidget):
         kept, needed = self._images(place)
         done = kept >= needed > 0
         outline = _outline(middle, rim, place, self._value.heading)
+        # What it showed goes, or its smoothed edges would grow with each drawing.
+        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Clear)
+        painter.setPen(QPen(Qt.GlobalColor.black, 2))
+        painter.setBrush(Qt.GlobalColor.black)
+        painter.drawPath(outline)
+        painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_SourceOver)
         painter.setPen(QPen(QColor(colors.line), 1))
         painter.setBrush(QColor(colors.good if done else colors.raised))
         painter.drawPath(outline)
