@@ -229,7 +229,7 @@ def calibrate_camera(
         camera = replace(camera, distortion=np.append(camera.distortion[:4], 0.0))
     camera = replace(
         camera,
-        covariance=found.adjustment.covariance[at, at],
+        covariance=found.choice.with_shrinkage(found.adjustment.covariance[at, at]),
         calibrated_on=calibrated_on,
         lens_field=found.effects.fields[0],
     )

@@ -29,6 +29,7 @@ WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
 FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
 PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
 NO_K3 = 1e-12  # the pull of a model without k3
+USUAL_SIZE = 0.5  # of a coefficient that is drawn towards 0, rms
 N_FOLDS = 5
 WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
 ALIKE = 1.5  # times the held-out error: another model that is near to the views
@@ -75,9 +76,31 @@ class Choice:
         return _model(self.n_coefficients, own, others)
 
     @property
+    def draws_in(self) -> bool:
+        """Whether the corners of the image are undetermined."""
+        return self.pull is not None and self.pull != NO_K3
+
+    def with_shrinkage(self, covariance: FloatArray) -> FloatArray:
+        """Return the covariance of the intrinsics with what the pull may take away.
+
+        The estimate lies off by ``C L k`` where the pull has the information L and its
+        coefficients in truth the values k, of a usual size.
+
+        Parameters
+        ----------
+        covariance : (4 + n, 4 + n) array
+            C, by the fit, for which the pull is a measurement.
+        """
+        if self.pull is None or not self.draws_in:
+            return covariance
+        moved = covariance[:, 4 + np.array(FOLDING[self.n_coefficients])] / self.pull**2
+        variance = max(USUAL_SIZE**2 - self.pull**2, 0.0)
+        return np.asarray(covariance + variance * moved @ moved.T)
+
+    @property
     def remark(self) -> Message | None:
         """Message if the corners of the image are undetermined."""
-        if self.pull is None or self.pull == NO_K3:
+        if not self.draws_in:
             return None
         return message(
             "intrinsics.drawn-in",

@@ -167,6 +167,18 @@ def test_a_lens_that_corners_leave_open_is_not_taken_for_a_changed_camera(
     assert found.held_out_rms < 1.2 * NOISE * 2**0.5
 
 
+@pytest.mark.parametrize("seed", [1000, 1002])
+def test_what_is_drawn_towards_0_is_as_uncertain_as_it_is_off(seed: int) -> None:
+    views = held_before(RATIONAL, 24, seed, least=0.08)
+
+    found = calibrate_camera(views, BoardTolerances())
+
+    assert "intrinsics.drawn-in" in {each.code for each in found.remarks}
+    assert found.camera.covariance is not None
+    off = found.camera.intrinsics - RATIONAL.intrinsics
+    assert (np.abs(off) < 3 * np.sqrt(np.diag(found.camera.covariance))).all()
+
+
 def test_a_plain_lens_is_kept_though_a_fisheye_was_begun_with(
     make_views: Callable[..., Views], camera: Camera
 ) -> None:
