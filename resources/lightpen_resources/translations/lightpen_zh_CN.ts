@@ -6605,10 +6605,6 @@ mm</translation>
         <translation>测头库文件 {file} 由更新版本的程序写成。请使用该版本。</translation>
     </message>
     <message>
-        <source>The files of camera and pen were found from the images of {swing}, which would count twice. Remove it.</source>
-        <translation>相机文件和光笔文件是由 {swing} 的图像求得的，这些图像会被计两次。请将其去掉。</translation>
-    </message>
-    <message>
         <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
     </message>
@@ -9127,6 +9123,10 @@ mm</translation>
     <message>
         <source>The swing in {folder} changed after the tip was computed. Compute the tip again, then accept it.</source>
         <translation>{folder} 中的摆动在计算测头后有变化。请重新计算，然后接受。</translation>
+    </message>
+    <message>
+        <source>The swing {swing} contradicts the others by {times:.0f} standard deviations. Check that pen, zoom and focus were the same in all swings.</source>
+        <translation>摆动 {swing} 与其他摆动相差 {times:.0f} 倍标准差。请检查各次摆动的光笔、变焦和对焦是否相同。</translation>
     </message>
     <message>
         <source>The swing {swing} does not confirm the new LED file: residuals {after:.4f} px, with the old file {before:.4f} px. The old file is as good, or the pen changed in between.</source>
