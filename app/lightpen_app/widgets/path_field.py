@@ -70,7 +70,7 @@ class PathField(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._value = ""
+        self._value = self._last = ""
         self._is_faulty = False
 
         # Widgets
@@ -91,7 +91,7 @@ class PathField(QWidget):
 
     def set_value(self, value: str) -> None:
         """Show another path."""
-        self._value = value
+        self._value, self._last = value, value or self._last
         self._edit.setText(value)
         self._edit.setToolTip(value)
 
@@ -111,7 +111,10 @@ class PathField(QWidget):
     def pick(
         self, mode: QFileDialog.FileMode, title: str, name_filter: str = ""
     ) -> None:
-        """Let the user pick a file or a folder in a dialog, and take it over."""
+        """Let the user pick a file or a folder in a dialog, and take it over.
+
+        The dialog opens where the last one was.
+        """
         dialog = QFileDialog(self, title)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setFileMode(mode)
@@ -119,9 +122,9 @@ class PathField(QWidget):
             dialog.setOption(QFileDialog.Option.ShowDirsOnly)
         elif name_filter:
             dialog.setNameFilter(name_filter)
-        present = Path(self._value)
-        if present.parent.is_dir():
-            dialog.setDirectory(str(present if present.is_dir() else present.parent))
+        last = Path(self._last)
+        if self._last and last.parent.is_dir():
+            dialog.setDirectory(str(last if last.is_dir() else last.parent))
         dialog.fileSelected.connect(self.take)
         dialog.open()
 

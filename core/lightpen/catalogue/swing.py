@@ -34,7 +34,7 @@ MESSAGES = {
     "verdict.not-upright": "Hold the pen upright. Images needed: {n_images}.",
     "verdict.uncertain": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm. Capture more images in other postures.",
     "swing.out-of-reach": "With this LED file the lowest achievable U (k = 2) is {floor:.1f} µm; the limit is {limit:.1f} µm. Only the images needed for the postures are captured.",
-    "verdict.file-uncertain": "U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm due to {advice}. More images hardly help.",
+    "verdict.file-uncertain": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm due to {advice}. More images hardly help.",
     "verdict.file-contradicted": "{why}",
     "verdict.not-simultaneous": "Camera {camera} is not synchronised with the first camera (about {lag}). This shifts the tip and may cause other warnings. Trigger all cameras by one signal, or hold the pen still for each image.",
     "verdict.camera-moved": "Cone and camera moved by {distance:.3f} mm relative to each other during the swing. The result is corrected as far as possible, but probed points would be affected too. Clamp both and let the camera warm up.",
@@ -50,7 +50,7 @@ MESSAGES = {
     "verdict.leds-misfit": "Residuals {sigma:.2f} px; usual is {usual:.2f} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.",
     "verdict.no-tip": "{why}",
     "verdict.good": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction.",
-    "verdict.file-assumed": "U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.",
+    "verdict.file-assumed": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.",
     "swing.images-stay-in": "Without these images the tip is not determined; they remain included. {why}",
     "swing.bug": "An internal error occurred. The captured images are saved. Continue, or restart the program.",
 }

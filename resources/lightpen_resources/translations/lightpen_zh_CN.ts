@@ -3879,12 +3879,12 @@ needed</source>
         <translation>标定前状态：与上次标定相差 {0} mm</translation>
     </message>
     <message>
-        <source>Odd and even images agree: {0} µm</source>
-        <translation>奇数与偶数图像一致：{0} µm</translation>
+        <source>Odd and even images agree: {0}</source>
+        <translation>奇数与偶数图像一致：{0}</translation>
     </message>
     <message>
-        <source>Odd and even images differ significantly: {0} µm</source>
-        <translation>奇数与偶数图像有显著差异：{0} µm</translation>
+        <source>Odd and even images differ significantly: {0}</source>
+        <translation>奇数与偶数图像有显著差异：{0}</translation>
     </message>
     <message>
         <source>Self-check of the LEDs: {0}, limit {1}</source>
@@ -9465,12 +9465,12 @@ mm</translation>
         <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。请以不同姿态继续采集。</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm due to {advice}. More images hardly help.</source>
-        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 来自{advice}。增加图像几乎没有帮助。</translation>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm due to {advice}. More images hardly help.</source>
+        <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 来自{advice}。增加图像几乎没有帮助。</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.</source>
-        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 为假定值，来自{advice}。增加图像几乎没有帮助。</translation>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm is assumed for {advice}. More images hardly help.</source>
+        <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 为假定值，来自{advice}。增加图像几乎没有帮助。</translation>
     </message>
     <message>
         <source>U alone</source>

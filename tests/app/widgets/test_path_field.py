@@ -103,3 +103,17 @@ def test_the_dialog_begins_where_the_path_leads(form: Form, tmp_path: Path) -> N
     dialog.selectFile(str(file))
     dialog.accept()
     assert form.taken == [str(file)]
+
+
+def test_the_dialog_begins_where_the_last_file_was_once_the_path_is_gone(
+    form: Form, tmp_path: Path
+) -> None:
+    form.field.set_value(str(tmp_path / "camera.yaml"))
+    form.field.set_value("")
+
+    form.field.pick(QFileDialog.FileMode.ExistingFile, "Camera", "Files (*.yaml)")
+    dialog = form.field.findChild(QFileDialog)
+    assert isinstance(dialog, QFileDialog)
+
+    assert Path(dialog.directory().absolutePath()) == tmp_path
+    dialog.reject()

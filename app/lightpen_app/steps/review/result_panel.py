@@ -185,10 +185,12 @@ class ResultPanel(Translated, QFrame):
         agree = halves_agree(halves)
         figures = _with_u(halves.difference, halves.expanded_uncertainty)
         text = (
-            self.tr("Odd and even images agree: {0} \xb5m")
+            self.tr("Odd and even images agree: {0}")
             if agree
-            else self.tr("Odd and even images differ significantly: {0} \xb5m")
-        ).format(", ".join(map("\xa0".join, zip(AXES, figures, strict=True))))
+            else self.tr("Odd and even images differ significantly: {0}")
+        )
+        parts = map("\xa0".join, zip(AXES, figures, strict=True))
+        text = text.format(", ".join(parts) + "\xa0\xb5m")
         sign, tone = (Sign.CHECK, Tone.GOOD) if agree else (Sign.WARNING, Tone.WARN)
         return StatusMessage(text, sign, tone)
 

@@ -1,4 +1,4 @@
-"""Displayed number of remaining images, which does not increase slightly."""
+"""Displayed number of images of a swing, which does not follow each estimate."""
 
 from dataclasses import dataclass, replace
 from math import ceil
@@ -6,51 +6,63 @@ from typing import Self
 
 # Of the images to go: from so many on, rounded up to this.
 STEPS = ((30, 10), (10, 5), (-1, 1))
-LEAST_RISE = 2  # by which a small figure must be wrong before it is reported
+LEAST_ERROR = 2  # by which a small figure must be wrong before it is corrected
 
 
 @dataclass(frozen=True)
 class RemainingImages:
-    """Displayed number of remaining images.
+    """Displayed number of images, in all and remaining.
 
-    The estimate is renewed with each image and fluctuates. Its minimum is displayed,
-    except after a significant rise and after images were dropped.
+    The estimate is renewed with each image and fluctuates. The displayed number in all
+    stays until it is wrong by more than the accuracy of the estimate.
 
     Attributes
     ----------
-    n_images : int
-        Remaining images, rounded to the accuracy of the estimate.
+    n_in_all : int
+        Images at the end; the remaining ones are rounded to the accuracy of the
+        estimate.
     n_kept : int
-        Number of images at the time of the estimate.
+        Number of images at present.
+    n_before : int
+        Images that remained when the number in all was last changed.
     fraction : float
         Of all images, that are there; it goes back only when images are dropped.
     has_risen : bool
-        Whether more remain than were displayed before, though none were dropped.
+        Whether more remained at the last change than at the one before, though none
+        were dropped.
     """
 
-    n_images: int
+    n_in_all: int
     n_kept: int
+    n_before: int
     fraction: float
     has_risen: bool = False
+
+    @property
+    def n_images(self) -> int:
+        """Remaining images."""
+        return self.n_in_all - self.n_kept
 
     @classmethod
     def first(cls, n_more: int, n_kept: int) -> Self:
         """Return the first displayed number of a swing."""
-        fraction = n_kept / max(n_kept + n_more, 1)
-        return cls(in_true_steps(n_more), n_kept, fraction)
+        n_images = in_true_steps(n_more)
+        n_in_all = n_kept + n_images
+        return cls(n_in_all, n_kept, n_images, n_kept / max(n_in_all, 1))
 
     def after(self, n_more: int, n_kept: int) -> Self:
         """Return the displayed number after the next estimate."""
         now = self.first(n_more, n_kept)
         if n_kept < self.n_kept:
             return now
-        now = replace(now, fraction=max(now.fraction, self.fraction))
-        if now.n_images < self.n_images:
-            return now
-        rise = now.n_images - self.n_images
-        if rise > max(_step(self.n_images), LEAST_RISE):
-            return replace(now, has_risen=True)
-        return replace(now, n_images=self.n_images, has_risen=self.has_risen)
+        is_enough = n_kept + min(n_more, 1) <= self.n_in_all
+        error = abs(n_kept + n_more - self.n_in_all)
+        if is_enough and error <= max(_step(n_more), LEAST_ERROR):
+            fraction = n_kept / max(self.n_in_all, 1)
+            now = replace(self, n_kept=n_kept, fraction=fraction)
+        else:
+            now = replace(now, has_risen=now.n_before > self.n_before)
+        return replace(now, fraction=max(now.fraction, self.fraction))
 
 
 def in_true_steps(n_more: int) -> int:

@@ -369,8 +369,8 @@ class SwingWords(QObject):
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of {1} (minimum)").format(n_kept, least)
-        n_in_all = n_kept + _to_go(moment).n_images
-        return self.tr("{0} of about {1} images").format(n_kept, n_in_all)
+        words = self.tr("{0} of about {1} images")
+        return words.format(n_kept, _to_go(moment).n_in_all)
 
     def _read(self, moment: SwingViewState) -> str:
         """Return the progress of reading a recording; empty before the first image."""

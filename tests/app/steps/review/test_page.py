@@ -540,9 +540,8 @@ def test_without_an_earlier_result_that_is_reported(page: ReviewPage) -> None:
     assert "No earlier result" in reported_of_result(page)
     assert page.lead() == "Next: accept the tip."  # none is in force until then
     figure = r"-?\d\.\d\s\u00b1\s\d\.\d"
-    agree = (
-        f"Odd and even images agree: x\\s{figure}, y\\s{figure}, z\\s{figure} \u00b5m"
-    )
+    figures = f"x\\s{figure}, y\\s{figure}, z\\s{figure}\u00a0\u00b5m"
+    agree = f"Odd and even images agree: {figures}"
     assert re.search(agree, reported_of_result(page)), reported_of_result(page)
     assert remarks(page) == ""
 

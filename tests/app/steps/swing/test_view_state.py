@@ -164,24 +164,35 @@ def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
     assert words.stand(replace(at_verdict(), setup=nobody)) is None
 
 
-def reported(*estimates: tuple[int, int]) -> list[int]:
-    """Return the displayed numbers of remaining images after estimates of them."""
-    to_go = RemainingImages.first(*estimates[0])
-    found = [to_go.n_images]
+def displayed(*estimates: tuple[int, int]) -> list[RemainingImages]:
+    """Return what is displayed after each estimate: images to go, images so far."""
+    found = [RemainingImages.first(*estimates[0])]
     for n_more, n_kept in estimates[1:]:
-        to_go = to_go.after(n_more, n_kept)
-        found.append(to_go.n_images)
+        found.append(found[-1].after(n_more, n_kept))
     return found
 
 
-def test_what_is_to_go_does_not_creep_up() -> None:
-    assert reported((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51)) == [
-        *(25, 25, 25, 15, 4, 4)
-    ]
+def test_the_images_in_all_follow_no_chance_change_of_the_estimate() -> None:
+    found = displayed((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51), (4, 54))
+
+    assert [to_go.n_in_all for to_go in found] == [55, 55, 62, 55, 55, 55, 58]
+
+
+def test_the_progress_of_a_swing_never_goes_back_and_ends_at_no_more_than_all() -> None:
+    rising = [(40, n_kept) for n_kept in range(20, 60)]
+    found = displayed(*rising, *((1, n_kept) for n_kept in range(60, 90)))
+
+    fractions = [to_go.fraction for to_go in found]
+    assert fractions == sorted(fractions)
+    assert all(to_go.n_kept < to_go.n_in_all for to_go in found)
+    assert fractions[-1] < 1
 
 
 def test_more_is_to_go_after_images_were_dropped() -> None:
-    assert reported((4, 50), (10, 44)) == [4, 10]
+    before, after = displayed((4, 50), (10, 44))
+
+    assert (before.n_images, after.n_images) == (4, 10)
+    assert after.fraction < before.fraction
 
 
 def test_a_rise_that_is_no_chance_is_reported_with_its_reason(
