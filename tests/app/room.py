@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QAbstractButton, QLabel, QScrollArea, QTabBar, QWi
 
 from lightpen_app.look.theme import TextSize
 from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.steps.leds.led_table import LedTable
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.plots import Plot
 
@@ -30,7 +31,7 @@ class SizeClass:
     clipped, sideways : tuple of str
         Words that are not seen whole; what is scrolled to the sides.
     downwards : tuple of str
-        Parts of the page that are scrolled, tables left out.
+        Parts of the page that are scrolled; of tables only that of the LEDs.
     """
 
     size: QSize
@@ -97,9 +98,10 @@ def scrolled_sideways(root: QWidget) -> tuple[str, ...]:
 
 
 def scrolled_downwards(root: QWidget) -> tuple[str, ...]:
+    areas = *root.findChildren(QScrollArea), *root.findChildren(LedTable)
     return tuple(
-        type(area.parentWidget()).__name__
-        for area in root.findChildren(QScrollArea)
+        type(area if isinstance(area, LedTable) else area.parentWidget()).__name__
+        for area in areas
         if area.isVisible() and area.verticalScrollBar().maximum() > 0
     )
 

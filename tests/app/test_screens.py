@@ -212,6 +212,13 @@ def test_nothing_is_scrolled_amid_a_ring_nor_at_its_result(
     assert probing.downwards == verified.downwards == ()
 
 
+@pytest.mark.parametrize("language", languages())
+def test_all_leds_of_a_pen_are_seen_at_once(seen: Seen, language: str) -> None:
+    (room,) = seen.rooms["leds", language, 1280]
+
+    assert "LedTable" not in room.downwards
+
+
 def test_the_tabs_of_the_review_are_all_looked_at(seen: Seen) -> None:
     assert (
         len(seen.rooms["review", "en", LEAST.width()]) == 1 + 5

@@ -25,7 +25,7 @@ from lightpen_app.widgets.translated import Translated
 
 N_COORDINATES = 3
 MISFIT = 1 + len(COLUMNS)  # the last column; the first is the LED's number
-ROW_HEIGHT = 27
+ROW_HEIGHT = 25  # px; ten rows fit the window at 1280 x 800
 LEAST_HEIGHT = 22 * GRID  # px; the head and five rows
 SHOWN_DECIMALS = 3
 NUMBER_WIDTH, MISFIT_WIDTH = 6 * GRID, 10 * GRID

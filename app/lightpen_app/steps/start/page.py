@@ -222,6 +222,7 @@ class StartPage(ResponsiveLayout, Page):
     def _on_selected(self, before: Preparation) -> None:
         now = self._selection.preparation
         if is_trial_ready(now) and not is_trial_ready(before) and self.isVisible():
+            self.show_day()
             self.step_requested.emit("swing")
         if before.names != now.names or before.origin is not now.origin:
             self._library.refresh()
@@ -231,6 +232,7 @@ class StartPage(ResponsiveLayout, Page):
 
     def _on_trial_requested(self) -> None:
         self._selection.set_preparation(trial_of(self._selection.preparation))
+        self.show_setup()  # until the files are there that the day page would miss
         self._chosen_files.use_samples()
         if not self._camera.live.is_open:
             self._camera.open()

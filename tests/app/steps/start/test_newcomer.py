@@ -27,6 +27,7 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
     assert (
         walker.workbench.selection.preparation.missing_inputs()
     )  # no swing begins with other files
+    assert walker.tells("Set up station")  # the day page would miss the files
     walker.until_shows("Swing")
     walker.click("Let the simulated operator swing")
     walker.until(lambda: walker.workbench.run.status.state is not None)

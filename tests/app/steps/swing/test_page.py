@@ -459,6 +459,21 @@ def test_after_the_verdict_more_can_be_captured(
     assert len(desk.run.status.solution.numbers) == desk.state.n_kept
 
 
+def test_enter_after_pause_does_not_ask_for_more_images_once_the_swing_is_complete(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    desk.click("Capture more")
+    until(qtbot, lambda: desk.value.state.word == "CAPTURING")
+    desk.click("Pause (Space)")
+    until(qtbot, lambda: desk.value.state.word == "PAUSED")
+    assert isinstance(desk.window.focusWidget(), QAbstractButton)
+    desk.run.runner.ask(lambda workflow: workflow.finish())
+    until(qtbot, lambda: desk.offers("Capture more"))
+
+    assert not isinstance(desk.window.focusWidget(), QAbstractButton)
+
+
 def test_computing_can_be_stopped_and_begun_again(
     qtbot: QtBot, at_verdict: Desk, solving_on: "SolvingOn"
 ) -> None:
@@ -566,6 +581,20 @@ def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
 
     capturing.type(Key.Key_Space)
     keep_on(qtbot, capturing)
+
+
+def test_left_and_right_are_learnt_anew_where_they_are_swapped(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    swapped = "Left and right are swapped"
+    until(qtbot, lambda: capturing.offers(swapped))
+
+    capturing.click(swapped)
+
+    until(qtbot, lambda: not capturing.offers(swapped))
+    assert capturing.state.heading is None
+    until(qtbot, lambda: capturing.offers(swapped))
+    assert capturing.state.heading is not None
 
 
 def test_leaving_the_step_pauses_and_coming_back_goes_on(
