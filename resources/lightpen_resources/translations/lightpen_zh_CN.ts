@@ -1572,6 +1572,10 @@
         <source>included</source>
         <translation>已计入</translation>
     </message>
+    <message>
+        <source>excluded</source>
+        <translation>已剔除</translation>
+    </message>
 </context>
 <context>
     <name>ImageTable</name>
@@ -4031,6 +4035,10 @@ needed</source>
     <message>
         <source>Next: record more images and load all of them again.</source>
         <translation>下一步：补录图像，然后重新载入全部图像。</translation>
+    </message>
+    <message>
+        <source>Next: include the images again, or repeat the swing.</source>
+        <translation>下一步：恢复这些图像，或重新摆动。</translation>
     </message>
     <message>
         <source>{0} Until then the previous result remains current.</source>

@@ -7,6 +7,7 @@ from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt,
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen.detection.reasons import Reason
 from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import decimals_for, number_text
@@ -74,9 +75,15 @@ class ImageModel(TitledModel):
         if column == LEDS:
             return str(row.n_leds)
         if column == STATE:
-            return self.tr("included") if row.is_used else reason_text(row.reason)
+            return self._state(row)
         known = row.misfit == row.misfit
         return number_text(row.misfit, self._decimals) if known else ""
+
+    def _state(self, row: ImageRow) -> str:
+        if row.is_used:
+            return self.tr("included")
+        is_manual = row.reason is Reason.TAKEN_OUT
+        return self.tr("excluded") if is_manual else reason_text(row.reason)
 
 
 class ImageTable(Translated, RowTable):

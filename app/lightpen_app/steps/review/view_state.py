@@ -247,6 +247,11 @@ def next_step_text(status: SwingStatus) -> str:
         text = translate(
             "ReviewPage", "Next: record more images and load all of them again."
         )
+    verdict = status.verdict
+    if verdict is not None and verdict.reason.code == Code.MANY_EXCLUDED:
+        text = translate(
+            "ReviewPage", "Next: include the images again, or repeat the swing."
+        )
     has_last = status.assessment is not None and status.assessment.last is not None
     is_practice = status.origin is Origin.SIMULATED
     if step is NextStep.ACCEPT and has_last and not is_practice:

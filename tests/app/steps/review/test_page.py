@@ -73,7 +73,7 @@ from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.steps.page import MainAction
-from lightpen_app.steps.review.image_table import ImageTable
+from lightpen_app.steps.review.image_table import STATE, ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
 from lightpen_app.steps.review.message_list import StatusMessageList
@@ -444,7 +444,7 @@ def test_a_vast_screen_shows_the_postures_beside_larger_figures(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
     dial, panel = the(page, PostureDial), the(page, ResultPanel)
-    page.resize(1616, 870)
+    page.resize(1480, 780)
     assert not dial.isVisible()
     width = panel.width()
     page.resize(2300, 1250)
@@ -934,7 +934,7 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     deviation = tip(workbench) - [-1.0, -90.0, -24.0]
     shown = list(map(float, readout(page).deviation))
     assert shown == pytest.approx(deviation.tolist(), abs=1e-3)
-    assert readout(page).nominal == ("-1", "-90", "-24")
+    assert readout(page).nominal == ("-1.0000", "-90.0000", "-24.0000")
 
 
 @pytest.mark.slow
@@ -1251,6 +1251,10 @@ def test_the_line_leaves_the_better_half_of_the_images(
 
     half = N_IMAGES // 2
     await_count(qtbot, page, f"{half} of {N_IMAGES} included; {half} excluded manually")
+    assert page.lead() == "Next: include the images again, or repeat the swing."
+    table = the(page, ImageTable)
+    states = [table.model().index(i, STATE).data() for i in range(N_IMAGES)]
+    assert states.count("excluded") == half  # short enough for its column
 
 
 @pytest.mark.slow

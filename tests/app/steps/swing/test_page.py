@@ -571,6 +571,8 @@ def test_a_slip_costs_only_the_images_that_slipped(
     assert Sound.LOST in capturing.recorder.sounds()
     keep_on(qtbot, capturing)
     assert capturing.state.n_kept > n_before - 5
+    until(qtbot, lambda: capturing.value.state.word == "CAPTURING")
+    assert capturing.state.slipped_at is not None  # it is no longer shown, not undone
 
 
 def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
