@@ -8,6 +8,7 @@ would shrink the variance of the tip, per image.
 References
 ----------
 .. [1] A. C. Atkinson, A. N. Donev, "Optimum experimental designs" (1992), chapter 10.
+.. [2] M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
 """
 
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 
 TILTS = (np.radians(14.0), np.radians(28.0))  # in the middle of the rings of the dial
 TURNS = (np.radians(-25.0), 0.0, np.radians(25.0))
+WITHIN = np.radians([5.0, 18.0, 12.0])  # of a field, from its middle: tilt and turns
+EVEN_STEPS = np.array([0.8191725, 0.6710436, 0.5497005])  # of a sequence in a cube [2]_
 N_ON_THE_WAY = 3  # postures that represent all in between
 MAX_INCIDENCE = np.radians(70.0)  # an LED seen flatter is a line, and dim
 MIN_GAP = 4.0  # px between the edges of two LEDs; blur joins closer ones
@@ -67,22 +70,28 @@ def next_posture(
 
     ``wanted`` (3, 8) are the fields of the dial to choose from, all unless given:
     upright (in the first column), leaning and leaning far, by direction from the right.
-    None if the LEDs could be seen in none of the postures.
+    None if the LEDs could be seen in none of the postures. Where there are images on
+    all ways to the middles of these fields, it is beside a middle.
     """
-    postures, rotations, fields = _candidates(outlook.pen)
-    fit = _is_seen(outlook, rotations)
-    if wanted is not None:
-        fit &= wanted[fields[:, 0], fields[:, 1]]
-    chosen = np.flatnonzero(fit)
-    if not len(chosen):
-        return None
-    worth = _worth(outlook, present, rotations[chosen])
-    return postures[int(chosen[np.argmax(worth)])]
+    best = None
+    for beside in (np.zeros(3), _beside(len(outlook.rotations))):
+        postures, rotations, fields = _candidates(outlook.pen, beside)
+        fit = _is_seen(outlook, rotations)
+        if wanted is not None:
+            fit &= wanted[fields[:, 0], fields[:, 1]]
+        chosen = np.flatnonzero(fit)
+        if not len(chosen):
+            continue
+        worth = _worth(outlook, present, rotations[chosen])
+        best = postures[int(chosen[np.argmax(worth)])]
+        if worth.max() > 0:
+            break
+    return best
 
 
 def visible_fields(outlook: GuidanceInput) -> BoolArray:
     """Return in which fields of the dial the pen shows enough LEDs, (3, 8)."""
-    _, rotations, fields = _candidates(outlook.pen)
+    _, rotations, fields = _candidates(outlook.pen, np.zeros(3))
     row, column = fields[_is_seen(outlook, rotations)].T
     visible = np.zeros((3, N_DIRECTIONS), dtype=bool)
     visible[row, column] = True
@@ -135,12 +144,27 @@ def _usable_leds(outlook: GuidanceInput, rotations: FloatArray, c: int) -> BoolA
     )
 
 
-def _candidates(pen: Pen) -> tuple[list[Posture], FloatArray, IntArray]:
-    """Return postures in the fields of the dial, rotations, and row and column."""
+def _beside(n: int) -> FloatArray:
+    """Return the n-th of places spread evenly in a cube from -1 to 1, (3,) [2]_."""
+    return 2 * ((0.5 + n * EVEN_STEPS) % 1) - 1
+
+
+def _candidates(
+    pen: Pen, beside: FloatArray
+) -> tuple[list[Posture], FloatArray, IntArray]:
+    """Return postures in the fields of the dial, rotations, and row and column.
+
+    ``beside`` (3,) is how far they lie from the middles of the fields, from -1 to 1.
+    """
     fields = [(0, 0)] + [(row, k) for row in (1, 2) for k in range(N_DIRECTIONS)]
     places = [(row, column, turn) for row, column in fields for turn in TURNS]
+    up, right, about = beside * WITHIN
     postures = [
-        Posture((0.0, *TILTS)[row], column * 2 * np.pi / N_DIRECTIONS, turn)
+        Posture(
+            abs((0.0, *TILTS)[row] + up),
+            column * 2 * np.pi / N_DIRECTIONS + right,
+            turn + about,
+        )
         for row, column, turn in places
     ]
     numbers = np.array([(p.tilt, p.direction, p.turn) for p in postures])

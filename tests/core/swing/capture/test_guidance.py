@@ -8,6 +8,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.contact.joint import fit_joint
+from lightpen.model.coverage import TILT_RINGS
 from lightpen.model.posture import Posture, angles_between, rotations_of
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
@@ -204,6 +205,21 @@ def test_a_way_of_which_there_are_images_already_is_worth_nothing() -> None:
     taken = replace(known, rotations=np.concatenate([known.rotations, steps]))
 
     assert next_posture(taken, present) != first
+
+
+def test_where_all_middles_are_taken_a_posture_beside_one_is_chosen() -> None:
+    tilt = np.degrees(TILTS[0])
+    known = swung(*((tilt, 90.0, float(turn)) for turn in range(-25, 26)))
+    wanted = np.zeros((3, 8), dtype=bool)
+    wanted[1, 2] = True
+
+    chosen = next_posture(known, rotation(tilt, 90.0), wanted)
+
+    assert chosen is not None
+    there = rotation(*np.degrees([chosen.tilt, chosen.direction, chosen.turn]))
+    assert angles_between(there[None], known.rotations).min() > SPACING
+    assert TILT_RINGS[0] < chosen.tilt < TILT_RINGS[1]
+    assert abs(chosen.direction - np.pi / 2) < np.pi / 8
 
 
 def test_leds_that_touch_in_the_image_are_not_counted_on() -> None:
