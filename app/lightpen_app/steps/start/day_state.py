@@ -129,8 +129,10 @@ def readiness(
 
 
 def tip_details(now: Preparation, statuses: StationStatus) -> str:
-    """Return the text on the selected tip, in one line."""
+    """Return the text on the selected tip, in one line; empty without one."""
     translate, names = QCoreApplication.translate, now.names
+    if not names.tip:
+        return ""
     tip, point = statuses.library.tips.get(names.tip), now.nominal_tip
     if point is None and now.pen is not None:
         point = now.pen.nominal_tip

@@ -36,6 +36,7 @@ from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
 from lightpen_app.steps.start.barcode import PACE_MS
+from lightpen_app.steps.start.day_state import tip_details
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.page import StartPage
@@ -612,7 +613,9 @@ def test_an_unknown_barcode_that_is_not_added_leaves_no_other_tip_chosen(
     desk.scan("T-77")
     desk.click("Not now")
 
-    assert desk.workbench.selection.preparation.names.tip == ""
+    chosen = desk.workbench.selection.preparation
+    assert chosen.names.tip == ""
+    assert tip_details(chosen, desk.workbench.library.statuses) == ""
     assert desk.text_of("Probe tip") == ""
     assert desk.page.main_action().why_not
 
