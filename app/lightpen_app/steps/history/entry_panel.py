@@ -23,6 +23,7 @@ from lightpen_app.look.words import PARTED, breakable, moment_text
 from lightpen_app.steps.history.texts import (
     item_text,
     kind_text,
+    setting_text,
     verdict_text,
     what_text,
 )
@@ -256,6 +257,6 @@ def _why_of(event: Event) -> str:
         return PARTED.join(filter(None, (item_text(event), event.reason)))
     why = worded(event.why)
     settings = event.settings.items() if event.kind in BESIDE_SWINGS else ()
-    values = (f"{name} {value}" for name, value in settings if name != VERIFIED)
+    values = (setting_text(*each) for each in settings if each[0] != VERIFIED)
     words = (verdict_text(event.grade), why, event.reason, *values)
     return PARTED.join(filter(None, words))

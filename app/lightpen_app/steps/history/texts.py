@@ -5,6 +5,8 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.history.history import Line, TipState
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.json_records import Plain
+from lightpen.model.limits import LIMITS
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.verification.tasks.registry import ALL_TASKS
@@ -55,6 +57,7 @@ _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
     "note": "{0}",
     "supervisor": QT_TRANSLATE_NOOP("history", "signed by {0}"),
 }
+_LIMITS = {limit.key: limit for limit in LIMITS}
 _RETIRED = QT_TRANSLATE_NOOP("history", "retired")
 _CHANGED = QT_TRANSLATE_NOOP("history", "Modified after entry")
 _KEPT = QT_TRANSLATE_NOOP("history", "saved")  # and in force for no pen
@@ -120,6 +123,16 @@ def item_text(event: Event) -> str:
     if event.settings.get("is_retired"):
         words.append(_translated(_RETIRED))
     return PARTED.join(words)
+
+
+def setting_text(name: str, value: Plain) -> str:
+    """Return the words on a stored setting; a limit has its label."""
+    limit = _LIMITS.get(name)
+    if limit is None or not isinstance(value, int | float):
+        return f"{name} {value}"
+    if limit.choices:
+        return f"{worded(limit.label)}: {worded(limit.choices[int(value)])}"
+    return f"{worded(limit.label)}: {value:g}\xa0{limit.unit}".rstrip()
 
 
 def task_text(event: Event) -> str:

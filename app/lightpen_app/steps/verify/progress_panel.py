@@ -77,6 +77,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._lamps = SignLabel()
         self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
         self._count = FittedText(TextSize.DISPLAY)
+        self._count.setMaximumHeight(self._count.sizeHint().height())  # one line
         self._progress = QProgressBar()
         self._progress.setRange(0, PROGRESS_STEPS)
         self._progress.setTextVisible(False)
@@ -87,7 +88,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         horizontal_layout(
             self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
         )
-        vertical_layout(self._numbers, self._count, self._progress, spacing=GRID // 2)
+        numbers = 1, self._count, self._progress, 1
+        vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
         buttons = self._accept, self._report, self._act, self._undo, self._start_over
         horizontal_layout(self._buttons, *buttons, 1)
         fill(layout, self._lamps)

@@ -298,7 +298,7 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     kinds.setCurrentIndex(kinds.findText("Limits"))
     desk.until(lambda: desk.column(WHAT) == ["Limits", "Limits"])
     desk.select(0)
-    limit = f"max_radius_mm {StationLimits().verification.radius}"
+    limit = f"Radius error: {StationLimits().verification.radius}\u00a0mm"
     desk.until(lambda: limit in _words(desk))
 
 
