@@ -266,6 +266,19 @@ def test_it_is_whole_without_the_curves_where_the_file_does_not_hold_enough(
     assert "End of report" in reported
 
 
+def test_the_camera_is_named_whose_parameters_are_listed(
+    result: Result, stated: dict[str, Any], printed: Printed, words: Words
+) -> None:
+    files = stated["inputs"]
+    first, second = ({**files["camera"], "file": f"{n}.yaml"} for n in ("a", "b"))
+    inputs = {**files, "cameras": [first, second]}
+    other = replace(result, calibration=record_of({**stated, "inputs": inputs}))
+
+    reported = " ".join(" ".join(page) for page in words(printed(other)))
+
+    assert "Camera parameters from the images (a.yaml)" in reported
+
+
 def test_the_pdf_holds_all_that_an_archive_asks_of_it(
     doubted: Result, printed: Printed
 ) -> None:

@@ -164,7 +164,8 @@ class MonteCarloRow(Translated, QWidget):
         if self._fault:
             return StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
         if self._found is None:
-            return StatusMessage()
+            why_not = self._why_not()
+            return StatusMessage(why_not, Sign.RING if why_not else Sign.NONE)
         text = self.tr("{0} trials successful, {1} failed.")
         n_solved = len(self._found.errors)
         outcome = text.format(n_solved, self._found.n_failed)

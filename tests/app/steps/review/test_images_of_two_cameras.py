@@ -15,10 +15,12 @@ from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution, solve_record
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.steps.review.residual_plots import ArrowPlot
 from lightpen_app.steps.review.residual_view import ResidualView
 from lightpen_app.widgets.camera_switch import CameraSwitch
+from lightpen_app.widgets.sign_label import SignLabel
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +111,17 @@ def test_two_cameras_need_no_more_width_than_one(
     (switch,) = panel.findChildren(CameraSwitch)
     qtbot.waitUntil(switch.isVisible)
     assert panel.minimumSizeHint().width() == width
+
+
+def test_why_there_is_no_monte_carlo_of_two_cameras_is_seen(
+    solution: Solution, qtbot: QtBot
+) -> None:
+    row = MonteCarloRow()
+    qtbot.addWidget(row)
+    row.set_value(solution)
+
+    start = next(b for b in row.findChildren(QAbstractButton) if b.isVisibleTo(row))
+    assert not start.isEnabled()
+    shown = [each for each in row.findChildren(SignLabel) if each.isVisibleTo(row)]
+    words = [each.value().text for each in shown]
+    assert words == ["Available for swings with one camera only."]
