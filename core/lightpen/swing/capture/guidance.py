@@ -64,12 +64,16 @@ class GuidanceInput:
 
 
 def next_posture(
-    outlook: GuidanceInput, present: FloatArray, wanted: BoolArray | None = None
+    outlook: GuidanceInput,
+    present: FloatArray,
+    wanted: BoolArray | None = None,
+    avoided: Posture | None = None,
 ) -> Posture | None:
     """Return the posture to lean the pen to from ``present``, cam_from_pen (3, 3).
 
     ``wanted`` (3, 8) are the fields of the dial to choose from, all unless given:
     upright (in the first column), leaning and leaning far, by direction from the right.
+    ``avoided`` is not chosen.
     None if the LEDs could be seen in none of the postures. Where there are images on
     all ways to the middles of these fields, it is beside a middle.
     """
@@ -79,6 +83,7 @@ def next_posture(
         fit = _is_seen(outlook, rotations)
         if wanted is not None:
             fit &= wanted[fields[:, 0], fields[:, 1]]
+        fit &= [posture != avoided for posture in postures]
         chosen = np.flatnonzero(fit)
         if not len(chosen):
             continue

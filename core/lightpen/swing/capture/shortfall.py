@@ -27,7 +27,7 @@ UPRIGHT_HELD = 0.5  # s
 LEARNING_TILT = np.radians(12.0)  # shows to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
 N_MORE = 40  # images at least, where more are requested than a swing needs
-PATIENCE = 4.0  # s until a target that is not reached is chosen again
+PATIENCE = 4.0  # s until a target is chosen anew, reached or not
 DECAY = 1 / 2  # U^2 less its floor goes with n^-DECAY, measured with simulated stations
 ENOUGH_FILLED = 0.5  # of the fields, before it is said what no image can lower
 
@@ -170,9 +170,12 @@ def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
 
 
 def next_target(
-    setup: SwingSetup, state: SwingState, present: FloatArray
+    setup: SwingSetup,
+    state: SwingState,
+    present: FloatArray,
+    avoided: Posture | None = None,
 ) -> Posture | None:
-    """Return the next posture, from the present rotation (3, 3).
+    """Return the next posture, from the present rotation (3, 3); not the avoided one.
 
     Once the uncertainty suffices, only fields that lack images are chosen from.
     """
@@ -182,8 +185,8 @@ def next_target(
     outlook = _outlook(setup, state, seat)
     short = measure_shortfall(setup, state)
     if short.n_for_uncertainty == 0 and short.fields.any():
-        return next_posture(outlook, present, short.fields > 0)
-    return next_posture(outlook, present)
+        return next_posture(outlook, present, short.fields > 0, avoided)
+    return next_posture(outlook, present, avoided=avoided)
 
 
 def oriented(
@@ -215,18 +218,23 @@ def guided(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Swi
     """Choose a target if there is none, it is reached, or it stays out of reach."""
     if state.heading is None:
         return state
-    if state.target is not None and state.time - state.target_since < PATIENCE:
-        target = state.target
+    target, avoided, away = state.target, None, True
+    if target is not None:
         wanted = rotations_of(
             setup.pen,
             np.array([target.tilt]),
             np.array([target.direction]),
             np.array([target.turn]),
         )
-        if angles_between(wanted, detection.rotation[None])[0, 0] > REACHED:
+        away = angles_between(wanted, detection.rotation[None])[0, 0] > REACHED
+        is_recent = state.time - state.target_since < PATIENCE
+        if away and is_recent:
             return state
-    chosen = next_target(setup, state, detection.rotation)
-    return replace(state, target=chosen, target_since=state.time)
+        if not (away or is_recent):  # nothing new comes of it any more
+            avoided = target
+    chosen = next_target(setup, state, detection.rotation, avoided)
+    since = state.target_since if chosen == target and not away else state.time
+    return replace(state, target=chosen, target_since=since)
 
 
 def _outlook(setup: SwingSetup, state: SwingState, seat: Seat) -> GuidanceInput:

@@ -199,6 +199,25 @@ def test_a_target_out_of_reach_is_chosen_anew_after_a_while() -> None:
     assert late.target_since == 14.0
 
 
+def test_a_target_at_which_the_pen_stays_for_long_gives_way_to_another() -> None:
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=1e-4))
+    state = replace(state_of(setup, to_the_right(20)), heading=0.0, time=10.0)
+    pose = state.kept.rotations[-1], state.kept.translations[-1]
+    detection = detect_from_centers(CAMERA, PEN, state.kept.pixels[-1, 0], *pose)
+    state = guided(setup, state, detection)
+    target = state.target
+    assert target is not None
+    numbers = target.tilt - np.radians(3), target.direction, target.turn
+    (near,) = rotations_of(PEN, *(np.array([number]) for number in numbers))
+    detection = replace(detection, rotation=near)
+
+    soon = guided(setup, replace(state, time=11.0), detection)
+    late = guided(setup, replace(soon, time=14.5), detection)
+
+    assert soon.target == target
+    assert late.target not in (None, target)
+
+
 def test_the_range_of_turns_holds_each_posture_that_was_kept() -> None:
     rng = np.random.default_rng(4)
     n_poses = 40
