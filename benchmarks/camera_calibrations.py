@@ -17,7 +17,6 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import Centers
@@ -50,8 +49,6 @@ NOTHING_ELSE = Assumptions(warmth=TINY, form_error=0.0, center_bias=0.0)
 NORMAL_95 = 1.959964
 COVERED = (93.0, 97.0)  # per cent
 CHANCE = 0.99  # of a coverage of 95 % in so many trials; a row has three
-# What is drawn here; what seat and drift may do is in U, too, and does not happen.
-DRAWN = (ContributionName.NOISE, ContributionName.CAMERA)
 STREAM = 23  # of the seeds
 SMALL_BOARD = "chessboard:8x6:20"
 SMALL = Camera(
@@ -69,8 +66,8 @@ def camera_calibration_rows(workers: Workers, data: Path | None) -> list[Row]:
         *(without_data("`chessboard`") if data is None else [_of_set(data)]),
         *_lens_rows(trials),
         _covered(
-            f"Tip x y z with {len(tips)} cameras calibrated so, by the shares "
-            "of noise and camera",
+            f"Tip x y z with {len(tips)} cameras calibrated so, by the noise of the "
+            "estimate and the camera, the only errors drawn here",
             tips,
         ),
         *([] if data is None else workers.call(partial(_time_rows, data))),
@@ -225,8 +222,9 @@ def _tip_deviations(part: int) -> FloatArray:
         centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
         observations = observe_centers(centers, camera, pen)
         solved = calibrate(camera, pen, observations, NOTHING_ELSE)
-        drawn = [each for each in solved.budget.shares if each.name in DRAWN]
-        sigmas = np.sqrt(sum(each.standard_uncertainty**2 for each in drawn))
+        bundle = solved.bundle
+        drawn = bundle.independent_noise + bundle.part(*bundle.layout.cameras)
+        sigmas = np.sqrt(np.diag(drawn)[:3])
         deviations.append((solved.joint.tip_pen - swing.tip_pen) / sigmas)
     return np.array(deviations)
 

@@ -2,10 +2,10 @@
 
 The estimate is taken for the truth. Each trial draws files of camera and pen about it,
 by what the files state of themselves or what is assumed in its place, a seat and a
-drift as U counts them, centres that are off in each posture, the areas of the discs,
-and noise in the images; then it calibrates again, as a user would who has no more than
-these files. The scatter of the tips is their uncertainty, whatever is not linear in
-between.
+drift as U counts them, mechanics of usual size, centres that are off in each posture,
+the areas of the discs, and noise in the images; then it calibrates again, as a user
+would who has no more than these files. The scatter of the tips is their uncertainty,
+whatever is not linear in between.
 
 References
 ----------
@@ -25,8 +25,10 @@ from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.components import NONE
 from lightpen.estimation.bundle.disc_diameter import modelled_areas
-from lightpen.estimation.bundle.linearised import N_CONE, BundleState
+from lightpen.estimation.bundle.effects import mechanics_of, prior_of
+from lightpen.estimation.bundle.linearised import N_CONE, BundleState, views_at
 from lightpen.estimation.bundle.priors import Priors
+from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.statistics.workers import Map
 from lightpen.estimation.uncertainty.budget import (
@@ -50,12 +52,8 @@ OF_OTHERS = {
     ContributionName.DISTANCE,
     ContributionName.EXTRINSICS,
     ContributionName.LENS,
-    ContributionName.COMPLIANCE,
-    ContributionName.LOOSE,
-    ContributionName.SAG,
-    ContributionName.TILT,
     ContributionName.TIMING,
-}  # cones, or cameras; not drawn
+}  # cones, cameras, or models of them; not drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +78,10 @@ class Trials:
         Of the moves of the cone in them, mm^2.
     jitter : (3, 3) array
         Covariance of the seat from image to image, mm^2.
+    mechanics : (N, L, 2, k) array
+        Derivative of the LEDs' images by the unknowns of mechanics, px by mm or px.
+    mechanics_covariance : (k, k) array
+        Of these by their priors.
     edge_widths : (N,) array
         Of the LEDs, px; NaN where no areas are known.
     """
@@ -95,6 +97,8 @@ class Trials:
     forms: FloatArray
     move_covariance: FloatArray
     jitter: FloatArray
+    mechanics: FloatArray
+    mechanics_covariance: FloatArray
     edge_widths: FloatArray
     priors: Priors
     assumptions: Assumptions
@@ -159,6 +163,15 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
     instrument, joint = calibration.instrument, calibration.joint
     bundle, pen = calibration.bundle, calibration.instrument.pen
     n_images = len(joint.rotations)
+    state = BundleState(
+        *(rig_of(instrument.camera), pen, joint.tip_pen, joint.cone_cam),
+        joint.rotations,
+    )
+    mechanics = mechanics_of(
+        views_at(state, np.zeros((n_images, 1, pen.n_leds, 2))),
+        *(joint.rotations, axes_of_cone(joint.rotations), pen.leds),
+        calibration.priors.compliance,
+    )
     basis, jitter = bundle.unknowns.basis, bundle.components.jitter
     leds = bundle.budget_components.leds
     led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
@@ -184,6 +197,8 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
             if jitter.covariance is None
             else jitter.covariance
         ),
+        mechanics=np.concatenate([each.columns[:, 0] for each in mechanics], axis=-1),
+        mechanics_covariance=prior_of(mechanics),
         edge_widths=_edge_widths(calibration, n_images),
         priors=calibration.priors,
         assumptions=calibration.assumptions,
@@ -244,6 +259,7 @@ def run_trial(trials: Trials, number: int) -> FloatArray | None:
         trials.pen.diameter / 2,
     )
     errors = trials.sigma * rng.standard_normal(exact.shape) + _biases(trials, rng)
+    errors += trials.mechanics @ _drawn(trials.mechanics_covariance, rng)
     pixels = np.where(trials.seen[..., None], exact + errors, np.nan)
     areas = _drawn_areas(trials, rng)
     off = _drawn(trials.priors.cameras[0].covariance, rng)

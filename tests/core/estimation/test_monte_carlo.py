@@ -83,6 +83,7 @@ def test_exact_files_and_images_give_no_error(calibration: Calibration) -> None:
         led_covariance=0.0 * trials.led_covariance,
         move_covariance=0.0 * trials.move_covariance,
         jitter=np.zeros((3, 3)),
+        mechanics_covariance=0.0 * trials.mechanics_covariance,
         priors=replace(
             trials.priors,
             center_bias=0.0,
@@ -113,6 +114,18 @@ def test_trials_of_a_seat_that_jitters_differ_by_it(calibration: Calibration) ->
     assert len(differences) >= 3
     # 25 images with 0.02 mm of jitter move the tip by some hundredths.
     assert 0.003 < np.std(differences) < 0.1
+
+
+def test_mechanics_move_the_tip_in_a_trial(calibration: Calibration) -> None:
+    trials = trials_of(calibration)
+    none = 0.0 * trials.mechanics_covariance
+    rigid = [run_trial(replace(trials, mechanics_covariance=none), n) for n in range(4)]
+    found = [run_trial(trials, number) for number in range(4)]
+
+    pairs = zip(found, rigid, strict=True)
+    differences = [a - b for a, b in pairs if a is not None and b is not None]
+    assert len(differences) >= 3
+    assert np.std(differences, axis=0)[1] > 0.001
 
 
 def test_domes_that_all_stand_out_alike_move_the_tip_along_the_normals(
