@@ -118,6 +118,7 @@ class Soak(QObject):
         now = time.perf_counter()
         self._lateness.append(max(1000 * (now - self._last_tick) - TIMER_MS, 0.0))
         self._last_tick = now
+        self._begin_next()
 
     def _on_sample(self) -> None:
         elapsed = time.perf_counter() - self._start
@@ -126,7 +127,8 @@ class Soak(QObject):
             self._ticker.stop()
             self._sampler.stop()
             QApplication.exit()
-            return
+
+    def _begin_next(self) -> None:
         run = self._wizard.workbench.run
         if run.status.state is not None and run.status.state.phase is Phase.VERDICT:
             self._n_swings += 1
