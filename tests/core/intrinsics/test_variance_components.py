@@ -47,9 +47,11 @@ def moved(views: Views, camera: Camera, off: FloatArray) -> Views:
     return replace(views, pixels=views.pixels + shift[:, None])
 
 
-def through_field(views: Views, amplitude: float, seed: int = 6) -> Views:
+def through_field(
+    views: Views, amplitude: float, seed: int = 6, length: float = 190.0
+) -> Views:
     """Return the views through a lens with a residual field."""
-    field = LensField.of(*views.image_sizes[0], amplitude, 190.0)
+    field = LensField.of(*views.image_sizes[0], amplitude, length)
     root = np.linalg.cholesky(field.covariance + 1e-12 * np.eye(len(field.nodes)))
     drawn = np.random.default_rng(seed).normal(size=field.values.shape)
     field = replace(field, values=root @ drawn)
@@ -130,6 +132,22 @@ def test_a_lens_field_is_found(make_views: MakeViews) -> None:
     share = np.diag(beside) / np.diag(shared)
     assert np.all(share < 1.0)
     assert np.all(share[2:4] < 0.3), share
+
+
+def test_fields_far_above_the_noise_leave_errors_as_large_as_stated(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    length, errors = 0.21 * 640, []
+    for seed in range(4):
+        views = make_views(n_views=20, noise=0.012, seed=seed)
+        found = fitted(through_field(views, 0.25, seed + 100, length))
+        state, covariance = found.adjustment.state, found.adjustment.covariance
+        off = state.cameras[0].intrinsics - camera.intrinsics
+        errors.append(off / np.sqrt(np.diag(covariance)[: len(off)]))
+        assert found.fields[0] is not None
+        assert found.fields[0].length == pytest.approx(length, rel=0.1)
+
+    assert np.sqrt(np.mean(np.square(errors))) < 1.2
 
 
 def test_smooth_errors_of_single_views_are_found(make_views: MakeViews) -> None:
