@@ -1,4 +1,8 @@
-"""Calibrations with erroneous files, seats and noise."""
+"""Calibrations with erroneous files, seats and noise.
+
+Mechanics are unknowns of every fit and widen U, but are not drawn here: coverage has a
+lower limit only. Section `station` draws all, and has both limits.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -49,8 +53,8 @@ FEW = 60  # images
 SIGMA = 0.03  # px
 STREAM = 5  # of the seeds
 NORMAL_95 = 1.959964
-# Per cent, of camera files, and of all else; 300 intervals of 95 % give 92 to 98.
-COVERED_FILES, COVERED = (93.0, 99.0), (90.0, 99.0)
+# Least coverage, per cent, of camera files, and of all else.
+COVERED_FILES, COVERED = 93.0, 90.0
 # Standard uncertainties that a camera file states.
 FOCAL, ASPECT, CENTRE, K1, K2, TANGENTIAL = 0.003, 0.0003, 3.0, 0.02, 0.1, 3e-4
 
@@ -59,8 +63,8 @@ FOCAL, ASPECT, CENTRE, K1, K2, TANGENTIAL = 0.003, 0.0003, 3.0, 0.02, 0.1, 3e-4
 class Flaws:
     """What is not as it should be.
 
-    Beside it all that U holds is drawn: what the files state of themselves, and what is
-    assumed of the pen's warmth, of ball and cone, and of the centres.
+    Beside it is drawn what the files state of themselves, and what is assumed of the
+    pen's warmth, of ball and cone, and of the centres.
 
     Attributes
     ----------
@@ -186,9 +190,9 @@ def _reported(
     covered = 100 * np.mean(np.abs(errors) < NORMAL_95 * stated, axis=0)
     median = float(np.median(np.linalg.norm(errors, axis=1)))
     median_held = float(np.median(np.linalg.norm(held, axis=1)))
-    low, high = COVERED if limit is None else COVERED_FILES
-    passed = bool(np.all((covered >= low) & (covered <= high)))
-    asked = f"{low:.0f} to {high:.0f} % each"
+    least = COVERED if limit is None else COVERED_FILES
+    passed = bool(np.all(covered >= least))
+    asked = f">= {least:.0f} % each"
     if limit is not None:
         passed &= median <= limit
         asked = f"<= {1000 * limit:.0f} \u00b5m, {asked}"
