@@ -34,7 +34,7 @@ from lightpen.intrinsics.uncertainty_map import moved_in_image
 from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
 from lightpen.messages import Message, message
-from lightpen.model.camera import Camera
+from lightpen.model.camera import Camera, LensModel
 from lightpen.model.quantiles import chi_square_quantile
 
 MAX_ROUNDS = 8
@@ -50,6 +50,7 @@ OTHER_CENTER = 0.005  # shift of the principal point, of that side
 OTHER_ASPECT = 0.002  # of fx/fy, relative
 OTHER_DISTORTION = 0.002  # of the distortion, rms over the image, of that side
 SIGMAS = 3.0
+TURNED = 0.2  # of the squared difference of two cameras, that turned images leave
 SKEW_ALONE = 0.8  # of the rms without a skew; a lens field hardly looks like one
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one
@@ -125,12 +126,8 @@ def explain(
         enough = groups.rms / LESSENED
     if turned is not None and nothing**2 - turned[1] ** 2 > LEAST_EFFECT**2:
         which, rms = turned
-        names, n_named = _fewer(views, which)
-        turned_error = CalibrationError(
-            "intrinsics.turned", names=names, n_named=n_named, n_views=views.n_views
-        )
         if rms < enough:
-            consider(rms, cost_of_groups, turned_error)
+            consider(rms, cost_of_groups, _turned_error(views, which))
     skewed = _skewed(views, tolerances, near)
     height, longer = views.image_sizes[0][1], max(views.image_sizes[0])
     # Less is also a lens's field, unless there is a board to be blamed for it.
@@ -187,11 +184,17 @@ def _differ(groups: _Groups) -> bool:
     return in_image > USELESS * max(one.image_size)
 
 
+def _known(groups: _Groups) -> FloatArray:
+    """Return the covariance of the difference of two cameras."""
+    at = groups.fits[0].of_intrinsics(0)
+    known = np.sum([fit.covariance[at, at] for fit in groups.fits], axis=0)
+    return np.asarray(known)
+
+
 def _are_two_cameras(groups: _Groups) -> bool:
     """Return whether more differs than zoom and focus of one camera may."""
     one, other = groups.cameras
-    longer, at = max(one.image_size), groups.fits[0].of_intrinsics(0)
-    known = np.sum([fit.covariance[at, at] for fit in groups.fits], axis=0)
+    longer, known = max(one.image_size), _known(groups)
     change, sigmas = other.intrinsics - one.intrinsics, np.sqrt(np.diag(known))
     shift = np.abs(change[2:4]) - SIGMAS * sigmas[2:4]
     aspect = abs(other.fx / other.fy / (one.fx / one.fy) - 1)
@@ -211,6 +214,8 @@ def _groups_error(views: Views, groups: _Groups) -> CalibrationError:
         which, one, other = ~which, other, one
     first = int(np.argmax(which))
     before, after = _setting(views, ~which, one), _setting(views, which, other)
+    if _are_turned(groups):
+        return _turned_error(views, which)
     if _are_two_cameras(groups):
         return CalibrationError("intrinsics.two-cameras", one=before, other=after)
     if which[first:].all():
@@ -234,11 +239,28 @@ def _setting(views: Views, which: BoolArray, camera: Camera) -> Message:
     )
 
 
-def _fewer(views: Views, which: BoolArray) -> tuple[str, int]:
-    """Return the names of the fewer views of two groups, and their number."""
+def _are_turned(groups: _Groups) -> bool:
+    """Return whether two cameras are one, its images turned by 180 degrees."""
+    one, other = groups.cameras
+    turned = one.intrinsics.copy()
+    turned[2:4] = np.array(one.image_size) - 1 - turned[2:4]
+    if one.lens is LensModel.BROWN:
+        turned[6:8] *= -1
+    off = other.intrinsics - np.stack([one.intrinsics, turned])
+    sizes = np.sum(off.T * np.linalg.solve(_known(groups), off.T), axis=0)
+    return bool(sizes[1] < TURNED * sizes[0])
+
+
+def _turned_error(views: Views, which: BoolArray) -> CalibrationError:
+    """Return the error of images that are turned, naming the fewer."""
     fewer = which if which.sum() <= len(which) / 2 else ~which
     names = tuple(n for n, own in zip(views.names, fewer, strict=True) if own)
-    return listed_names(names), len(names)
+    return CalibrationError(
+        "intrinsics.turned",
+        names=listed_names(names),
+        n_named=len(names),
+        n_views=views.n_views,
+    )
 
 
 def _fitted(views: Views, tolerances: BoardTolerances, near: Camera) -> BoardFit | None:

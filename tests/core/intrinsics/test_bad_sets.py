@@ -18,6 +18,7 @@ from lightpen.intrinsics.variance_components import fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
+from lightpen.model.lens_field import LensField
 from lightpen.simulator.boards import simulate_board_poses
 
 MakeViews = Callable[..., Views]
@@ -246,6 +247,21 @@ def test_rotated_images_are_named_also_with_uneven_squares(
         calibrated(replace(views, pixels=pixels))
     names = caught.value.message.values["names"]
     assert names == "view_03.png, view_06.png, view_10.png"
+
+
+def test_rotated_images_before_a_lens_with_a_field_are_no_second_camera(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    off_centre = replace(camera, cx=313.0, cy=232.0)
+    views = make_views(n_views=14, noise=0.015, of=off_centre)
+    field = LensField.of(640, 480, 0.15, 180.0)
+    root = np.linalg.cholesky(field.covariance + 1e-9 * np.eye(len(field.nodes)))
+    drawn = np.random.default_rng(3).normal(size=field.values.shape)
+    pixels = views.pixels + replace(field, values=root @ drawn).at(views.pixels)
+    pixels[[2, 5, 9]] = np.array([639, 479]) - pixels[[2, 5, 9]]
+
+    with pytest.raises(CalibrationError, match="rotated by 180"):
+        calibrated(replace(views, pixels=pixels))
 
 
 @pytest.mark.slow
