@@ -4,12 +4,20 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent, QPaintEvent
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QIcon,
+    QKeyEvent,
+    QPaintEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QCheckBox,
     QFileDialog,
+    QLineEdit,
     QMainWindow,
     QMessageBox,
     QWidget,
@@ -23,6 +31,7 @@ from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.shell.about import About
 from lightpen_app.shell.action_bar import ActionBar
 from lightpen_app.shell.help_window import HelpWindow
+from lightpen_app.shell.last_input import LastInput
 from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
 from lightpen_app.shell.sidebar import Sidebar, Subject
@@ -110,6 +119,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._notifications = notifications
         self._now = 0
         self._asks = True
+        self._last_input = LastInput(self)
 
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
@@ -315,6 +325,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         super().closeEvent(event)
 
     @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._last_input.follow(self.windowHandle())
+
+    @override
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() == QEvent.Type.WindowStateChange:
@@ -459,9 +474,15 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return replace(action, why_not=self.tr("Answer the question first."))
 
     def _focus_page(self) -> None:
-        """Put the focus on the control that the page chose, or on its first one."""
+        """Put the focus on the control that the page chose, or on its first one.
+
+        Who uses the mouse sees no frame, but where text can be typed at once.
+        """
         page = self.page()
         first = page.first_control()
+        if self._last_input.is_pointer and not isinstance(first, QLineEdit):
+            page.setFocus(Qt.FocusReason.OtherFocusReason)
+            return
         if first is not None:
             first.setFocus(Qt.FocusReason.TabFocusReason)
             return

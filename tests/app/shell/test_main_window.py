@@ -399,6 +399,22 @@ def test_a_new_page_has_the_focus_on_its_first_control(shell: Shell) -> None:
     assert QApplication.focusWidget() is shell.pages[1].field
 
 
+def test_after_a_click_a_new_page_frames_no_control_until_tab_is_pressed(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    main, handle = shell.main_button, shell.window.windowHandle()
+    at = main.mapTo(shell.window, main.rect().center())
+    QTest.mouseClick(handle, Qt.MouseButton.LeftButton, pos=at)
+    assert shell.shown == "Camera"
+    page = shell.pages[1]
+    assert QApplication.focusWidget() is page
+    press(Key.Key_Tab)
+    assert page.field.hasFocus()
+
+    QTest.keyClick(handle, Key.Key_PageUp)
+    assert shell.pages[0].field.hasFocus()
+
+
 def test_a_button_that_vanishes_leaves_the_focus_to_no_other_button(
     shell: Shell,
 ) -> None:
