@@ -14,7 +14,7 @@ from lightpen.swing.preparation import Preparation
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.notifications import Notifications
-from lightpen_app.work.selection import Selection
+from lightpen_app.work.selection import Selection, trial_of
 from lightpen_app.work.stations import FilePaths
 
 
@@ -68,14 +68,32 @@ class ChosenFiles(QObject):
         self._withdraw()
         self._read_samples()
 
+    def use_trial(self, begin: Callable[[], None]) -> None:
+        """Choose a trial with its simulated pen, once the files are written; begin."""
+
+        def on_read(opened: OpenedFiles) -> None:
+            self._selection.set_preparation(
+                replace(
+                    trial_of(self._selection.preparation),
+                    camera_file=opened.camera_file,
+                    pen_file=opened.pen_file,
+                )
+            )
+            begin()
+
+        self._withdraw()
+        self._read(self._write_samples, on_read, SourceChoice())
+
     def use_files(self, files: FilesBeside) -> None:
         """Select the files beside recorded images once they are read."""
         self._withdraw()
         self._read(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
 
     def _read_samples(self) -> None:
-        around, folder = self._around, self._samples
-        self._read(lambda _: sample_files(around, folder), self._on_chosen_read)
+        self._read(self._write_samples, self._on_chosen_read)
+
+    def _write_samples(self, _: Report) -> OpenedFiles:
+        return sample_files(self._around, self._samples)
 
     def _read_station(self, files: FilePaths) -> None:
         """Read the files of a station; what cannot be read must be chosen again."""
@@ -96,10 +114,11 @@ class ChosenFiles(QObject):
         self,
         function: Callable[[Report], OpenedFiles],
         take: Callable[[OpenedFiles], None],
+        source: SourceChoice | None = None,
     ) -> None:
         self._cancel()
         self._job = job = Job(function, self)
-        source = self._selection.preparation.source
+        source = source or self._selection.preparation.source
 
         def on_read(opened: OpenedFiles) -> None:
             self._job = None

@@ -35,7 +35,8 @@ class GuidedOperator:
             self._lean_towards(GENTLE_LEANS[step % len(GENTLE_LEANS)])
         elif state.phase is Phase.CAPTURING:
             self._lean_towards(self._wanted(state))
-        elif self._wish in GENTLE_LEANS:  # so that the first tilt differs from these
+        elif self._wish in GENTLE_LEANS or state.phase is Phase.VERDICT:
+            # So that the first tilt differs from these; and at the end as asked.
             self._lean_towards(UPRIGHT)
         elif self._wish != UPRIGHT:
             self._wish = None  # a hand that was stopped must be led again

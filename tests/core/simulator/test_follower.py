@@ -82,6 +82,16 @@ def test_the_first_lean_goes_to_the_operators_right(
     assert operator.requested == [replace(FIRST_LEAN, direction=np.pi / 2)]
 
 
+def test_after_the_verdict_the_pen_is_held_upright_as_asked(
+    operator: ToldOperator, state: SwingState
+) -> None:
+    follower = GuidedOperator(operator)
+    for phase in (Phase.CAPTURING, Phase.SOLVING, Phase.VERDICT, Phase.VERDICT):
+        follower.follow(replace(state, phase=phase))
+
+    assert operator.requested == [ASKED, UPRIGHT]
+
+
 def test_without_a_target_the_hand_stays(
     operator: ToldOperator, state: SwingState
 ) -> None:
@@ -90,7 +100,9 @@ def test_without_a_target_the_hand_stays(
     assert operator.requested == []
 
 
-@pytest.mark.parametrize("phase", [p for p in Phase if p is not Phase.CAPTURING])
+@pytest.mark.parametrize(
+    "phase", [p for p in Phase if p not in (Phase.CAPTURING, Phase.VERDICT)]
+)
 def test_the_hand_is_led_only_while_images_are_captured(
     operator: ToldOperator, state: SwingState, phase: Phase
 ) -> None:

@@ -24,7 +24,7 @@ from lightpen_app.steps.start.setup_view import SetupView
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.work.selection import is_trial_ready, trial_of
+from lightpen_app.work.selection import is_trial_ready
 from lightpen_app.work.workbench import Workbench
 
 
@@ -231,11 +231,14 @@ class StartPage(ResponsiveLayout, Page):
         self._refresh()
 
     def _on_trial_requested(self) -> None:
-        self._selection.set_preparation(trial_of(self._selection.preparation))
-        self.show_setup()  # until the files are there that the day page would miss
-        self._chosen_files.use_samples()
+        self._chosen_files.use_trial(self._begin_trial)
+
+    def _begin_trial(self) -> None:
         if not self._camera.live.is_open:
+            self.show_setup()  # until there is an image, which the day page would miss
             self._camera.open()
+        elif is_trial_ready(self._selection.preparation) and self.isVisible():
+            self.step_requested.emit("swing")
 
     def _show_trial(self) -> None:
         is_on = self._run.status.state is not None
