@@ -54,6 +54,7 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     walker = known
     walker.click_step("Measure")
     walker.until_tells("Probe the sphere dome: 0 of 5 points.")
+    assert walker.says("Feature 1 of 1")
     assert walker.tells(SMALL.name)
     walker.click("Let the simulated operator probe")
     n_inputs = walker.n_inputs

@@ -11,6 +11,7 @@ from lightpen.local_time import local_time
 LONGEST_SHOWN = 32  # characters
 LONGEST_WORD = 24  # characters; what is longer may be parted
 BREAK = "\u200b"  # where a line may end, though no blank is there
+JOINER = "\u2060"  # where a line may not end, though it could
 PARTED = "  \u00b7  "  # between items in one line
 
 
@@ -33,6 +34,11 @@ def breakable(text: str) -> str:
 def unbroken(text: str) -> str:
     """Undo `breakable`."""
     return text.replace(BREAK, "")
+
+
+def on_one_line(text: str) -> str:
+    """Let a line end nowhere within a text."""
+    return JOINER.join(text.replace(" ", "\xa0"))
 
 
 def _parted(word: str) -> str:

@@ -7,7 +7,15 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import (
+    QColor,
+    QFontMetricsF,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+    QPixmap,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -29,6 +37,7 @@ RIM_SHARE = 0.435  # of the side, from the middle to the rim
 BAR_SHARE = 0.12  # of the side, for the bar of the turn
 LEAST_BAR = 2.8  # of the least letters
 LEGEND_SHARE, NUMBER_SHARE = 0.09, 0.19  # of the rim, for letters
+LEGEND_SIZES = (1.0, 0.9, 0.8, 0.7)  # of the usual size, tried in turn
 NUMBERS = 1.4  # times the least letters, where they fit
 SECTOR = 2 * math.pi / N_DIRECTIONS
 
@@ -227,15 +236,15 @@ class PostureDial(Translated, QWidget):
     def _draw_legend(
         self, painter: QPainter, middle: QPointF, rim: float, text: str, size: float
     ) -> None:
-        """Draw a text beside the rim, to the left above."""
+        """Draw a text beside the rim, to the left above, as large as it finds room."""
         painter.setPen(QColor(colors_of(self.palette()).muted))
-        painter.setFont(font(size))
-        words = painter.fontMetrics().size(0, text)
-        top = max(1 - words.height() / rim, 0.0)  # rim = 1; the legend ends there
-        right = middle.x() - math.sqrt(1 - top**2) * rim
-        left = min(middle.x() - 1.15 * rim, right - words.width())
-        corner = QRectF(max(left, 0.0), middle.y() - rim, rim, rim)
-        painter.drawText(corner, Qt.AlignmentFlag.AlignLeft, text)
+        sizes = (share * size for share in LEGEND_SIZES)
+        boxes = [(each, legend_box(text, each, middle, rim)) for each in sizes]
+        fitting = (each for each in boxes if each[1].left() >= 0)
+        chosen, box = next(fitting, boxes[-1])
+        box.moveLeft(max(box.left(), 0.0))
+        painter.setFont(font(chosen))
+        painter.drawText(box, int(Qt.TextFlag.TextDontClip), text)
 
     def _places(self) -> tuple[QPointF, float, QRectF]:
         """Return the middle of the dial, its radius, and the bar of the turn, px."""
@@ -419,6 +428,15 @@ def _turn_x(box: QRectF, turn: float) -> float:
     """Return the position of a turn (rad) on the bar, px."""
     share = float(np.clip(turn / MAX_TURN, -1, 1))
     return box.center().x() + share * box.width() / 2
+
+
+def legend_box(text: str, size: float, middle: QPointF, rim: float) -> QRectF:
+    """Return the box of a text beside the rim, to the left above; size in px."""
+    words = QFontMetricsF(font(size)).size(0, text)
+    top = max(1 - words.height() / rim, 0.0)  # rim = 1; the legend ends there
+    right = middle.x() - math.sqrt(1 - top**2) * rim
+    left = min(max(middle.x() - 1.15 * rim, 0.0), right - words.width())
+    return QRectF(QPointF(left, middle.y() - rim), words)
 
 
 def _reaches(

@@ -3023,6 +3023,10 @@
 <context>
     <name>MeasurePresenter</name>
     <message>
+        <source>Feature {0} of {1}</source>
+        <translation>要素 {0} / {1}</translation>
+    </message>
+    <message>
         <source>{0}  {1}  {2}  ± {3} mm (k = 2)</source>
         <translation>{0}  {1}  {2}  ± {3} mm (k = 2)</translation>
     </message>
@@ -4990,6 +4994,10 @@ needed</source>
         <translation>模拟光笔</translation>
     </message>
     <message>
+        <source>Simulated swing</source>
+        <translation>模拟摆动</translation>
+    </message>
+    <message>
         <source>Let the simulated operator swing</source>
         <translation>让模拟操作员摆动</translation>
     </message>
@@ -5092,6 +5100,10 @@ needed</source>
         <translation>录制的图像</translation>
     </message>
     <message>
+        <source>{0} rejected</source>
+        <translation>已舍去 {0} 幅</translation>
+    </message>
+    <message>
         <source>Not computed</source>
         <translation>尚未计算</translation>
     </message>
@@ -5118,10 +5130,6 @@ needed</source>
     <message>
         <source>The swing starts when the step Swing is opened at the computer.</source>
         <translation>在计算机上打开“摆动”步骤后，摆动即开始。</translation>
-    </message>
-    <message>
-        <source>{0}; {1} rejected</source>
-        <translation>{0}；已舍去 {1} 幅</translation>
     </message>
     <message>
         <source>More images needed: U (k = 2) has increased</source>
@@ -10354,6 +10362,18 @@ mm</translation>
     <message>
         <source>max. {0} swings</source>
         <translation>最多摆动 {0} 次</translation>
+    </message>
+    <message>
+        <source>camera {0}</source>
+        <translation>相机 {0}</translation>
+    </message>
+    <message>
+        <source>supervisor password changed</source>
+        <translation>主管密码已更改</translation>
+    </message>
+    <message>
+        <source>station key changed</source>
+        <translation>工位密钥已更改</translation>
     </message>
     <message>
         <source>Modified after entry</source>

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPointF
+from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -14,11 +14,13 @@ from lightpen.model.coverage import measure_coverage
 from lightpen.model.posture import Posture, posture_of, rotations_of
 from lightpen.simulator.samples import eight_led_pen
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
+from lightpen_app.widgets import posture_dial
 from lightpen_app.widgets.posture_dial import (
     BAR_SHARE,
     DialValue,
     PostureDial,
     field_of,
+    legend_box,
     place_of,
 )
 
@@ -188,6 +190,30 @@ def test_the_camera_is_named_from_whichever_side_it_looks(
 
     # Words that are turned are shaded otherwise, by 2 %; the word is a quarter of all.
     assert n_muted(seen(dial)) == pytest.approx(wanted, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("width", "letters"), [(200, 13.0), (470, 32.0)]
+)  # of a small window, and of the operator view
+def test_a_large_legend_leaves_the_fields_alone(
+    dial: PostureDial, monkeypatch: pytest.MonkeyPatch, width: int, letters: float
+) -> None:
+    drawn: list[tuple[QRectF, QPointF, float]] = []
+
+    def box_of(text: str, size: float, middle: QPointF, rim: float) -> QRectF:
+        drawn.append((legend_box(text, size, middle, rim), middle, rim))
+        return drawn[-1][0]
+
+    monkeypatch.setattr(posture_dial, "legend_box", box_of)
+    dial.resize(width, 6 * width // 5)
+    dial.set_least_letters(letters)
+    dial.set_value(DialValue(needed=WANTED))
+    seen(dial)
+
+    box, middle, rim = drawn[-1]
+    corner = box.bottomRight() - middle
+    assert box.left() >= 0
+    assert math.hypot(corner.x(), corner.y()) >= rim - 1
 
 
 def test_the_fields_are_drawn_anew_for_what_else_changes_them(

@@ -43,7 +43,7 @@ from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 TABLE_SHARE, TABS_SHARE = 3, 4  # of the height
-LEAST_TABS = 25 * GRID  # px
+LEAST_TABS = 16 * GRID  # px
 
 
 class HistoryContent(Translated, QWidget):

@@ -9,6 +9,12 @@ from lightpen.formats.json_records import Plain
 from lightpen.model.limits import LIMITS
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.library.key_changes import (
+    OLD_KEY_SIGNATURE,
+    STATION_KEY,
+    SUPERVISOR_KEY,
+    SUPERVISOR_SIGNATURE,
+)
 from lightpen.verification.tasks.registry import ALL_TASKS
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, origin_text
@@ -56,6 +62,16 @@ _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
     "max_swings": QT_TRANSLATE_NOOP("history", "max. {0} swings"),
     "note": "{0}",
     "supervisor": QT_TRANSLATE_NOOP("history", "signed by {0}"),
+}
+_SAID_OF_STATION: dict[str, str] = {  # of its limits, keys, cameras, verifications
+    "board": "{0}",
+    "camera": QT_TRANSLATE_NOOP("history", "camera {0}"),
+    "supervisor": QT_TRANSLATE_NOOP("history", "signed by {0}"),
+    "changes_password": QT_TRANSLATE_NOOP("history", "supervisor password changed"),
+    STATION_KEY: QT_TRANSLATE_NOOP("history", "station key changed"),
+    OLD_KEY_SIGNATURE: "",
+    SUPERVISOR_KEY: "",
+    SUPERVISOR_SIGNATURE: "",
 }
 _LIMITS = {limit.key: limit for limit in LIMITS}
 _RETIRED = QT_TRANSLATE_NOOP("history", "retired")
@@ -126,7 +142,10 @@ def item_text(event: Event) -> str:
 
 
 def setting_text(name: str, value: Plain) -> str:
-    """Return the words on a stored setting; a limit has its label."""
+    """Return the words on a stored setting; a limit has its label, a key none."""
+    if name in _SAID_OF_STATION:
+        said = _SAID_OF_STATION[name]
+        return _translated(said).format(value) if said and value else ""
     limit = _LIMITS.get(name)
     if limit is None or not isinstance(value, int | float):
         return f"{name} {value}"

@@ -66,10 +66,12 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._solving.hide()
         self._scroll.setWidget(self.result)
         self._result_box = vertical_layout(self._result_side, (self._scroll, 1))
-        below = vertical_layout(self._result_box, self.tools)
-        buttons = horizontal_layout(below, (self.repeat, 1), (self.capture_more, 1))
+        self._buttons = vertical_layout(self._result_box, self.tools)
+        buttons = horizontal_layout(
+            self._buttons, (self.repeat, 1), (self.capture_more, 1)
+        )
         fill(buttons, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
-        fill(below, self.next_tips, 0)
+        fill(self._result_box, self.next_tips)
         layout = vertical_layout(self, self._banner, self.question, self.reason)
         fill(layout, self.withdrawal)
         fill(layout, self._solving, self._messages)
@@ -168,13 +170,13 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         side, direction = self._result_side, QBoxLayout.Direction
         self.result.set_large(self._room.is_vast)
         if self._room.is_narrow:
-            self._result_box.setDirection(direction.LeftToRight)
+            self._buttons.setDirection(direction.LeftToRight)
             side.setMinimumWidth(0)
             side.setMaximumWidth(ANY_WIDTH)
             self.tabs.insertTab(0, side, self.tr("Result"))
             self.tabs.setCurrentIndex(0)
         else:
-            self._result_box.setDirection(direction.TopToBottom)
+            self._buttons.setDirection(direction.TopToBottom)
             is_vast = self._room.is_vast
             side.setFixedWidth(LARGE_RESULT_WIDTH if is_vast else RESULT_WIDTH)
             self._columns.insertWidget(0, side)

@@ -20,7 +20,7 @@ from lightpen_app.look.phrases import first_missing, grade_text
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import PARTED, shortened
+from lightpen_app.look.words import PARTED, on_one_line, shortened
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.status_mark import status_message
 
@@ -145,7 +145,8 @@ def tip_details(now: Preparation, statuses: StationStatus) -> str:
         x, y, z = (f"{each:g}" for each in point.tolist())
         parts.append(translate("DayPage", "nominal {0} {1} {2} mm").format(x, y, z))
     limit = now.limits.max_uncertainty
-    parts.append(translate("DayPage", "limit of U {0:g} mm").format(limit))
+    words = translate("DayPage", "limit of U {0:g} mm").format(limit)
+    parts.append(on_one_line(words))
     if tip is not None and tip.note:
         parts.append(tip.note)
     return PARTED.join(parts)

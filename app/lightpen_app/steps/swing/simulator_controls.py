@@ -69,6 +69,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
     @override
     def _use_room(self) -> None:
         self._layout.setSpacing(GRID // 2 if self._room.is_narrow else GRID)
+        self._name_swing()
 
     def lean(self, posture: Posture) -> None:
         """Hold the pen as the user requests, instead of following the swing."""
@@ -83,11 +84,7 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
     @override
     def _retranslate(self) -> None:
         self.setAccessibleName(self.tr("Simulated pen"))
-        set_words(
-            self._follow,
-            self.tr("Let the simulated operator swing"),
-            self.tr("Seats the tip and follows the arrow automatically"),
-        )
+        self._name_swing()
         slip = self.tr("Lets the tip slip by {0} mm for a moment").format(SLIP_MM)
         words = (
             (
@@ -106,6 +103,15 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         )
         for button, (text, tooltip) in zip(self._buttons, words, strict=True):
             set_words(button, text, tooltip)
+
+    def _name_swing(self) -> None:
+        set_words(
+            self._follow,
+            self.tr("Simulated swing")
+            if self._room.is_narrow
+            else self.tr("Let the simulated operator swing"),
+            self.tr("Seats the tip and follows the arrow automatically"),
+        )
 
     def _lead_by_hand(self) -> None:
         self._follow.setChecked(False)

@@ -194,16 +194,16 @@ class SwingWords(QObject):
 
     def note(self, moment: SwingViewState) -> str:
         """Return the text beside the count: time, limit and unused images."""
-        limit = moment.setup.limits.max_images
-        text = self.tr("at most {0} images").format(limit)
+        text = self.tr("at most {0} images").format(moment.setup.limits.max_images)
         if moment.setup.is_recording:
             text = self._read(moment) if moment.state.phase in ENDED else ""
             text = text or self.tr("recorded images")
+        elif moment.state.phase in ENDED:
+            text = ""
         n_dropped = sum(moment.state.n_dropped.values())
-        if n_dropped:
-            text = self.tr("{0}; {1} rejected").format(text, n_dropped)
-        why_more = self._why_more(moment)
-        return PARTED.join(filter(None, (self._time_left(moment), text, why_more)))
+        rejected = self.tr("{0} rejected").format(n_dropped) if n_dropped else ""
+        parts = self._time_left(moment), text, rejected, self._why_more(moment)
+        return PARTED.join(filter(None, parts))
 
     def _why_more(self, moment: SwingViewState) -> str:
         """Return why more images are to go than before."""

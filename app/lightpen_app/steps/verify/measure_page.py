@@ -13,7 +13,6 @@ from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen_app.look.quantities import number_text
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.verify.plan_panel import PlanPanel
@@ -40,10 +39,11 @@ class MeasurePresenter(VerifyPresenter):
             return value
         place = self._live_tip(status.setup, status.state)
         banner = replace(value.state, detail=place or value.state.detail)
-        if status.task is PART and PART.count is not None:  # the hint names the feature
-            options = status.setup.choices.options_of(PART)
+        if status.task is PART:  # the hint counts the points
             progress = status.state.progress(status.setup, PART)
-            value = replace(value, count=worded(PART.count(options, progress)))
+            is_planned = status.setup.choices.options_of(PART).plan is not None
+            count = self.tr("Feature {0} of {1}").format(progress.run, progress.n_runs)
+            value = replace(value, count=count if is_planned else "")
         return replace(value, state=banner)
 
     def _live_tip(self, setup: SessionSetup, state: SessionState) -> str:

@@ -300,6 +300,10 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk.select(0)
     limit = f"Radius error: {StationLimits().verification.radius}\u00a0mm"
     desk.until(lambda: limit in _words(desk))
+    assert "_" not in _words(desk)  # no name of a stored setting
+    desk.select(1)
+    desk.until(lambda: "supervisor password changed" in _words(desk))
+    assert "_" not in _words(desk)
 
 
 def test_a_server_that_cannot_be_reached_is_reported_without_the_password(

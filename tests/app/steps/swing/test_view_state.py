@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
 
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.reports.verdict import Grade, Verdict
 from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
@@ -193,6 +194,16 @@ def test_more_is_to_go_after_images_were_dropped() -> None:
 
     assert (before.n_images, after.n_images) == (4, 10)
     assert after.fraction < before.fraction
+
+
+def test_after_the_capture_no_limit_is_named_but_what_was_rejected(
+    words: SwingWords,
+) -> None:
+    done = replace(start_swing(SETUP), phase=Phase.VERDICT)
+    dropped = replace(done, n_dropped={next(iter(Reason)): 12})
+
+    assert words.note(moment(done)) == ""
+    assert words.note(moment(dropped)) == "12 rejected"
 
 
 def test_a_rise_that_is_no_chance_is_reported_with_its_reason(
