@@ -86,5 +86,6 @@ def test_without_a_plan_the_step_says_what_to_do(
     walker.click_step("Measure")
 
     walker.until_tells("No measuring plan is chosen.")
+    assert walker.says("Choose a plan")
     walker.click("Without a plan")
     walker.until_tells("Probe the feature F1: 0 of 8 points.")

@@ -111,7 +111,7 @@ class StepButton(Translated, QAbstractButton):
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leads to the page
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self._retranslate()
 

@@ -3035,6 +3035,10 @@
         <translation>用当前测头测量工件的要素。</translation>
     </message>
     <message>
+        <source>Choose a plan</source>
+        <translation>请选择测量计划</translation>
+    </message>
+    <message>
         <source>Nothing to measure</source>
         <translation>没有可测量的内容</translation>
     </message>

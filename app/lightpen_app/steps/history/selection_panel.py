@@ -66,9 +66,7 @@ class SelectionPanel(Translated, QWidget):
         self._report = PushButton()
 
         # Layout
-        layout = grid_layout(
-            self, spacing=(4 * GRID, GRID // 2), margins=(0, GRID, 0, 0)
-        )
+        layout = grid_layout(self, spacing=(GRID, GRID // 2), margins=(0, GRID, 0, 0))
         sides = zip(
             self._heads,
             (self._compared, self._scattered),

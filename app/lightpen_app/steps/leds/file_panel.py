@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QLabel, QWidget
 
 from lightpen.formats.pen_content import UNITS
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
@@ -73,14 +73,9 @@ class LedFilePanel(Translated, QWidget):
 
         # Layout
         layout = vertical_layout(self)
-        horizontal_layout(
-            layout,
-            self._label,
-            (self._path, 1),
-            self._save,
-            self._samples,
-            self._discover,
-        )
+        self._row = horizontal_layout(layout)
+        horizontal_layout(self._row, self._label, (self._path, 1), stretch=1)
+        horizontal_layout(self._row, self._save, self._samples, self._discover)
         layout.addWidget(self._units)
         horizontal_layout(
             layout,
@@ -103,6 +98,13 @@ class LedFilePanel(Translated, QWidget):
         self._question.declined.connect(self._on_declined)
 
         self._retranslate()
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Place the buttons below the path, or beside it."""
+        direction = QBoxLayout.Direction
+        self._row.setDirection(
+            direction.TopToBottom if narrow else direction.LeftToRight
+        )
 
     def value(self) -> str:
         """Return the path of the open file, not that being typed."""

@@ -159,6 +159,7 @@ class LedsPage(ResponsiveLayout, Page):
     def _use_room(self) -> None:
         """Put the pen in space between the others, or below them on a narrow page."""
         self._content.set_squeezed(not self._room.is_low)
+        self._file.set_narrow(self._room.is_narrow)
         if self._room.is_narrow:
             self._rows.addWidget(self._space)
         else:

@@ -41,9 +41,10 @@ class MeasurePresenter(VerifyPresenter):
         banner = replace(value.state, detail=place or value.state.detail)
         if status.task is PART:  # the hint counts the points
             progress = status.state.progress(status.setup, PART)
-            is_planned = status.setup.choices.options_of(PART).plan is not None
             count = self.tr("Feature {0} of {1}").format(progress.run, progress.n_runs)
-            value = replace(value, count=count if is_planned else "")
+            value = replace(value, count=count)
+            if status.setup.choices.options_of(PART).plan is None:
+                value = replace(value, count="", fraction=None)
         return replace(value, state=banner)
 
     def _live_tip(self, setup: SessionSetup, state: SessionState) -> str:
@@ -63,6 +64,10 @@ class MeasurePresenter(VerifyPresenter):
     @override
     def _purpose(self) -> str:
         return self.tr("Measure features of a part with the current tip.")
+
+    @override
+    def _missing(self) -> str:
+        return self.tr("Choose a plan")
 
     @override
     def _refused(self) -> str:

@@ -196,7 +196,7 @@ class VerifyPresenter(QObject):
             return Instruction(self.tr("Reading images"), hint)
         if status.refusal is not None:
             is_possible = status.tip is not None  # once the missing value is entered
-            short = self.tr("Enter the value") if is_possible else self._refused()
+            short = self._missing() if is_possible else self._refused()
             return Instruction(short, worded(status.refusal))
         if setup is None or state is None:
             return Instruction(self.tr("Wait"), self.tr("Reading the current tip."))
@@ -211,6 +211,9 @@ class VerifyPresenter(QObject):
         if status.is_paused:
             return Instruction(self.tr("Paused"), self.tr("Press Space to continue."))
         return Instruction(self._short(setup, state), worded(instruction(setup, state)))
+
+    def _missing(self) -> str:
+        return self.tr("Enter the value")
 
     def _refused(self) -> str:
         """Return the short text for a refusal."""
