@@ -95,6 +95,7 @@ class StartPage(ResponsiveLayout, Page):
         workbench.selection.changed.connect(self._on_selected)
         workbench.run.changed.connect(self._show_trial)
 
+        self._use_room()
         self._retranslate()
 
     @property
