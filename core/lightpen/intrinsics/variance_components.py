@@ -381,11 +381,14 @@ def _averaged(
     factor = max(clustering, 1.0)
     poses = _own(design, reduced, likeliest)[:, :N_POSE]
     off = x[:n_kept] - likeliest.x[:n_kept]
-    poses = poses - np.einsum("vpo,p->vo", reduced.solved[:, :n_kept, :N_POSE], off)
+    C = likeliest.covariance
+    moved = C[:, :n] @ np.linalg.solve(C[:n, :n], off[:n])  # with them the fields
+    moved[:n_kept] = off
+    poses = poses - np.einsum("vpo,p->vo", reduced.solved[..., :N_POSE], moved)
     state = moved_state(fitted.state, x[:n], poses)
     state = replace(state, offsets=fitted.state.offsets + x[n:].reshape(-1, 3))
     fields = tuple(
-        _field(design, reduced, likeliest, fitted, c, factor, off[:n])
+        _field(design, reduced, likeliest, fitted, c, factor, moved)
         if gain > SIGNIFICANT
         else None
         for c in range(len(state.cameras))
@@ -453,19 +456,17 @@ def _field(
     fitted: BoardFit,
     c: int,
     factor: float,
-    off: FloatArray,
+    moved: FloatArray,
 ) -> LensField:
     """Return the residual field of a lens, and the intrinsics' covariance beside it.
 
-    Its values are those that belong to intrinsics (and what else views share) that are
-    off by that from the solution.
+    Its values are moved from the solution.
 
     Its covariance is that of the image: an error of the field draws the intrinsics
     along, and most of it cancels.
     """
     at, own, field = design.of_field(c), fitted.of_intrinsics(c), design.fields[c]
-    C, n = solution.covariance, len(off)
-    values = solution.x[at] + C[at, :n] @ np.linalg.solve(C[:n, :n], off)
+    C, values = solution.covariance, solution.x[at] + moved[at]
     normal = reduced.normal + design.prior(solution.components)
     others = np.delete(np.arange(len(normal)), at)
     among = normal[np.ix_(others, others)]

@@ -197,3 +197,12 @@ def test_a_change_of_the_camera_is_in_the_scores_of_the_views_after_it(
     left, _ = rest.change(which[:, 0, 0, 0].astype(float))
     np.testing.assert_allclose(left[at], 0.0, atol=1e-6 * np.abs(score[at]).max())
     assert rest.clustering < found.scores.clustering
+
+
+def test_residuals_before_a_lens_with_a_field_are_those_of_noise(
+    make_views: MakeViews,
+) -> None:
+    views = make_views(n_views=10, noise=0.015)
+    found = fitted(through_field(views, 0.12, seed=101, length=250.0))
+
+    assert found.adjustment.rms == pytest.approx(0.015 * 2**0.5, rel=0.1)
