@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QApplication, QListWidget
 from tests.accepted_tip import Hold, accept_tip, leant
+from tests.app.room import scrolled_sideways
 from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.estimation.reports.verdict import Grade
@@ -20,6 +22,7 @@ from lightpen.verification.tasks.drift import DRIFT, VISIT_POINTS
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH
 from lightpen.verification.tasks.registry import TASKS
+from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 
@@ -50,6 +53,18 @@ def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
 def records(walker: "Walker") -> list[dict[str, Any]]:
     folder = walker.workbench.folder / SIMULATED / VERIFICATIONS
     return [json.loads(file.read_bytes()) for file in sorted(folder.glob("*.json"))]
+
+
+def test_every_task_has_room_in_a_window_of_1280_x_800(known: "Walker") -> None:
+    walker = known
+    walker.window.resize(QSize(1280, 800) - FRAME)
+    walker.click_step("Verify")
+    tasks = walker.window.page().findChild(QListWidget, "task_list")
+    assert isinstance(tasks, QListWidget)
+    for row in range(tasks.count()):
+        tasks.setCurrentRow(row)
+        QApplication.processEvents()
+        assert scrolled_sideways(walker.window.page()) == ()
 
 
 @pytest.mark.slow

@@ -51,6 +51,7 @@ LEAST_SIZE = QSize(104 * GRID, 60 * GRID)  # for the wizard; fits 1280 x 800 at 
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
 PAINTED_MS = 50  # from the first paint, which comes in parts, to what takes time
 OPTIONS = "options"  # cause of a notification
+ARROW_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
 KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)
 
 
@@ -304,6 +305,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._on_advance_pressed()
         elif key == Qt.Key.Key_PageUp:
             self.go_back()
+        elif key in ARROW_KEYS and self.page().hasFocus():  # after a click
+            self._focus_first(self.page())
+            focused = QApplication.focusWidget()
+            if focused is not None and focused is not self.page():
+                QApplication.sendEvent(focused, event)
         else:
             super().keyPressEvent(event)
 
@@ -482,7 +488,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         first = page.first_control()
         if self._last_input.is_pointer and not isinstance(first, QLineEdit):
             page.setFocus(Qt.FocusReason.OtherFocusReason)
-            return
+        else:
+            self._focus_first(page)
+
+    def _focus_first(self, page: Page) -> None:
+        first = page.first_control()
         if first is not None:
             first.setFocus(Qt.FocusReason.TabFocusReason)
             return

@@ -140,7 +140,7 @@ MESSAGES = {
     "articulation.off": "Location error {error:.4f} mm over all postures (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the point moves with the pen tilt.",
     "articulation.few-touches": "{posture} has {n_touches} usable points, {needed} are needed in each posture.",
     "drift.title": "Drift",
-    "drift.purpose": "Probe the cone before, between and after the other tasks",
+    "drift.purpose": "Probe the cone between the other tasks",
     "drift.first": "Probe the cone upright",
     "drift.table": "Moves of the drift reference / mm",
     "drift.axis": "U {axis}",

@@ -3407,7 +3407,7 @@
         <translation>正在读取该光笔的摆动。</translation>
     </message>
     <message>
-        <source>Two accepted swings of pen {0} with this LED file are needed; there are {1}.</source>
+        <source>Two accepted swings of pen {0} with this LED file are needed; so far: {1}.</source>
         <translation>需要光笔 {0} 用此 LED 文件的两次已接受摆动；现有 {1} 次。</translation>
     </message>
     <message>
@@ -6373,8 +6373,8 @@ mm</translation>
         <translation>触测锥孔</translation>
     </message>
     <message>
-        <source>Probe the cone before, between and after the other tasks</source>
-        <translation>在其他任务之前、之间和之后触测锥孔</translation>
+        <source>Probe the cone between the other tasks</source>
+        <translation>在其他任务之间触测锥孔</translation>
     </message>
     <message>
         <source>Probe the cone five times in each of five postures</source>

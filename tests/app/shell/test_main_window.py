@@ -410,6 +410,9 @@ def test_after_a_click_a_new_page_frames_no_control_until_tab_is_pressed(
     assert QApplication.focusWidget() is page
     press(Key.Key_Tab)
     assert page.field.hasFocus()
+    page.setFocus()
+    press(Key.Key_Down)
+    assert page.field.hasFocus()
 
     QTest.keyClick(handle, Key.Key_PageUp)
     assert shell.pages[0].field.hasFocus()

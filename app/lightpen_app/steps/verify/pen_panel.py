@@ -88,7 +88,7 @@ class PenPanel(Translated, QWidget):
             (self._label, 1, Qt.AlignmentFlag.AlignTop),
             (self._use, 0, Qt.AlignmentFlag.AlignTop),
         )
-        fill(layout, self._head, self._table, (self._plot, 1))
+        fill(layout, self._head, self._table, (self._plot, 100), 1)
 
         # Connections
         self._improve.clicked.connect(self._on_improve_clicked)
@@ -274,8 +274,7 @@ class PenPanel(Translated, QWidget):
         if self._shown is None:
             return StatusMessage(self.tr("Reading the swings of the pen."), Sign.WAIT)
         text = self.tr(
-            "Two accepted swings of pen {0} with this LED file are needed; there are "
-            "{1}."
+            "Two accepted swings of pen {0} with this LED file are needed; so far: {1}."
         )
         pen, n_swings = shortened(self._shown.names.pen), len(self._shown.swings)
         return StatusMessage(text.format(pen, n_swings), Sign.RING)

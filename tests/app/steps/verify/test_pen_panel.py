@@ -58,7 +58,7 @@ def test_what_comes_of_the_pen_before_is_not_shown_for_the_next_one(
     QCoreApplication.processEvents()
 
     assert words(panel) == (
-        "Two accepted swings of pen LP-05 with this LED file are needed; there are 0."
+        "Two accepted swings of pen LP-05 with this LED file are needed; so far: 0."
     )
 
 
@@ -72,6 +72,10 @@ def test_swings_are_said_to_be_read_only_as_long_as_they_are(
     QThreadPool.globalInstance().waitForDone()
     QCoreApplication.processEvents()
     assert words(panel).startswith("Two accepted swings")
+    panel.resize(900, 400)  # the words stay with their sign, not in the middle
+    verdict = panel.findChild(SignLabel)
+    assert isinstance(verdict, SignLabel)
+    assert verdict.height() <= verdict.heightForWidth(verdict.width())
 
     workbench.selection.set_preparation(
         replace(workbench.selection.preparation, pen_file=None)
