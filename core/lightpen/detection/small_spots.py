@@ -2,31 +2,19 @@
 
 A disc less than some 20 px wide with a blur of 1.5 px is a bell, not a plateau with a
 rim. Reflections on the board and bloom reach into its foot, so its outline near the
-background shows neither its centre nor whether it is whole. Three estimators measure it
-in its own window:
-
-* the **grey centroid** in a Gaussian window 0.75 half-level radii wide, iterated until
-  it stays in the middle of its window [1]_, for light with nothing beside it;
-* the **Gaussian fit**, the same in a window of 0.45 or 0.55 radii: the place of the
-  Gaussian that correlates most with the light. It hardly sees what lies beside the LED;
-* the **edge**, the centroid of the soft-thresholded disc, for LEDs wide enough to have
-  one and for saturated ones.
-
-How far the first two differ shows the foreign light of an image, and which of them
-errs least. The edge is taken at several heights. The more of the rim it uses, the less
-noise it has; the nearer to the foot, the more foreign light. The lowest one that agrees
-with all above it, within their noise, is taken [2]_.
+background shows neither its centre nor whether it is whole. A **windowed centroid**, in
+a Gaussian window 0.45 half-level radii wide, iterated until it stays in the middle of
+its window [1]_, is little disturbed by what lies beside the LED. From there a blurred
+disc is fitted (`lightpen.detection.disc_fit`).
 
 The part of the window that is odd under a point reflection about the centre holds all
-noise and none of a symmetric LED: it gives the standard deviation of the centre, and
-shows LEDs that are partly hidden or merge with something.
+noise and none of a symmetric LED: it shows LEDs that are partly hidden or merge with
+something.
 
 References
 ----------
 .. [1] E. Bertin, S. Arnouts, "SExtractor: software for source extraction", Astronomy
    and Astrophysics Supplement 117 (1996) 393-404; its manual has windowed centroids.
-.. [2] O. V. Lepskii, "On a problem of adaptive estimation in Gaussian white noise",
-   Theory of Probability and its Applications 35 (1991) 454-466.
 """
 
 from dataclasses import dataclass
@@ -36,27 +24,23 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
+from lightpen.detection.disc_fit import fit_discs
 
 LARGEST_RADIUS = 12.0  # px, half-level, of a spot that is measured here
 REACH = 2.5  # half-level radii, and
-MORE_REACH = 1.0  # px, from the centre to the border of a window
+MORE_REACH = 4.0  # px, from the centre to the border of a window
 BACKGROUND_QUANTILE = 0.1
-FOOT, HEAD = 0.25, 0.75  # heights between which the half-level area is counted
+FOOT, HEAD = 0.25, 0.75  # heights between which the area of tiny spots is counted
+BELOW, ABOVE = 0.45, 0.55  # and of others, which light at their feet may join
 
-WIDE, MIDDLE, NARROW = 0.75, 0.55, 0.45  # half-level radii, standard deviation
+MIDDLE, NARROW = 0.55, 0.45  # half-level radii, standard deviation
 LEAST_WINDOW = 1.1  # px
 ROUNDS = 10
-FARTHEST = 0.5  # half-level radii, of a centre from its start
+FARTHEST = 0.5  # half-level radii, of a centre from its start, and
+FAR = 0.2  # of one that is not clipped; others have 0.06
 
-LITTLE, MUCH = 0.012, 0.022  # px, median difference of two windows: foreign light
-LEAST_EDGE = 4.0  # px, half-level radius from which the edge is better than windows
-EDGES = ((0.5, 0.95), (0.4, 0.9), (0.3, 0.9), (0.2, 0.9), (0.1, 0.9))  # heights
-AGREEING = 5.0  # standard deviations of the higher of two edges
-MOST_BESIDE = 0.15  # radii, of an edge from the windowed centre
 SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
 
-SHARES = (0.1, 0.6)  # of that difference: the errors of edges, and of windows
-SPREAD = 1.3  # half-level radii in a standard deviation of the light
 INTERPOLATED = 1.4  # noise of a pixel over that between pixels, by bilinear weights
 LONGEST = 4.0  # times as long as wide, of a spot
 NEAR = 0.5  # radii, of a place that may be brighter than the middle of a region
@@ -91,8 +75,8 @@ class SmallSpots:
         Standard deviation of one coordinate of each centre, px.
     noises : (N,) array
         Standard deviation of a pixel beside the centre, digital numbers.
-    lopsided : (N,) array
-        Odd part of the light over all of it: noise only for a whole LED.
+    are_whole : (N,) array
+        Whether the LED is neither hidden nor merged.
     saturated : (N,) array
         Whether the light is clipped.
     alone : (N,) array
@@ -105,14 +89,9 @@ class SmallSpots:
     peaks: FloatArray
     sigmas: FloatArray
     noises: FloatArray
-    lopsided: FloatArray
+    are_whole: BoolArray
     saturated: BoolArray
     alone: BoolArray
-
-    @property
-    def are_whole(self) -> BoolArray:
-        """Whether the LED is neither hidden nor merged, by the fit windows."""
-        return np.asarray(self.lopsided < LOPSIDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,32 +130,24 @@ def measure_small(
     radii = np.minimum(radii, LARGER * np.median(radii))
     windows = _windows(image, _brightest(image, centers, radii), radii)
     saturated = windows.peaks >= SATURATED_PEAK * full_scale
-    narrow = _windowed(windows, np.zeros_like(centers), NARROW)
-    wide = _windowed(windows, narrow, WIDE)
-    clear = ~saturated | (saturated.mean() > 0.5)
-    gaps = np.linalg.norm(wide - narrow, axis=1)
-    foreign = float(np.median(gaps[clear]))
-    grade = 0 if foreign < LITTLE else 1 if foreign < MUCH else 2
-    width = (WIDE, MIDDLE, NARROW)[grade]
-    found = _windowed(windows, narrow, width)
+    narrow = _windowed(windows, np.zeros_like(centers))
+    clipped = SATURATED_PEAK * full_scale - (windows.peaks - windows.tops)
+    fits = fit_discs(windows.light, narrow, windows.radii, clipped)
+    gaps = np.linalg.norm(fits.centers - narrow, axis=1)
+    is_near = gaps < np.where(saturated, FARTHEST, FAR) * windows.radii
+    found = np.where(is_near[:, None], fits.centers, narrow)
+    sigmas = np.sqrt((fits.sigmas**2 + np.median(fits.sigmas) ** 2) / 2)
+    sigmas = np.where(is_near, sigmas, windows.radii)
     odd = _odd_parts(windows, narrow)
-    sigmas = _window_sigmas(windows, odd, width)
-    edges, edge_sigmas = _lowest_edges(windows, narrow, odd)
-    beside = np.linalg.norm(edges - narrow, axis=1) / windows.radii
-    is_edge = (saturated | (windows.radii > LEAST_EDGE)) & (beside < MOST_BESIDE)
-    found[is_edge], sigmas[is_edge] = edges[is_edge], edge_sigmas[is_edge]
-    sigmas = np.sqrt((sigmas**2 + np.median(sigmas) ** 2) / 2)
-    if grade:
-        sigmas = np.hypot(sigmas, np.where(is_edge, *SHARES) * foreign)
     noises, lopsided = _asymmetry(windows, odd)
     return SmallSpots(
-        centers=windows.middles + found,
+        centers=np.asarray(windows.middles + found),
         shapes=_shapes(windows, narrow),
         radii=windows.radii,
         peaks=windows.tops,
         sigmas=sigmas,
         noises=noises,
-        lopsided=lopsided,
+        are_whole=is_near & (lopsided < LOPSIDED),
         saturated=saturated,
         alone=_are_alone(windows, narrow),
     )
@@ -240,10 +211,11 @@ def _windows(image: Image, centers: FloatArray, radii: FloatArray) -> _Windows:
     light -= background[:, None, None]
     tops = np.maximum(peaks - background, 1.0)
     heights = light / tops[:, None, None]
-    soft = np.clip((heights - FOOT) / (HEAD - FOOT), 0, 1)
+    soft = np.clip((heights - BELOW) / (ABOVE - BELOW), 0, 1)
     radii = np.sqrt(_about_the_middles(soft).sum(axis=(1, 2)) / np.pi)
     # What is larger by far has a neighbour in its half-level area.
-    radii = np.clip(radii, LEAST_WINDOW, LARGER * max(np.median(radii), LEAST_WINDOW))
+    usual = max(float(np.median(radii)), LEAST_WINDOW)
+    radii = np.clip(radii, LEAST_WINDOW, LARGER * usual)
     return _Windows(light, middles, radii, tops, peaks)
 
 
@@ -267,11 +239,11 @@ def _weights(
     return away, np.exp(-0.5 * away**2 / variances[:, None, None]), variances
 
 
-def _windowed(windows: _Windows, starts: FloatArray, width: float) -> FloatArray:
+def _windowed(windows: _Windows, starts: FloatArray) -> FloatArray:
     """Return the centroids that lie in the middle of their Gaussian windows, (N, 2)."""
     at, farthest = starts, FARTHEST * windows.radii[:, None]
     for _ in range(ROUNDS):
-        away, weights, _ = _weights(windows, at, width)
+        away, weights, _ = _weights(windows, at, NARROW)
         over_rows = np.einsum("nyx,ny->nx", windows.light, weights[:, 1])
         over_columns = np.einsum("nyx,nx->ny", windows.light, weights[:, 0])
         weighted = np.stack([over_rows, over_columns], axis=1) * weights
@@ -325,55 +297,6 @@ def _odd_parts(windows: _Windows, at: FloatArray) -> FloatArray:
         there = cv2.getRectSubPix(light.astype(np.float32), size, (half + x, half + y))
         odd[i] = INTERPOLATED * (there - there[::-1, ::-1]) / np.sqrt(2)
     return odd
-
-
-def _window_sigmas(windows: _Windows, odd: FloatArray, width: float) -> FloatArray:
-    """Return the standard deviations of centres in Gaussian windows, (N,), px."""
-    away, weights, variances = _weights(windows, np.zeros((len(odd), 2)), width)
-    both = weights[:, 1, :, None] * weights[:, 0, None, :]
-    lever = away[:, 1, :, None] ** 2 + away[:, 0, None, :] ** 2
-    squares = 0.5 * np.einsum("nyx,nyx,nyx->n", both**2, lever, odd**2)
-    amounts = np.maximum(np.einsum("nyx,nyx->n", both, windows.light), 1e-9)
-    spread = (windows.radii / SPREAD) ** 2
-    return np.asarray(np.sqrt(squares) / amounts * (1 + spread / variances))
-
-
-def _lowest_edges(
-    windows: _Windows, at: FloatArray, odd: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return centres by the lowest edges that agree with all higher ones, and sigmas.
-
-    (N, 2), px from the middle, and (N,), px; NaN without an edge.
-    """
-    centers, sigmas = _edges(windows, at, odd, EDGES[0])
-    higher = [(centers, np.nanmedian(sigmas))]
-    agree = np.ones(len(at), dtype=bool)
-    for heights in EDGES[1:]:
-        lower, lower_sigmas = _edges(windows, at, odd, heights)
-        for other, sigma in higher:
-            agree &= np.linalg.norm(lower - other, axis=1) < AGREEING * sigma
-        centers = np.where(agree[:, None], lower, centers)
-        sigmas = np.where(agree, lower_sigmas, sigmas)
-        higher.append((lower, np.nanmedian(lower_sigmas)))
-    return centers, sigmas
-
-
-def _edges(
-    windows: _Windows, at: FloatArray, odd: FloatArray, heights: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return the centres by an edge, px, and sigmas, as above."""
-    low, high = heights
-    soft = windows.light / windows.tops[:, None, None]
-    soft = _about_the_middles(np.clip((soft - low) / (high - low), 0, 1))
-    areas = soft.sum(axis=(1, 2))
-    areas = np.where(areas < 1, np.nan, areas)
-    sums = np.stack([soft.sum(axis=1), soft.sum(axis=2)], axis=1)
-    squares = (windows.places - at[:, :, None]) ** 2
-    lever = squares[:, 1, :, None] + squares[:, 0, None, :]
-    grey = (soft > 0) & (soft < 1)
-    noise = np.sqrt(0.5 * np.sum(lever * odd**2, axis=(1, 2), where=grey))
-    sigmas = noise / ((high - low) * windows.tops * areas)
-    return sums @ windows.places / areas[:, None], sigmas
 
 
 def _asymmetry(windows: _Windows, odd: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -41,7 +41,7 @@ NumberArray = TypeVar("NumberArray", FloatArray, IntArray)
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
-MAX_REGIONS = 256  # examined in one image
+MAX_REGIONS = 1024  # examined in one image
 MAX_CONTOURS = 4000
 
 MOVED = 0.5  # of a spot's size; a hand that holds still trembles by less
@@ -55,6 +55,7 @@ LEVEL_OF_PEAK = 0.03  # far below an LED at a tenth of the brightest lamp
 LEVEL_STEP = 0.2  # from level to level, fraction of the height above the background
 LEVEL_STEP_OF_PEAK = 0.06  # at most
 MAX_LEVELS_AT_ONCE = 3  # while a region hardly shrinks
+HIDDEN = 2.0  # times as high above the background is light that faint light hides
 CROWDED = 0.03  # fraction of bright samples above which single ones are ignored
 TEXTURED = 0.08  # changes from sample to sample; there is no use in listing regions
 SPECK = np.ones((2, 2), np.uint8)  # regions that do not hold it are ignored
@@ -306,6 +307,12 @@ class _Survey:
     noise: float
     peak: float
 
+    def hides_light(self, box: PixelBox, level: float) -> bool:
+        """Return whether a region that is hardly brighter than a level holds more."""
+        window = self.image[box.top : box.bottom, box.left : box.right]
+        rise = level - self.background
+        return bool(window.max() > self.background + HIDDEN * rise)
+
     def higher(self, level: float) -> float:
         """Return the next level to search."""
         step = LEVEL_STEP * (level - self.background)
@@ -394,7 +401,10 @@ def _find_discs(
         if _is_too_large(scene, box):
             unclear.append((box, None))
         else:
-            measured += _measured(scene, box, level, 0.0, budget)
+            found = list(_measured(scene, box, level, 0.0, budget))
+            measured += found
+            if not found and scene.hides_light(box, level):
+                unclear.append((box, None))
     measured = with_rims(scene.image, measured, before)
     discs = [disc for disc in measured if disc.is_whole]
     unclear += [(disc.box, disc) for disc in measured if not disc.is_whole]
@@ -427,6 +437,8 @@ def _parted(
             blocks += _parted(scene, part, level, None, budget)
             continue
         found = list(_measured(scene, part, level, level, budget))
+        if not found and scene.hides_light(part, level):
+            blocks += _parted(scene, part, level, None, budget)
         for block in with_rims(scene.image, found):
             if block.is_whole:
                 blocks.append(block)
