@@ -79,7 +79,9 @@ class StartPage(ResponsiveLayout, Page):
         # Connections
         setup.names.station_entered.connect(self.show_missing_input)
         setup.limits.all_requested.connect(self._all_limits.open)
-        setup.newcomer.trial_requested.connect(self._on_trial_requested)
+        setup.newcomer.trial_requested.connect(
+            lambda: self._chosen_files.use_trial(self._begin_trial)
+        )
         setup.folder.change_requested.connect(self.data_folder_requested)
         setup.done.connect(self.show_day)
         self._day.setup_requested.connect(self.show_setup)
@@ -230,9 +232,6 @@ class StartPage(ResponsiveLayout, Page):
         if not before.names.station and not now.start_missing_inputs():
             self.show_day()  # the station is known from before
         self._refresh()
-
-    def _on_trial_requested(self) -> None:
-        self._chosen_files.use_trial(self._begin_trial)
 
     def _begin_trial(self) -> None:
         if not self._camera.live.is_open:
