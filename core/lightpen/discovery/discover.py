@@ -14,12 +14,17 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.discovery.found import Discovery, discovery_of
-from lightpen.discovery.hypotheses import Hypothesis, solve_seed
+from lightpen.discovery.hypotheses import (
+    Hypothesis,
+    require_one_focal_length,
+    solve_seed,
+)
 from lightpen.discovery.labelling import Labelled, label, pixels_of
 from lightpen.discovery.numbering import number_by_sketch
 from lightpen.discovery.observing import labelled_observations
 from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import (
+    SECOND_PEN,
     require_certain,
     require_enough,
     require_length,
@@ -35,9 +40,9 @@ from lightpen.discovery.scaled_start import (
     scaled_start,
 )
 from lightpen.discovery.sightings import Report, Sightings
-from lightpen.discovery.starts import any_covariance, scaled_to
+from lightpen.discovery.starts import Start, any_covariance, scaled_to, turn_sigmas
 from lightpen.discovery.touched_length import with_touched_length
-from lightpen.discovery.tracks import find_lamps, follow, without_lamps
+from lightpen.discovery.tracks import Pieces, find_lamps, follow, without_lamps
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import calibrate
@@ -45,7 +50,14 @@ from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
-NOT_SETTLED = ("bundle.not-settled", "joint.not-settled")
+NOT_SETTLED = (
+    "bundle.not-settled",
+    "joint.not-settled",
+    "calibrate.leds-do-not-fit",
+    "calibrate.leds-do-not-fit-nor-tip",
+)
+TYPICAL = 0.05  # px, noise of a centre
+WEAK = 0.01  # rad: the turn of a flat pen seen from the front, that does not settle
 SLIPPED = 0.03  # of the images, that are left out after a slip
 
 
@@ -62,6 +74,7 @@ class _Swing:
     sightings: Sightings
     centers: tuple[FloatArray, ...]
     kept: tuple[IntArray, ...]
+    pieces: Pieces
     found: Labelled
     hypotheses: tuple[Hypothesis, ...]
     n_lamps: int
@@ -136,7 +149,13 @@ def _adjusted(
         if request.camera is not None:
             raise CalibrationError("discover.other-camera") from error
         if second is None:
-            raise
+            seen = pixels[swing.found.images]
+            weak = turn_sigmas(Start(start, TYPICAL), seen) > WEAK
+            if is_cleared or not weak.any():
+                require_one_focal_length(swing.pieces, sightings.size, request.camera)
+                raise CalibrationError("discover.not-settled") from error
+            firm = replace(swing, found=_of_images(swing.found, ~weak))
+            return _adjusted(firm, request, report, is_cleared=True)
         distance = second.separation.distance
         raise CalibrationError(
             "discover.cones-not-settled", distance=distance
@@ -176,7 +195,9 @@ def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _
     report(0.4)
     found = label(seed, joined, certain, centers, width)
     require_no_second_pen(found)
-    return _Swing(sightings, centers, kept, found, seed.hypotheses, len(lamps))
+    if np.median(found.unexplained.sum(axis=1)) >= SECOND_PEN:
+        require_one_focal_length(joined, sightings.size, request.camera)
+    return _Swing(sightings, centers, kept, joined, found, seed.hypotheses, len(lamps))
 
 
 def _of_images(found: Labelled, some: BoolArray) -> Labelled:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.discovery.factorisation import WeakShape, factorise, filled_tracks
 from lightpen.discovery.starts import (
     CameraPrior,
@@ -18,6 +19,7 @@ from lightpen.discovery.starts import (
     adjust_start,
     any_camera,
     focal_length_of,
+    focal_sigma,
     free_focal_length,
     held_camera,
     ideal_camera,
@@ -31,8 +33,9 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
 USUAL_FOCAL = 1.7  # image widths, where the shape shows none
+FOCAL_LENGTHS = (1.0, 1.7, 3.0)  # image widths, of cameras
 # Parts of the images, and what is assumed of the depth of a shape; in turn, until one
-# fits.
+# fits well: first with the focal length that the shape implies, then with several.
 ATTEMPTS = (
     (0.0, 1.0, 1e-6),
     (0.0, 1.0, 0.2),
@@ -44,10 +47,20 @@ ATTEMPTS = (
     (0.0, 0.67, 0.5),
     (0.25, 0.75, 1e-6),
 )
+# A flat pen shows depth by perspective alone, and has wrong starts that nearly fit.
+MORE_ATTEMPTS = (
+    (0.17, 0.83, 1e-6),
+    (0.33, 0.67, 1e-6),
+    (0.0, 0.33, 1e-6),
+    (0.67, 1.0, 1e-6),
+    (0.33, 1.0, 1e-6),
+    (0.33, 1.0, 0.2),
+)
 SHORTEST, LONGEST = 0.3, 12.0  # image widths, of a focal length that may be
 MIN_PIECES = 5  # of a part of the swing to begin with
 MIN_IMAGES = 25
 PRESENT = 0.7  # share of a part's images in which a piece is seen
+SHOWN = 0.3  # the same, of a part of these
 N_BOUNDS = 25  # images between which parts are sought
 N_USED = 80  # images of a part that are adjusted
 UNIT = 100.0  # mm: the largest distance of two LEDs, until a length is known
@@ -55,7 +68,9 @@ POINT = 1e-3  # mm: radius of a disc before the size is known
 ROUGH, FINER = 2.0, 0.5  # px: noise that residuals are measured by at first
 PROMISING = 30.0  # times the least misfit, within which all of the camera is adjusted
 FITTING = 0.7  # px: a start that fits
+WELL = 0.1  # px: one after which no other is sought
 ALIKE = 0.02  # of the pen's size, within which two shapes are one
+END, ENDS_APART = 1 / 6, 4.0  # of the images, and standard deviations
 APART = 0.2  # of the misfit of all, allowed for a part of them alone
 DECIDED = 2.0  # times the misfit of the best that the mirrored one must have
 
@@ -93,12 +108,15 @@ class Seed:
     start : Start
         LED j is that of ``pieces[j]``.
     hypotheses : tuple of Hypothesis
+    margin : float
+        Least misfit of another shape in the same images, times that of the start.
     """
 
     images: IntArray
     pieces: IntArray
     start: Start
     hypotheses: tuple[Hypothesis, ...]
+    margin: float
 
 
 def solve_seed(
@@ -120,14 +138,12 @@ def solve_seed(
     """
     images, chosen = _best_part(pieces)
     seed = _solved(pieces, images, chosen, size, known)
-    others = [h.misfit for h in seed.hypotheses if not h.is_best]
-    is_decided = min(others, default=np.inf) >= DECIDED * seed.start.sigma
     fits = seed.start.sigma <= FITTING
-    if fits and is_decided:
+    if fits and seed.margin >= DECIDED:
         return seed
     if not fits:
+        require_one_focal_length(pieces, size, known, APART * seed.start.sigma)
         _require_one_pen(pieces, seed, size, known)
-    _require_one_camera(pieces, seed, size, known)
     if fits:
         raise CalibrationError("discover.mirror-undecided")
     raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
@@ -142,60 +158,70 @@ def _solved(
 ) -> Seed:
     """Return the best of all hypotheses for a part of a swing.
 
-    Where none fits, smaller parts and other depths of the shape are tried.
+    Where none fits well, smaller parts, other depths of the shape and other focal
+    lengths are tried.
     """
+    given = [focal * size[0] for focal in FOCAL_LENGTHS]
+    attempts = [(*each, list[float]()) for each in ATTEMPTS]
+    attempts += [(*each, given) for each in MORE_ATTEMPTS]
     tried: list[Seed] = []
-    for first, last, least_metric in ATTEMPTS:
+    for first, last, least_metric, focal_lengths in attempts:
         n = len(images)
         part = images[int(first * n) : int(last * n)]
-        if tried and len(part) < MIN_IMAGES:
+        shown = (pieces.spots[np.ix_(part, chosen)] >= 0).mean(axis=0)
+        own = chosen[shown >= SHOWN]
+        if len(own) < MIN_PIECES or (tried and len(part) < MIN_IMAGES):
             continue
-        seed = _attempted(pieces, part, chosen, size, known, least_metric)
+        pixels = pieces.pixels[np.ix_(part, own)]
+        used = np.unique(np.linspace(0, len(part) - 1, N_USED).astype(int))
+        shape = factorise(pixels, least_metric)
+        shape = shape._replace(
+            rotations=shape.rotations[used],
+            scales=shape.scales[used],
+            centroids=shape.centroids[used],
+        )
+        trial = _Trial(pixels[used], size, known)
+        seed = _attempted(trial, shape, part[used], own, focal_lengths)
         if seed is not None:
             tried.append(seed)
-            if seed.start.sigma < FITTING:
+            if seed.start.sigma < WELL and seed.margin >= DECIDED:
                 break
     if not tried:
         raise CalibrationError("discover.no-start")
-    best = min(tried, key=lambda each: each.start.sigma)
+    least = min(seed.start.sigma for seed in tried)
+    near = [seed for seed in tried if seed.start.sigma <= DECIDED * least]
+    decided = [seed for seed in near if seed.margin >= DECIDED]
+    best = min(decided or near, key=lambda seed: seed.start.sigma)
     others = [each for seed in tried if seed is not best for each in seed.hypotheses]
     failed = tuple(replace(each, is_best=False) for each in others)
     return replace(best, hypotheses=best.hypotheses + failed)
 
 
 def _attempted(
-    pieces: Pieces,
+    trial: "_Trial",
+    shape: WeakShape,
     images: IntArray,
     chosen: IntArray,
-    size: tuple[int, int],
-    known: Camera | None,
-    least_metric: float,
+    focal_lengths: Sequence[float],
 ) -> Seed | None:
-    """Return the better of both mirror images; None without a focal length."""
-    pixels = pieces.pixels[np.ix_(images, chosen)]
-    shape = factorise(pixels, least_metric)
-    used = np.unique(np.linspace(0, len(images) - 1, N_USED).astype(int))
-    shape = shape._replace(
-        rotations=shape.rotations[used],
-        scales=shape.scales[used],
-        centroids=shape.centroids[used],
-    )
-    trial = _Trial(pixels[used], size, known)
-    both = ((False, shape), (True, shape.mirrored))
-    # The mirrored shape has the same focal length, but for its sign.
-    focal = abs(focal_length_of(shape)) if known is None else known.fx
-    if known is None and focal < SHORTEST * size[0]:
-        focal = USUAL_FOCAL * size[0]
-    tried: list[tuple[Hypothesis, Start]] = []
-    for mirrored, each in both:
-        tried += trial.starts(each, [focal], mirrored=mirrored)
+    """Return the best of both mirror images; None without a focal length."""
+    if trial.known is not None:
+        focal_lengths = [trial.known.fx]
+    elif not focal_lengths:
+        # The mirrored shape has the same focal length, but for its sign.
+        focal, width = abs(focal_length_of(shape)), trial.size[0]
+        focal_lengths = [focal if focal >= SHORTEST * width else USUAL_FOCAL * width]
+    tried = trial.starts(shape, focal_lengths, mirrored=False)
+    tried += trial.starts(shape.mirrored, focal_lengths, mirrored=True)
     if not tried:
         return None
     _, start = min(tried, key=lambda pair: pair[0].misfit)
     hypotheses = tuple(
         replace(each, is_best=_are_alike(other, start)) for each, other in tried
     )
-    return Seed(images[used], chosen, start, hypotheses)
+    others = [each.misfit for each in hypotheses if not each.is_best]
+    margin = min(others, default=np.inf) / max(start.sigma, NOISE_FLOOR)
+    return Seed(images, chosen, start, hypotheses, margin)
 
 
 def _are_alike(one: Start, other: Start) -> bool:
@@ -237,23 +263,45 @@ def _require_one_pen(
             raise CalibrationError("discover.two-pens", n_others=n_others)
 
 
-def _require_one_camera(
-    pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
+def require_one_focal_length(
+    pieces: Pieces,
+    size: tuple[int, int],
+    known: Camera | None,
+    most_misfit: float = FITTING,
 ) -> None:
-    """Refuse a swing whose parts fit alone, with focal lengths of their own."""
-    n_images = seed.images[-1] + 1
-    images = np.arange(seed.images[0], n_images)
-    shown = (pieces.spots[np.ix_(images, seed.pieces)] >= 0).sum(axis=1)
-    images = images[shown >= min(4, len(seed.pieces))]
-    if len(images) < 2 * MIN_IMAGES:
-        return
-    parts = [  # the change is somewhere between them
-        _solved(pieces, part, seed.pieces, size, known)
-        for part in (images[:MIN_IMAGES], images[-MIN_IMAGES:])
-    ]
-    if all(part.start.sigma < APART * seed.start.sigma for part in parts):
-        first, second = (part.start.state.rig.cameras[0].fx for part in parts)
-        raise CalibrationError("discover.camera-changed", first=first, second=second)
+    """Refuse a swing whose ends fit alone, with focal lengths of their own.
+
+    Parameters
+    ----------
+    most_misfit : float
+        Of ends that fit, px.
+    """
+    n = len(pieces.spots)
+    n_end = max(MIN_IMAGES, int(END * n))
+    focal_lengths, sigmas = [], []
+    for end in (slice(0, n_end), slice(n - n_end, n)):  # it changed in between
+        part = Pieces(pieces.pixels[end], pieces.spots[end])
+        try:
+            seed = _solved(part, *_best_part(part), size, known)
+        except CalibrationError:
+            return
+        if seed.start.sigma > most_misfit:
+            return
+        pixels = part.pixels[np.ix_(seed.images, seed.pieces)]
+        camera = seed.start.state.rig.cameras[0]
+        prior = camera_prior(camera, known)
+        leds = seed.start.state.pen.leds
+        apart = np.linalg.norm(leds[:, None] - leds, axis=2)
+        first, second = np.unravel_index(np.argmax(apart), apart.shape)
+        length = KnownLength(int(first), int(second), float(apart.max()), 1e-4 * UNIT)
+        focal_lengths.append(camera.fx)
+        sigmas.append(focal_sigma(seed.start, pixels, prior, (length,)))
+    first_focal, last_focal = focal_lengths
+    by_chance = ENDS_APART * float(np.linalg.norm(sigmas))
+    if abs(last_focal - first_focal) > by_chance:
+        raise CalibrationError(
+            "discover.camera-changed", first=first_focal, second=last_focal
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,8 +84,9 @@ def label(
     labels = search.labelled_spots()
     done = np.flatnonzero(search.solved)
     state = replace(search.state, rotations=search.rotations[done])
-    named = np.isin(np.arange(certain.spots.shape[1]), np.flatnonzero(search.led >= 0))
-    return Labelled(state, done, labels, (certain.spots >= 0) & ~named)
+    are_leds = (certain.spots[:, :, None] == labels[:, None]).any(axis=2)
+    unexplained = (certain.spots >= 0) & ~are_leds & (search.led < 0)
+    return Labelled(state, done, labels, unexplained)
 
 
 class _Search:

@@ -62,8 +62,10 @@ def require_enough(sightings: Sightings) -> None:
 
 
 def require_no_second_pen(found: Labelled) -> None:
-    """Refuse images in which more moves than one pen."""
-    n_others = int(np.median(found.unexplained.sum(axis=1)))
+    """Refuse images in which more moves beside a pen that is seen whole."""
+    n_leds = (found.spots >= 0).sum(axis=1)
+    is_whole = n_leds >= np.quantile(n_leds, 0.75)
+    n_others = int(np.median(found.unexplained[is_whole].sum(axis=1)))
     if n_others >= SECOND_PEN:
         raise CalibrationError("discover.two-pens", n_others=n_others)
 

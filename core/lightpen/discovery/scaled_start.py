@@ -128,7 +128,7 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
     turned, _ = fit_rigid(state.pen.leds, part.pen.leds)
     every = replace(part, rotations=state.rotations @ turned.T)
     prior = camera_prior(part.rig.cameras[0], known)
-    every = adjust_start(every, pixels, prior, 8, lengths).state
+    every = adjust_start(every, pixels, prior, 40, lengths).state
     pen, R, t = framed(every.pen, every.tip_pen, request.rough_leds)
     tip, rotations = R @ every.tip_pen + t, every.rotations @ R.T
     every = replace(every, pen=pen, tip_pen=tip, rotations=rotations)

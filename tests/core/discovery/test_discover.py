@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +14,18 @@ from tests.simulated_stations import (
 
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
+from lightpen.discovery.hypotheses import require_one_focal_length
+from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import require_sketched
 from lightpen.discovery.scale import MeasuredLength
-from lightpen.discovery.sightings import Sightings
+from lightpen.discovery.sightings import Sightings, sightings_of_centers
 from lightpen.discovery.starts import KnownLength
+from lightpen.discovery.tracks import Pieces
 from lightpen.errors import CalibrationError
+from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.simulator.swings import swing_from_postures
 
+DATA = Path(__file__).parents[2] / "data"
 N = 160  # images: 8 s, a little more than once round the cone
 STATION = random_station(6, n_images=N)
 SHORT = random_station(6, n_images=60)
@@ -286,3 +292,34 @@ def test_a_length_that_the_sketch_contradicts_is_refused() -> None:
         require_sketched([KnownLength(0, 1, apart + right, 0.01)], sketch)
         with pytest.raises(CalibrationError, match="file of the pen their distance"):
             require_sketched([KnownLength(0, 1, apart + wrong, 0.01)], sketch)
+
+
+@pytest.mark.slow
+def test_a_flat_pen_is_found_where_the_first_starts_only_nearly_fit() -> None:
+    """Simulated by a projection of its own; the true distances of the LEDs in mm."""
+    given = read_unlabelled_centers(DATA / "flat-pen-centers.csv")
+    seen = sightings_of_centers(
+        tuple(map(str, given.frames)), given.centers, (1280, 1024)
+    )
+    length = MeasuredLength(None, 165.0968, 0.001)
+
+    found = discover(seen, Request((length,), 10.0))
+
+    from_tip = np.sort(np.linalg.norm(found.pen.leds - found.tip_pen, axis=1))
+    true = [113.3888, 184.0272, 217.7966, 231.7566, 278.4132]
+    U = float(found.expanded_uncertainty.max())
+    assert U < 0.3
+    np.testing.assert_allclose(from_tip, true, atol=U)
+
+
+@pytest.mark.slow
+def test_ends_of_a_swing_show_a_zoom_though_an_led_is_missing_in_one() -> None:
+    pixels, size = STATION.pixels.copy(), STATION.camera.image_size
+    pixels[-40:, 0] = np.nan
+    spots = np.where(np.isfinite(pixels[..., 0]), np.arange(STATION.pen.n_leds), -1)
+    require_one_focal_length(Pieces(pixels, spots), size, None)
+
+    middle = np.array(size) / 2
+    pixels[N // 2 :] = middle + 1.05 * (pixels[N // 2 :] - middle)
+    with pytest.raises(CalibrationError, match="zoom"):
+        require_one_focal_length(Pieces(pixels, spots), size, None)
