@@ -8549,6 +8549,10 @@ mm</translation>
         <translation>LED 依次发光，间隔 {time}；结果已修正，其余部分计入 U。请同时点亮全部 LED，或在每次取图时保持光笔静止。</translation>
     </message>
     <message>
+        <source>The adjustment of pen and camera did not converge: the swing shows too little of them, or the zoom changed. Tilt the pen by 30 degrees in all directions, turn it about its axis, come closer to the camera, and lock the zoom.</source>
+        <translation>光笔与相机的平差未收敛：摆动对它们反映不足，或变焦发生了变化。请向各方向倾斜光笔 30 度，绕其轴线转动，靠近相机，并锁定变焦。</translation>
+    </message>
+    <message>
         <source>The archive has no entry of this station, so there is nothing to timestamp.</source>
         <translation>存档中没有本工位的记录，因此没有可加时间戳的内容。</translation>
     </message>
