@@ -34,7 +34,7 @@ from lightpen.intrinsics.uncertainty_map import moved_in_image
 from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
 from lightpen.messages import Message, message
-from lightpen.model.camera import Camera, LensModel
+from lightpen.model.camera import Camera
 from lightpen.model.quantiles import chi_square_quantile
 
 MAX_ROUNDS = 8
@@ -50,7 +50,7 @@ OTHER_CENTER = 0.005  # shift of the principal point, of that side
 OTHER_ASPECT = 0.002  # of fx/fy, relative
 OTHER_DISTORTION = 0.002  # of the distortion, rms over the image, of that side
 SIGMAS = 3.0
-TURNED = 0.2  # of the squared difference of two cameras, that turned images leave
+TURNED = 0.2  # of what two cameras remove of the squares, that turned images leave
 SKEW_ALONE = 0.8  # of the rms without a skew; a lens field hardly looks like one
 SHEARED = 0.01  # of the slope of the columns, first step
 MOST_SINGLE = 40  # views that are turned one by one
@@ -96,13 +96,18 @@ def explain(
     def consider(rms: float, cost: float, error: CalibrationError | None) -> None:
         found.append((n * np.log(max(rms, FINEST) ** 2) + cost, rms, error))
 
+    def error_of(groups: _Groups) -> CalibrationError:
+        if _are_turned(views, tolerances, groups, nothing):
+            return _turned_error(views, groups.which)
+        return _groups_error(views, groups)
+
     useless: CalibrationError | None = None
     if change is not None:
         order = np.arange(views.n_views)
         first = views.names.index(change.name) if change.name else views.n_views // 2
         parted = _two_cameras(views, tolerances, near, order >= first, rounds=0)
         if parted is not None and _differ(parted):
-            error = _groups_error(views, parted)
+            error = error_of(parted)
             if not change.name:
                 error = CalibrationError(message_on_change(change))
             cost = cost_of_camera + 2 * np.log(views.n_views)
@@ -117,7 +122,7 @@ def explain(
     elif groups and groups.rms > HALVED * nothing:
         groups = None  # what differs less is rather what the lens does
     if groups is not None and _differ(groups):
-        error = _groups_error(views, groups)
+        error = error_of(groups)
         consider(groups.rms, cost_of_camera + cost_of_groups, error)
         if apart is not None:
             useless = useless or error
@@ -184,17 +189,11 @@ def _differ(groups: _Groups) -> bool:
     return in_image > USELESS * max(one.image_size)
 
 
-def _known(groups: _Groups) -> FloatArray:
-    """Return the covariance of the difference of two cameras."""
-    at = groups.fits[0].of_intrinsics(0)
-    known = np.sum([fit.covariance[at, at] for fit in groups.fits], axis=0)
-    return np.asarray(known)
-
-
 def _are_two_cameras(groups: _Groups) -> bool:
     """Return whether more differs than zoom and focus of one camera may."""
     one, other = groups.cameras
-    longer, known = max(one.image_size), _known(groups)
+    longer, at = max(one.image_size), groups.fits[0].of_intrinsics(0)
+    known = np.sum([fit.covariance[at, at] for fit in groups.fits], axis=0)
     change, sigmas = other.intrinsics - one.intrinsics, np.sqrt(np.diag(known))
     shift = np.abs(change[2:4]) - SIGMAS * sigmas[2:4]
     aspect = abs(other.fx / other.fy / (one.fx / one.fy) - 1)
@@ -214,8 +213,6 @@ def _groups_error(views: Views, groups: _Groups) -> CalibrationError:
         which, one, other = ~which, other, one
     first = int(np.argmax(which))
     before, after = _setting(views, ~which, one), _setting(views, which, other)
-    if _are_turned(groups):
-        return _turned_error(views, which)
     if _are_two_cameras(groups):
         return CalibrationError("intrinsics.two-cameras", one=before, other=after)
     if which[first:].all():
@@ -239,16 +236,16 @@ def _setting(views: Views, which: BoolArray, camera: Camera) -> Message:
     )
 
 
-def _are_turned(groups: _Groups) -> bool:
-    """Return whether two cameras are one, its images turned by 180 degrees."""
-    one, other = groups.cameras
-    turned = one.intrinsics.copy()
-    turned[2:4] = np.array(one.image_size) - 1 - turned[2:4]
-    if one.lens is LensModel.BROWN:
-        turned[6:8] *= -1
-    off = other.intrinsics - np.stack([one.intrinsics, turned])
-    sizes = np.sum(off.T * np.linalg.solve(_known(groups), off.T), axis=0)
-    return bool(sizes[1] < TURNED * sizes[0])
+def _are_turned(
+    views: Views, tolerances: BoardTolerances, groups: _Groups, alone: float
+) -> bool:
+    """Return whether two cameras are one, its images turned by 180 degrees.
+
+    By what turning the images of the second leaves of the residuals of a single camera,
+    `alone`, px rms.
+    """
+    rms = _rms_by(_with_turned(views, groups.which), tolerances, groups.cameras[0])
+    return bool(rms**2 - groups.rms**2 < TURNED * (alone**2 - groups.rms**2))
 
 
 def _turned_error(views: Views, which: BoolArray) -> CalibrationError:
@@ -310,13 +307,7 @@ def _turned(
     views: Views, tolerances: BoardTolerances, near: Camera
 ) -> tuple[BoolArray, float] | None:
     """Return which images are turned by 180 degrees, and the rms with them so."""
-    size = np.array(views.image_sizes[0]) - 1.0
-    other = replace(views, pixels=size - views.pixels)
-
-    def turned(which: BoolArray) -> Views:
-        pixels = np.where(which[:, None, None, None], other.pixels, views.pixels)
-        return replace(views, pixels=pixels)
-
+    other = _with_turned(views, np.ones(views.n_views, dtype=np.bool_))
     which = np.zeros(views.n_views, dtype=np.bool_)
     found = _fitted(views, tolerances, near)
     for _ in range(MAX_ROUNDS):
@@ -326,15 +317,17 @@ def _turned(
         if np.array_equal(now, which):
             break
         which = now
-        found = _fitted(turned(which), tolerances, near)
+        found = _fitted(_with_turned(views, which), tolerances, near)
     # Views that the others pulled along are found one by one.
-    least = _rms_by(turned(which), tolerances, near)
+    least = _rms_by(_with_turned(views, which), tolerances, near)
     tried = np.arange(min(views.n_views, MOST_SINGLE))
     for turn in range(MAX_PASSES):
         if not tried.size:
             break
         trials = [which ^ (np.arange(views.n_views) == v) for v in tried]
-        sizes = [_rms_by(turned(trial), tolerances, near) for trial in trials]
+        sizes = [
+            _rms_by(_with_turned(views, trial), tolerances, near) for trial in trials
+        ]
         best = int(np.argmin(sizes))
         if sizes[best] >= ENOUGH * least:
             break
@@ -343,10 +336,19 @@ def _turned(
         tried = tried[order[: len(order) // 2] if turn == 0 else order]
     if which.sum() > views.n_views / 2:
         which = ~which
-    found = _fitted(turned(which), tolerances, near) if which.any() else None
+    found = (
+        _fitted(_with_turned(views, which), tolerances, near) if which.any() else None
+    )
     if found is None:
         return None
     return which, float(np.sqrt(np.nanmean(np.square(found.residuals))))
+
+
+def _with_turned(views: Views, which: BoolArray) -> Views:
+    """Return the views, some images of which are turned by 180 degrees."""
+    turned = np.array(views.image_sizes[0]) - 1.0 - views.pixels
+    pixels = np.where(which[:, None, None, None], turned, views.pixels)
+    return replace(views, pixels=pixels)
 
 
 def _best_groups(
