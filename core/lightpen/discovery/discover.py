@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.observations import Observations
 from lightpen.discovery.found import Discovery, discovery_of
 from lightpen.discovery.hypotheses import (
     Hypothesis,
@@ -20,6 +21,7 @@ from lightpen.discovery.hypotheses import (
     solve_seed,
 )
 from lightpen.discovery.labelling import Labelled, label, pixels_of
+from lightpen.discovery.lens_choice import pulled
 from lightpen.discovery.numbering import number_by_sketch
 from lightpen.discovery.observing import labelled_observations
 from lightpen.discovery.request import Request
@@ -45,9 +47,10 @@ from lightpen.discovery.touched_length import with_touched_length
 from lightpen.discovery.tracks import Pieces, find_lamps, follow, without_lamps
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
-from lightpen.model.camera import Camera
+from lightpen.formats.camera_checks import folds
+from lightpen.intrinsics.distortion import FOLDING, PULLS, Choice
 from lightpen.model.rigid import fit_rigid
 
 NOT_SETTLED = (
@@ -139,10 +142,9 @@ def _adjusted(
     observations = labelled_observations(
         sightings, start, swing.found.images, swing.numbers
     )
-    camera = _camera_to_adjust(start, request)
-    pen = with_lengths_known(start.pen, lengths)
+    start = replace(start, pen=with_lengths_known(start.pen, lengths))
     try:
-        calibration = calibrate(camera, pen, observations, second=second)
+        calibration, choice = _calibrated(start, choice, request, observations, second)
     except CalibrationError as error:
         if error.message.code not in NOT_SETTLED:
             raise
@@ -167,16 +169,11 @@ def _adjusted(
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(
-        *(calibration, lengths, request.rough_leds, second),
+        *(calibration, choice, lengths, request.rough_leds, second),
         is_relative=request.is_relative,
     )
     require_certain(discovery, sightings)
-    return replace(
-        discovery,
-        hypotheses=swing.hypotheses,
-        n_lamps=swing.n_lamps,
-        lens_choice=choice,
-    )
+    return replace(discovery, hypotheses=swing.hypotheses, n_lamps=swing.n_lamps)
 
 
 def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _Swing:
@@ -244,9 +241,30 @@ def _in_sightings(labels: IntArray, kept: Sequence[IntArray]) -> IntArray:
     return own
 
 
-def _camera_to_adjust(start: BundleState, request: Request) -> Camera:
-    """Return the camera of the file, or the one found with a covariance of any."""
-    if request.camera is not None:
-        return request.camera
-    camera = start.rig.cameras[0]
-    return replace(camera, covariance=any_covariance(camera))
+def _calibrated(
+    start: BundleState,
+    choice: Choice | None,
+    request: Request,
+    observations: Observations,
+    second: SecondSwing | None,
+) -> tuple[Calibration, Choice | None]:
+    """Return the calibration, and the choice of the lens model.
+
+    The camera is that of the file, or has the covariance of any, with the weakest
+    regularisation that does not fold the image; none where each does.
+    """
+    pen, camera = start.pen, start.rig.cameras[0]
+    if choice is None or request.camera is not None:
+        camera = request.camera or camera
+        return calibrate(camera, pen, observations, second=second), choice
+    given = choice.pull
+    pulls = PULLS if choice.n_coefficients in FOLDING else ()
+    stronger = [pull for pull in pulls if given is None or pull < given]
+    found = []
+    for pull in (given, *stronger):
+        of_any = replace(camera, covariance=any_covariance(camera))
+        near = of_any if pull is None else pulled(camera, pull)
+        found.append(calibrate(near, pen, observations, second=second))
+        if not folds(found[-1].bundle.state.rig.cameras[0]):
+            return found[-1], replace(choice, pull=pull)
+    return found[0], choice

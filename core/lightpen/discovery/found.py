@@ -102,6 +102,7 @@ class Discovery:
 
 def discovery_of(
     calibration: Calibration,
+    choice: Choice | None,
     lengths: tuple[KnownLength, ...],
     sketch: FloatArray | None,
     second: SecondSwing | None,
@@ -112,6 +113,8 @@ def discovery_of(
 
     Parameters
     ----------
+    choice : Choice or None
+        Of the lens model; None where the camera is known.
     sketch : (L, 3) array or None
         Rough LEDs in the frame that the pen is given, mm.
     second : SecondSwing or None
@@ -125,6 +128,8 @@ def discovery_of(
     by, axes = instrument_mixing(bundle), across_normals(state.pen.normals)
     covariance = instrument.covariance + by @ normals.covariance(of_turn) @ by.T
     at = instrument.parameters
+    if choice is not None:
+        covariance = choice.with_shrinkage(covariance, at.cameras[0].start)
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
     values, vectors = np.linalg.eigh(budget)
     beyond_fit = (vectors * np.maximum(values, 0.0)) @ vectors.T
@@ -160,6 +165,7 @@ def discovery_of(
         is_relative=is_relative,
         hypotheses=(),
         n_lamps=0,
+        lens_choice=choice,
     )
     return _in_frame(found, R, t)
 

@@ -120,7 +120,8 @@ def _refitted(
     for pull in (None, *(PULLS if n in FOLDING else ())):
         camera, prior = near, any_camera(near)
         if pull is not None:
-            camera, prior = _pulled(near, pull)
+            camera = pulled(near, pull)
+            prior = _prior(camera)
         state = replace(start.state, rig=rig_of(camera))
         found = adjust_start(state, pixels, prior, N_STEPS, lengths)
         if found.sigma > (1 - worth) * start.sigma:
@@ -130,16 +131,19 @@ def _refitted(
     return None
 
 
-def _pulled(near: Camera, pull: float) -> tuple[Camera, CameraPrior]:
-    """Return a camera, and a prior, with folding coefficients drawn towards 0."""
+def pulled(near: Camera, pull: float) -> Camera:
+    """Return a camera like no other, but for folding coefficients drawn towards 0."""
     folding = 4 + np.array(FOLDING[len(near.distortion)])
     values, covariance = near.intrinsics.copy(), any_covariance(near)
     values[folding] = 0.0
     covariance[folding, folding] = pull**2
-    camera = near.with_intrinsics(values)
-    return camera, CameraPrior(
-        any_camera(camera).intrinsics, CameraPrior.of(camera, covariance).information
-    )
+    return replace(near.with_intrinsics(values), covariance=covariance)
+
+
+def _prior(camera: Camera) -> CameraPrior:
+    assert camera.covariance is not None
+    known = CameraPrior.of(camera, camera.covariance).information
+    return CameraPrior(any_camera(camera).intrinsics, known)
 
 
 def _held_out(

@@ -195,9 +195,11 @@ def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
 
 
 def _remarks_on_camera(discovery: Discovery) -> list[Message]:
-    """Return what is to be said of the file of the camera, if there was one."""
-    if discovery.lens_choice is not None:
-        return []
+    """Return what is to be said of the lens found, or of the file of the camera."""
+    choice = discovery.lens_choice
+    if choice is not None:
+        drawn = message("discover.drawn-in", coefficients=choice.drawn_coefficients)
+        return [drawn] if choice.draws_in else []
     stated = discovery.calibration.bundle.unknowns.start.rig.cameras[0]
     sigma = USUAL.focal_length * stated.fx
     if stated.covariance is not None:

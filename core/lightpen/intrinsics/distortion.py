@@ -80,20 +80,23 @@ class Choice:
         """Whether the corners of the image are undetermined."""
         return self.pull is not None and self.pull != NO_K3
 
-    def with_shrinkage(self, covariance: FloatArray) -> FloatArray:
-        """Return the covariance of the intrinsics with what the pull may take away.
+    def with_shrinkage(self, covariance: FloatArray, first: int = 0) -> FloatArray:
+        """Return a covariance of the intrinsics with what the pull may take away.
 
         The estimate lies off by ``C L k`` where the pull has the information L and its
         coefficients in truth the values k, of a usual size.
 
         Parameters
         ----------
-        covariance : (4 + n, 4 + n) array
+        covariance : (q, q) array
             C, by the fit, for which the pull is a measurement.
+        first : int
+            Index of the intrinsics in it.
         """
         if self.pull is None or not self.draws_in:
             return covariance
-        moved = covariance[:, 4 + np.array(FOLDING[self.n_coefficients])] / self.pull**2
+        folding = first + 4 + np.array(FOLDING[self.n_coefficients])
+        moved = covariance[:, folding] / self.pull**2
         variance = max(USUAL_SIZE**2 - self.pull**2, 0.0)
         return np.asarray(covariance + variance * moved @ moved.T)
 
@@ -102,10 +105,12 @@ class Choice:
         """Message if the corners of the image are undetermined."""
         if not self.draws_in:
             return None
-        return message(
-            "intrinsics.drawn-in",
-            coefficients="k3" if self.n_coefficients == FEW else "(k4, k5, k6)",
-        )
+        return message("intrinsics.drawn-in", coefficients=self.drawn_coefficients)
+
+    @property
+    def drawn_coefficients(self) -> str:
+        """Names of the coefficients that a pull draws towards 0."""
+        return "k3" if self.n_coefficients == FEW else "(k4, k5, k6)"
 
 
 def choice_record(choice: Choice) -> dict[str, object]:

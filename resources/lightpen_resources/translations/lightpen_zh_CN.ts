@@ -8973,6 +8973,10 @@ mm</translation>
         <translation>测点记录之前光笔被抬起或移动，因此不计入。请保持不动直到记录完成。</translation>
     </message>
     <message>
+        <source>The pen was not seen in the corners of the image, where the distortion would fold it. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Keep the pen out of them, or repeat the swing over the whole image.</source>
+        <translation>图像四角未见光笔，那里的畸变会使图像折叠。已将 {coefficients} 减小到恰好避免折叠；四角为外推。请不要让光笔进入四角，或在整幅图像内重新摆动。</translation>
+    </message>
+    <message>
         <source>The pen was swung about one axis only, {axis}: this axis turned by {found:.1f}° (RMS); {needed:.0f}° are needed, so the tip along it is not determined. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
     </message>

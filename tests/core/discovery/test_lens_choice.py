@@ -2,10 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.simulated_stations import random_station, seen_station
+from tests import simulated_stations
+from tests.simulated_stations import errors_of, random_station, seen_station
 
 from lightpen.arrays import FloatArray
 from lightpen.discovery.lens_choice import choose_lens
+from lightpen.discovery.report import remarks_of
 from lightpen.discovery.requirements import require_lens
 from lightpen.discovery.starts import KnownLength, adjust_start, any_camera
 from lightpen.errors import CalibrationError
@@ -66,3 +68,16 @@ def test_a_lens_that_folds_the_corners_is_refused_with_advice() -> None:
     folding = replace(STATION.camera, distortion=np.array([-9.0, 0.0, 0.0, 0.0, 0.0]))
     with pytest.raises(CalibrationError, match="into the corners"):
         require_lens(replace(folding, fx=2000.0, fy=2000.0))
+
+
+def test_a_lens_is_drawn_towards_a_plain_one_where_it_would_fold_the_corners(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(simulated_stations, "FILLED", 0.3)  # far from the corners
+    station = random_station(29, n_images=150)
+    found = station.discovered()
+    require_lens(found.camera)
+    assert found.lens_choice is not None
+    assert found.lens_choice.draws_in
+    assert any("k3" in str(each) for each in remarks_of(found))
+    assert (np.abs(errors_of(found, station).tip) < found.expanded_uncertainty).all()
