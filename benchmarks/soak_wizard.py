@@ -29,7 +29,7 @@ from typing_extensions import override
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
-from lightpen.swing.capture.state import Phase
+from lightpen.swing.capture.state import Phase, SwingState
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Preferences, Settings
@@ -54,6 +54,7 @@ class Soak(QObject):
         self._memory: list[tuple[float, float]] = []
         self._n_paints: dict[int, int] = {}
         self._n_swings = 0
+        self._seen: SwingState | None = None
         self._plots: list[pg.PlotWidget] = []
         self._ticker = QTimer(self)
         self._ticker.setTimerType(Qt.TimerType.PreciseTimer)
@@ -129,8 +130,13 @@ class Soak(QObject):
             QApplication.exit()
 
     def _begin_next(self) -> None:
+        """Begin the next swing, once when the one before is solved."""
         run = self._wizard.workbench.run
-        if run.status.state is not None and run.status.state.phase is Phase.VERDICT:
+        state = run.status.state
+        if state is self._seen:
+            return
+        self._seen = state
+        if state is not None and state.phase is Phase.VERDICT:
             self._n_swings += 1
             run.runner.ask(lambda workflow: workflow.set_aside())
             chosen = self._wizard.workbench.selection.preparation
