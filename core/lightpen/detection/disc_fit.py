@@ -131,15 +131,16 @@ def fit_discs(
     places = np.arange(-half, half + 1, dtype=np.float32)
     x, y = (each.ravel() for each in np.meshgrid(places, places))
     reach = np.minimum(REACH * radii + MORE_REACH, FAR_REACH * radii + MORE_FAR)
-    used = np.hypot(x - starts[:, :1], y - starts[:, 1:]) < reach[:, None]
+    gaps = np.hypot(x - starts[:, :1], y - starts[:, 1:])
+    used = gaps < reach[:, None]
     chosen = np.argsort(~used, axis=1, kind="stable")[:, : used.sum(axis=1).max()]
+    gaps = np.take_along_axis(gaps, chosen, axis=1)
     used = np.take_along_axis(used, chosen, axis=1)
     pixels = light.reshape(len(light), -1).astype(np.float32)
     pixels = np.take_along_axis(pixels, chosen, axis=1)
     x, y, bound = x[chosen], y[chosen], full[:, None].astype(np.float32)
     ln_k = np.log(np.clip(radii / START_BLUR, *SHARPNESSES))
     windows = _Windows(x, y, pixels, used, pixels >= bound, bound, ln_k)
-    gaps = np.hypot(x - starts[:, :1], y - starts[:, 1:])
     values = np.zeros((len(light), N_PARAMETERS))
     values[:, CENTER] = starts
     near = gaps <= np.maximum(MIDDLE, gaps.min(axis=1, keepdims=True))
@@ -200,7 +201,7 @@ def _iterated(
         after = _model(windows, moved)
         better = cost(moved, after) < cost(values, model)
         steps = np.abs(moved - values)[:, CENTER].max(axis=1)
-        np.copyto(values := values.copy(), moved, where=better[:, None])
+        values = np.where(better[:, None], moved, values)
         for old, new in zip(model, after, strict=True):
             old[better] = new[better]
         found[left] = values

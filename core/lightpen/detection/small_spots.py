@@ -37,7 +37,7 @@ MIDDLE, NARROW = 0.55, 0.45  # half-level radii, standard deviation
 LEAST_WINDOW = 1.1  # px
 ROUNDS = 10
 FARTHEST = 0.5  # half-level radii, of a centre from its start, and
-FAR = 0.2  # of one that is not clipped; others have 0.06
+FAR = 0.2  # of one that is not clipped; good fits stay within 0.06
 
 SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
 

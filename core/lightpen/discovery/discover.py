@@ -50,7 +50,7 @@ from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_checks import folds
-from lightpen.intrinsics.distortion import FOLDING, PULLS, Choice
+from lightpen.intrinsics.distortion import Choice
 from lightpen.model.rigid import fit_rigid
 
 NOT_SETTLED = (
@@ -254,15 +254,12 @@ def _calibrated(
     regularisation that does not fold the image; none where each does.
     """
     pen, camera = start.pen, start.rig.cameras[0]
-    if choice is None or request.camera is not None:
+    if choice is None:  # the camera is known
         camera = request.camera or camera
-        return calibrate(camera, pen, observations, second=second), choice
-    given = choice.pull
-    pulls = PULLS if choice.n_coefficients in FOLDING else ()
-    stronger = [pull for pull in pulls if given is None or pull < given]
+        return calibrate(camera, pen, observations, second=second), None
+    of_any = replace(camera, covariance=any_covariance(camera))
     found = []
-    for pull in (given, *stronger):
-        of_any = replace(camera, covariance=any_covariance(camera))
+    for pull in choice.pulls:
         near = of_any if pull is None else pulled(camera, pull)
         found.append(calibrate(near, pen, observations, second=second))
         if not folds(found[-1].bundle.state.rig.cameras[0]):

@@ -36,9 +36,7 @@ from lightpen.intrinsics.camera_change import (
 )
 from lightpen.intrinsics.distortion import (
     FEW,
-    FOLDING,
     NO_K3,
-    PULLS,
     Choice,
     choose_distortion,
     fit_camera,
@@ -325,11 +323,9 @@ def _fit_unfolded(
     views: Views, tolerances: BoardTolerances, choice: Choice, fitted: BoardFit
 ) -> tuple[Choice, MixedFit]:
     """Return the fit with effects; they may fold the image where the fit does not."""
-    near, given = fitted.state.cameras[0], choice.pull
-    pulls = PULLS if choice.n_coefficients in FOLDING else ()
-    stronger = [pull for pull in pulls if given is None or pull < given]
-    for pull in (given, *stronger):
-        if pull != given:
+    near = fitted.state.cameras[0]
+    for pull in choice.pulls:
+        if pull != choice.pull:
             fitted = fit_camera(views, tolerances, near, pull)
         try:
             effects = fit_effects(views, fitted)

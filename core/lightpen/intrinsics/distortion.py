@@ -76,6 +76,13 @@ class Choice:
         return _model(self.n_coefficients, own, others)
 
     @property
+    def pulls(self) -> tuple[float | None, ...]:
+        """The pull, and all stronger ones."""
+        pulls = PULLS if self.n_coefficients in FOLDING else ()
+        given = self.pull
+        return given, *(pull for pull in pulls if given is None or pull < given)
+
+    @property
     def draws_in(self) -> bool:
         """Whether the corners of the image are undetermined."""
         return self.pull is not None and self.pull != NO_K3

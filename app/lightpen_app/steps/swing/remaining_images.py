@@ -6,7 +6,7 @@ from typing import Self
 
 # Of the images to go: from so many on, rounded up to this.
 STEPS = ((30, 10), (10, 5), (-1, 1))
-LEAST_ERROR = 2  # by which a small figure must be wrong before it is corrected
+LEAST_ERROR = 2  # images; a smaller change of the estimate is not shown
 
 
 @dataclass(frozen=True)
