@@ -1,7 +1,7 @@
 """Calibrations with erroneous files, seats and noise.
 
-Mechanics are unknowns of every fit and widen U, but are not drawn here: coverage has a
-lower limit only. Section `station` draws all, and has both limits.
+Mechanics are unknowns of every fit and widen U, but are not drawn here, so that more
+than 95 % of the intervals cover. Section `station` draws all.
 """
 
 from collections.abc import Callable
@@ -53,8 +53,8 @@ FEW = 60  # images
 SIGMA = 0.03  # px
 STREAM = 5  # of the seeds
 NORMAL_95 = 1.959964
-# Least coverage, per cent, of camera files, and of all else.
-COVERED_FILES, COVERED = 93.0, 90.0
+# Per cent, of camera files, and of all else; 300 intervals of 95 % give 92 to 98.
+COVERED_FILES, COVERED = (93.0, 99.0), (90.0, 99.0)
 # Standard uncertainties that a camera file states.
 FOCAL, ASPECT, CENTRE, K1, K2, TANGENTIAL = 0.003, 0.0003, 3.0, 0.02, 0.1, 3e-4
 
@@ -190,9 +190,9 @@ def _reported(
     covered = 100 * np.mean(np.abs(errors) < NORMAL_95 * stated, axis=0)
     median = float(np.median(np.linalg.norm(errors, axis=1)))
     median_held = float(np.median(np.linalg.norm(held, axis=1)))
-    least = COVERED if limit is None else COVERED_FILES
-    passed = bool(np.all(covered >= least))
-    asked = f">= {least:.0f} % each"
+    low, high = COVERED if limit is None else COVERED_FILES
+    passed = bool(np.all((covered >= low) & (covered <= high)))
+    asked = f"{low:.0f} to {high:.0f} % each"
     if limit is not None:
         passed &= median <= limit
         asked = f"<= {1000 * limit:.0f} \u00b5m, {asked}"
