@@ -202,7 +202,8 @@ def calibrate_camera(
     changes = (change, alternation, apart)
     if found.is_suspicious or any(each is not None for each in changes):
         released = released_tolerances(tolerances) if found.denied.any() else None
-        even = _without_lens_field(views, found.effects)
+        fields = found.effects.fields
+        even = views if found.has_skew else without_fields(views, fields)
         better = explain(
             even, tolerances, found.adjustment, change, released, apart=apart
         )
@@ -249,20 +250,6 @@ def calibrate_camera(
     )
 
 
-def _without_lens_field(views: Views, effects: MixedFit) -> Views:
-    """Return the views without what the lens does in all of them alike.
-
-    A field that is nothing but a skew of the image stays: no lens makes one.
-    """
-    even = without_fields(views, effects.fields)
-    at = views.pixels[views.seen]
-    moves = at - even.pixels[views.seen]
-    moves -= moves.mean(axis=0)
-    affine = np.linalg.lstsq(at - at.mean(axis=0), moves, rcond=None)
-    is_skew = affine[1].sum() < SKEW_ALONE * float(np.sum(moves**2))
-    return views if is_skew else even
-
-
 @dataclass(frozen=True, eq=False)
 class _Found:
     """One camera that fits the views best."""
@@ -289,8 +276,18 @@ class _Found:
             or self.choice.remark is not None
             or self.effects.clustering > CLUSTERED
             or components.view > UNEVEN_VIEWS * noise
-            or components.lenses[0] > UNEVEN_LENS * noise
+            or (components.lenses[0] > UNEVEN_LENS * noise and self.has_skew)
         )
+
+    @property
+    def has_skew(self) -> bool:
+        """Whether the lens field is nothing but a skew of the image, as no lens has."""
+        even = without_fields(self.views, self.effects.fields)
+        at = self.views.pixels[self.views.seen]
+        moves = at - even.pixels[self.views.seen]
+        moves -= moves.mean(axis=0)
+        affine = np.linalg.lstsq(at - at.mean(axis=0), moves, rcond=None)
+        return bool(affine[1].sum() < SKEW_ALONE * float(np.sum(moves**2)))
 
 
 def _calibrated(

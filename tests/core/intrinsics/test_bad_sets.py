@@ -9,7 +9,7 @@ from benchmarks import board_trials
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics import alternatives
+from lightpen.intrinsics import alternatives, calibration
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.camera_change import find_change
@@ -249,10 +249,18 @@ def test_rotated_images_are_named_also_with_uneven_squares(
     assert names == "view_03.png, view_06.png, view_10.png"
 
 
-def test_rotated_images_before_a_lens_with_a_field_are_no_second_camera(
-    make_views: MakeViews, camera: Camera
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cx", "said"),
+    [
+        (313.0, "3 of 14 images are rotated by 180"),
+        (318.0, "check that no image is rotated by 180"),  # near the middle, 319.5
+    ],
+)
+def test_a_lens_field_does_not_hide_that_images_may_be_rotated(
+    make_views: MakeViews, camera: Camera, cx: float, said: str
 ) -> None:
-    off_centre = replace(camera, cx=313.0, cy=232.0)
+    off_centre = replace(camera, cx=cx, cy=cx - 81.0)
     views = make_views(n_views=14, noise=0.015, of=off_centre)
     field = LensField.of(640, 480, 0.15, 180.0)
     root = np.linalg.cholesky(field.covariance + 1e-9 * np.eye(len(field.nodes)))
@@ -260,7 +268,7 @@ def test_rotated_images_before_a_lens_with_a_field_are_no_second_camera(
     pixels = views.pixels + replace(field, values=root @ drawn).at(views.pixels)
     pixels[[2, 5, 9]] = np.array([639, 479]) - pixels[[2, 5, 9]]
 
-    with pytest.raises(CalibrationError, match="rotated by 180"):
+    with pytest.raises(CalibrationError, match=said):
         calibrated(replace(views, pixels=pixels))
 
 
@@ -357,6 +365,17 @@ def test_a_correct_set_before_a_lens_with_a_large_field_is_accepted(seed: int) -
     views, _ = before_a_field(seed, 0.25)
 
     assert calibrated(views).change is None
+
+
+def test_a_lens_field_alone_is_no_reason_to_search_for_alternatives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(board_trials, "NOISE", (0.01, 0.01))
+    monkeypatch.setattr(board_trials, "SMOOTH", (0.0, 0.0))
+    monkeypatch.setattr(calibration, "explain", lambda *_, **__: pytest.fail("slow"))
+    found = calibrated(before_a_field(1, 0.25)[0])
+
+    assert found.effects.components.lenses[0] > 10 * found.effects.components.noise
 
 
 @pytest.mark.slow
