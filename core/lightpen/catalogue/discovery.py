@@ -23,6 +23,7 @@ MESSAGES = {
     "discover.length-not-sketched": "The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.",
     "discover.cones-contradict": "The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.",
     "discover.not-settled": "The adjustment of pen and camera did not converge: the swing shows too little of them, or the zoom changed. Tilt the pen by 30 degrees in all directions, turn it about its axis, come closer to the camera, and lock the zoom.",
+    "discover.one-cone": "The tip was in the same place in both swings. Give a swing in each of the two cones, before the same camera.",
     "discover.cones-not-settled": "The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.",
     "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.",
     "discover.no-length": "An LED file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.",

@@ -28,6 +28,7 @@ from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import (
     SECOND_PEN,
     require_certain,
+    require_distance,
     require_enough,
     require_length,
     require_no_second_pen,
@@ -36,17 +37,18 @@ from lightpen.discovery.requirements import (
 )
 from lightpen.discovery.scale import with_lengths_known
 from lightpen.discovery.scaled_start import (
-    LEAST_LENGTH_SIGMA,
+    RELATIVE,
     adjust_halves,
     numbered,
     scaled_start,
 )
 from lightpen.discovery.sightings import Report, Sightings
-from lightpen.discovery.starts import Start, any_covariance, scaled_to, turn_sigmas
+from lightpen.discovery.starts import any_covariance, scaled_to
 from lightpen.discovery.touched_length import with_touched_length
 from lightpen.discovery.tracks import Pieces, find_lamps, follow, without_lamps
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_checks import folds
@@ -59,8 +61,7 @@ NOT_SETTLED = (
     "calibrate.leds-do-not-fit",
     "calibrate.leds-do-not-fit-nor-tip",
 )
-TYPICAL = 0.05  # px, noise of a centre
-WEAK = 0.01  # rad: the turn of a flat pen seen from the front, that does not settle
+SAME_CONE = 0.02  # of the largest distance of two LEDs, between two cones
 SLIPPED = 0.03  # of the images, that are left out after a slip
 
 
@@ -144,6 +145,12 @@ def _adjusted(
     )
     start = replace(start, pen=with_lengths_known(start.pen, lengths))
     try:
+        if second is not None and lengths:
+            stated = second.separation
+            unknown = ConeSeparation(stated.distance, stated.distance)
+            free = replace(second, separation=unknown)
+            without, _ = _calibrated(start, choice, request, observations, free)
+            require_distance(without, stated, lengths)
         calibration, choice = _calibrated(start, choice, request, observations, second)
     except CalibrationError as error:
         if error.message.code not in NOT_SETTLED:
@@ -151,13 +158,8 @@ def _adjusted(
         if request.camera is not None:
             raise CalibrationError("discover.other-camera") from error
         if second is None:
-            seen = pixels[swing.found.images]
-            weak = turn_sigmas(Start(start, TYPICAL), seen) > WEAK
-            if is_cleared or not weak.any():
-                require_one_focal_length(swing.pieces, sightings.size, request.camera)
-                raise CalibrationError("discover.not-settled") from error
-            firm = replace(swing, found=_of_images(swing.found, ~weak))
-            return _adjusted(firm, request, report, is_cleared=True)
+            require_one_focal_length(swing.pieces, sightings.size, request.camera)
+            raise CalibrationError("discover.not-settled") from error
         distance = second.separation.distance
         raise CalibrationError(
             "discover.cones-not-settled", distance=distance
@@ -220,7 +222,9 @@ def _with_second(
     factor = 1.0
     if not request.lengths:
         apart = float(np.linalg.norm(cone - start.cone_rig))
-        factor = separation.distance / max(apart, LEAST_LENGTH_SIGMA)
+        if apart < SAME_CONE * RELATIVE:
+            raise CalibrationError("discover.one-cone")
+        factor = separation.distance / apart
     start = scaled_to(start, factor)
     start = replace(start, pen=replace(start.pen, diameter=request.diameter))
     there = replace(start, cone_rig=factor * cone, rotations=state.rotations @ R.T)

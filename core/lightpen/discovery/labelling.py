@@ -32,6 +32,7 @@ FIXED_TO_PEN = 1.0e-3  # of the image width: rms of a spot that goes with the pe
 MIN_TRIANGULATED = 12  # images that show a spot that may be a new LED
 MIN_PARALLAX = 0.1  # rad, between its rays
 REACH, GRID = 4, np.radians(8)  # steps of a turn to each side, and rad a step
+MOST_IN_VAIN = 30  # images sought so, all over the swing, before the rest is given up
 N_NEAREST = 8  # postures that an image found again is begun with
 ROUNDS = 400
 STEPS = 8
@@ -165,9 +166,27 @@ class _Search:
         return True
 
     def fit_turns(self, images: IntArray, pixels: FloatArray) -> BoolArray:
-        """Fit rotations (in place) to LEDs; return which fit."""
-        state = self.state
-        R = self.rotations[images]
+        """Fit rotations (in place) to LEDs; return which fit.
+
+        A flat pen that passes the view from the front may seem to turn back: near and
+        far exchanged fit almost as well there, so both are fitted, and the better kept.
+        """
+        R, lengths = self._fitted(self.rotations[images], pixels)
+        others, lengths_then = self._fitted(self._near_and_far_exchanged(R), pixels)
+        gate = AT_LED * self.width
+        is_better = _loss(lengths_then, gate) < _loss(lengths, gate)
+        self.rotations[images] = np.where(is_better[:, None, None], others, R)
+        lengths = np.where(is_better[:, None], lengths_then, lengths)
+        inside = np.nan_to_num(lengths, nan=np.inf) < gate
+        n_seen = np.isfinite(lengths).sum(axis=1)
+        n_inside = inside.sum(axis=1)
+        least = min(MIN_TURN_LEDS, self.state.pen.n_leds)
+        return np.asarray((n_inside >= least) & (2 * n_inside > n_seen))
+
+    def _fitted(
+        self, R: FloatArray, pixels: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return rotations fitted from R (M, 3, 3), and residuals (M, L), px."""
         for _ in range(STEPS):
             residuals, J = self._linearised(R, pixels)
             weights = cauchy_weights(residuals, max(robust_sigma(residuals, 3), 1.0))
@@ -176,13 +195,16 @@ class _Search:
             turns = np.asarray(np.linalg.solve(H, g[..., None]), dtype=np.float64)
             R = rotation_from_vector(turns[..., 0]) @ R
         residuals, _ = self._linearised(R, pixels)
-        self.rotations[images] = R
-        lengths = np.linalg.norm(residuals, axis=2)
-        inside = np.nan_to_num(lengths, nan=np.inf) < AT_LED * self.width
-        n_seen = np.isfinite(lengths).sum(axis=1)
-        n_inside = inside.sum(axis=1)
-        least = min(MIN_TURN_LEDS, state.pen.n_leds)
-        return np.asarray((n_inside >= least) & (2 * n_inside > n_seen))
+        return R, np.linalg.norm(residuals, axis=2)
+
+    def _near_and_far_exchanged(self, R: FloatArray) -> FloatArray:
+        """Return the rotations that show the plane of the LEDs alike from afar."""
+        leds = self.state.pen.leds
+        middle = leds.mean(axis=0)
+        normal = np.linalg.svd(leds - middle)[2][2]
+        sight = R @ middle + self.state.cone_rig
+        sight /= np.linalg.norm(sight, axis=1, keepdims=True)
+        return _mirror(sight) @ R @ _mirror(normal)
 
     def _linearised(
         self, R: FloatArray, pixels: FloatArray
@@ -266,7 +288,9 @@ class _Search:
         turns = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
         rotations = rotation_from_vector(turns) @ (u @ vt)
         there = self.predicted(rotations)
-        for i in np.flatnonzero(~self.solved & ~self.sought).tolist():
+        n_left = max(MOST_IN_VAIN - int((self.sought & ~self.solved).sum()), 0)
+        left = np.flatnonzero(~self.solved & ~self.sought)
+        for i in np.random.default_rng(0).permutation(left)[:n_left].tolist():
             spots = self.spots[i]
             if len(spots) < MIN_FOUND:
                 continue
@@ -290,7 +314,7 @@ class _Search:
                 return False
             pixels = np.full((1, len(match), 2), np.nan)
             pixels[0, found] = spots[match[found]]
-            self.fit_turns(image, pixels)
+            self.rotations[image], _ = self._fitted(self.rotations[image], pixels)
         n_enough = 0.6 * min(len(spots), len(match))
         return bool(found.sum() >= max(MIN_FOUND, n_enough))
 
@@ -302,6 +326,16 @@ class _Search:
         for i, predicted in zip(images.tolist(), there, strict=True):
             labels[i] = assign(predicted, self.spots[i], AT_LED * self.width)
         return labels
+
+
+def _mirror(normals: FloatArray) -> FloatArray:
+    """Return the reflections (..., 3, 3) in planes with unit normals (..., 3)."""
+    return np.asarray(np.eye(3) - 2 * normals[..., :, None] * normals[..., None, :])
+
+
+def _loss(lengths: FloatArray, gate: float) -> FloatArray:
+    """Return the sum of squared residuals (M, L), px, (M,); each at most the gate."""
+    return np.asarray(np.sum(np.fmin(lengths, gate) ** 2, axis=1))
 
 
 def pixels_of(labels: IntArray, spots: Sequence[FloatArray]) -> FloatArray:

@@ -115,7 +115,7 @@ def discovery_text(discovery: Discovery) -> str:
         for name, value, sigma in zip(names, values, sigmas, strict=True)
     ]
     lines += [
-        f"  LED {j:<6}{x:10.4f}{y:11.4f}{z:11.4f}   U {u.max() * um:.1f} um"
+        f"  LED {j:<6}{x:10.4f}{y:11.4f}{z:11.4f}   U {u.max() * um:.1f} µm"
         for j, ((x, y, z), u) in enumerate(
             zip(discovery.pen.leds, discovery.led_uncertainty, strict=True), 1
         )
@@ -164,7 +164,7 @@ def swings_text(together: Together) -> str:
     u = COVERAGE_FACTOR * um * held_out.tip_sigma
     return (
         f"{len(together.swings)} swings. The last one against the others: tip "
-        f"{x:+.1f} {y:+.1f} {z:+.1f} um, U {u[0]:.1f} {u[1]:.1f} {u[2]:.1f}; fx "
+        f"{x:+.1f} {y:+.1f} {z:+.1f} µm, U {u[0]:.1f} {u[1]:.1f} {u[2]:.1f}; fx "
         f"{held_out.focal_length:+.2f} px, U "
         f"{COVERAGE_FACTOR * held_out.focal_length_sigma:.2f}."
     )

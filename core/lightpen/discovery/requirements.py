@@ -13,7 +13,8 @@ from lightpen.discovery.scale import CONTRADICTING, nearest_pair
 from lightpen.discovery.sightings import Sightings
 from lightpen.discovery.starts import KnownLength, gradient_of
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.consistency_findings import DIAMETER, SCALE
+from lightpen.estimation.bundle.consistency_findings import DIAMETER
+from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration
 from lightpen.formats.camera_checks import folds
 from lightpen.model.camera import Camera
@@ -73,20 +74,10 @@ def require_no_second_pen(found: Labelled) -> None:
 def require_length(
     calibration: Calibration, request: Request, lengths: Sequence[KnownLength]
 ) -> None:
-    """Refuse a length that contradicts the diameter of the discs, or two cones."""
+    """Refuse a length that contradicts the diameter of the discs."""
     if not request.lengths:
         return
     for each in calibration.contradictions:
-        if each.what == SCALE and request.second is not None:
-            distance = request.second.separation.distance
-            raise CalibrationError(
-                "discover.cones-contradict",
-                distance=distance,
-                implied=distance / each.estimated,
-                length=lengths[0].length,
-                first=lengths[0].first + 1,
-                second=lengths[0].second + 1,
-            )
         if each.what != DIAMETER or each.estimated <= 0:
             continue
         ratio = each.stated / each.estimated
@@ -111,6 +102,46 @@ def require_length(
             other=first,
             another=second,
         )
+
+
+def require_distance(
+    without: Calibration, stated: ConeSeparation, lengths: Sequence[KnownLength]
+) -> None:
+    """Refuse a distance of two cones that known lengths contradict.
+
+    Parameters
+    ----------
+    without : Calibration
+        Of both swings, by the lengths alone.
+    """
+    bundle, second = without.bundle, without.second
+    assert second is not None
+    along = bundle.state.between_rig / second.distance
+    at = bundle.unknowns.layout.between
+    sigma = np.sqrt(along @ bundle.covariance[at, at] @ along)
+    off = abs(second.distance - stated.distance)
+    if off > CONTRADICTING * np.hypot(sigma, stated.sigma):
+        raise contradicting_distance(stated.distance, second.distance, lengths[0])
+
+
+def contradicting_distance(
+    stated: float, implied: float, known: KnownLength
+) -> CalibrationError:
+    """Return the error of a distance of two cones, mm, that a known length contradicts.
+
+    Parameters
+    ----------
+    implied : float
+        Distance by the length, mm.
+    """
+    return CalibrationError(
+        "discover.cones-contradict",
+        distance=stated,
+        implied=implied,
+        length=known.length,
+        first=known.first + 1,
+        second=known.second + 1,
+    )
 
 
 def require_lens(camera: Camera) -> None:

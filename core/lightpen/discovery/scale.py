@@ -15,6 +15,7 @@ from lightpen.model.self_calibration import EXACT_SCALE
 WIDE = 0.02  # of the pen's size: prior of an LED coordinate
 LARGEST_SCALE = 0.01  # relative, of a scale that a pen file can state apart
 CONTRADICTING = 4.0  # standard deviations
+SHAPE = 2e-4  # relative: more than ratios of lengths within the shape are uncertain by
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,7 @@ def scale_by(lengths: Sequence[KnownLength], leds: FloatArray) -> float:
     weights = found / sigmas
     factor = float((weights @ (stated / sigmas)) / (weights @ weights))
     off = factor * found - stated
-    # What the shape itself is uncertain by is far less.
-    limit = CONTRADICTING * np.hypot(sigmas, 2e-4 * stated)
+    limit = CONTRADICTING * np.hypot(sigmas, SHAPE * stated)
     worst = int(np.argmax(np.abs(off) / limit))
     if abs(off[worst]) > limit[worst]:
         rest = np.arange(len(lengths)) != worst

@@ -167,4 +167,4 @@ def _with_discs(pen: Pen, request: Request) -> Pen:
     if request.lengths:
         return replace(pen, diameter=request.diameter)
     usual = USUAL_DISC * RELATIVE  # nothing shows how large they are
-    return replace(pen, diameter=usual, diameter_sigma=usual)
+    return replace(pen, diameter=usual, diameter_sigma=usual / 2)

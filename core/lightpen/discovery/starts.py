@@ -241,14 +241,6 @@ def focal_sigma(
     return float(np.sqrt(_damped_step(N, unit, 0.0)[N_CONE]))
 
 
-def turn_sigmas(start: Start, pixels: FloatArray) -> FloatArray:
-    """Return the standard uncertainty of the weakest turn of each image, (N,), rad."""
-    turn = np.nan_to_num(_view(start.state, pixels[:, None]).turn)
-    turn = turn.reshape(len(pixels), -1, 3)
-    least = np.linalg.eigvalsh(np.swapaxes(turn, 1, 2) @ turn)[:, 0]
-    return np.asarray(start.sigma / np.sqrt(np.maximum(least, NOISE_FLOOR)))
-
-
 @dataclass(frozen=True)
 class KnownLength:
     """A length between two LEDs by index, with its standard uncertainty, mm."""

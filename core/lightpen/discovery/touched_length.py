@@ -6,7 +6,8 @@ import numpy as np
 
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.request import Request
-from lightpen.discovery.scale import MeasuredLength
+from lightpen.discovery.requirements import contradicting_distance
+from lightpen.discovery.scale import CONTRADICTING, SHAPE, MeasuredLength, known_lengths
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.verification.tasks.length import LengthOptions, measure_length
 from lightpen.verification.tasks.task import Conditions
@@ -21,7 +22,7 @@ def with_touched_length(request: Request, relative: Discovery) -> Request:
     Raises
     ------
     CalibrationError
-        The touches are not of two ends.
+        The touches are not of two ends, or a known length contradicts theirs.
     """
     touched = request.touched
     assert touched is not None
@@ -32,5 +33,12 @@ def with_touched_length(request: Request, relative: Discovery) -> Request:
     length = known.length * certified.distance / run.measured
     own = run.uncertainty / COVERAGE_FACTOR / run.measured
     sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
+    for each in known_lengths(request.lengths, relative.pen.leds):
+        ends = relative.pen.leds[[each.first, each.second]]
+        implied = run.measured * each.length / float(np.linalg.norm(ends[1] - ends[0]))
+        relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
+        by_chance = np.hypot(implied * relative_sigma, certified.sigma)
+        if abs(implied - certified.distance) > CONTRADICTING * by_chance:
+            raise contradicting_distance(certified.distance, implied, each)
     measured = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
     return replace(request, lengths=(*request.lengths, measured))

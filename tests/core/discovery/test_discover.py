@@ -150,6 +150,19 @@ def test_without_a_length_the_result_is_relative() -> None:
 
 
 @pytest.mark.slow
+def test_small_discs_of_unknown_size_do_not_keep_the_adjustment_from_converging() -> (
+    None
+):
+    pen = replace(STATION.pen, diameter=0.02 * STATION.longest)
+    rng = np.random.default_rng(2)
+    station = seen_station(STATION.camera, pen, STATION.swing, 0.03, 0.02, rng)
+
+    found = discover(station.sightings, replace(STATION.request, lengths=()))
+
+    assert 0 < found.pen.diameter < 5  # hundredths of the longest distance
+
+
+@pytest.mark.slow
 def test_a_tip_that_slips_and_lights_that_are_none_are_left_out() -> None:
     rng = np.random.default_rng(7)
     swing = STATION.swing

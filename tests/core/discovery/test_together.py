@@ -105,12 +105,25 @@ def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
 
 
 @pytest.mark.slow
-def test_two_cones_that_contradict_the_length_are_refused() -> None:
-    separation = ConeSeparation(1.001 * float(np.linalg.norm(APART)), 1e-3)
+@pytest.mark.parametrize("factor", [1.001, 1.15])
+def test_two_cones_that_contradict_the_length_are_refused(factor: float) -> None:
+    distance = float(np.linalg.norm(APART))
+    separation = ConeSeparation(factor * distance, 1e-3)
     second = SecondSightings(again(2, APART).sightings, separation)
 
-    with pytest.raises(CalibrationError, match="cones contradicts the length"):
+    with pytest.raises(CalibrationError, match="cones contradicts the length") as at:
         discover(FIRST.sightings, replace(FIRST.request, second=second))
+
+    implied = at.value.message.values["implied"]
+    assert implied == pytest.approx(distance, rel=2e-4)
+
+
+@pytest.mark.slow
+def test_two_swings_in_one_cone_are_refused_as_two_cones() -> None:
+    second = SecondSightings(FIRST.sightings, ConeSeparation(150.0, 1e-3))
+    request = Request((), FIRST.pen.diameter, second=second)
+    with pytest.raises(CalibrationError, match="same place in both swings"):
+        discover(FIRST.sightings, request)
 
 
 def test_the_picture_shows_the_pen_upright(together: Together) -> None:

@@ -66,6 +66,15 @@ def test_touches_of_both_ends_give_the_distance_of_two_leds(
     assert known.sigma < 1e-3 * known.length
 
 
+def test_a_touched_length_that_contradicts_the_known_length_is_refused(
+    relative: Discovery,
+) -> None:
+    right = replace(STATION.request, touched=touched())
+    assert len(with_touched_length(right, relative).lengths) == 2
+    with pytest.raises(CalibrationError, match="cones contradicts the length"):
+        with_touched_length(replace(right, touched=touched(1.01)), relative)
+
+
 @pytest.mark.slow
 def test_a_certified_length_touched_afterwards_gives_tip_and_leds_to_scale() -> None:
     found = discover(STATION.sightings, replace(FREE, touched=touched()))

@@ -49,6 +49,7 @@ CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
 FINDING_PASSES = 4  # at most, in which standard deviations are found; then they stand
 MAX_PASSES = 20
+OPPOSED = 0.5  # of the last step, by which a step goes back that is halved
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,6 +223,7 @@ def fit_bundle(
     """
     unknowns = Unknowns.of(start, priors, modes, effects, noise)
     now = _started(unknowns, start, pixels, places)
+    last = np.zeros(2 * N_CONE)
     for n_pass in range(MAX_PASSES):
         weight_sigma = max(now.sigma * float(np.sqrt(inflation)), FINEST)
         finding = 0 < n_pass <= FINDING_PASSES
@@ -232,14 +234,19 @@ def fit_bundle(
             jitter = _jitter_beside(unknowns, now, solved, weight_sigma)
             components = components._replace(jitter=jitter)
             used = inliers(_together(solved.residuals)).reshape(used.shape)
-        state = unknowns.moved(now.state, solved.values, solved.turns)
-        change = solved.values - now.values
         is_same = np.array_equal(used, now.used)
         is_same &= components.sigmas == now.components.sigmas
-        if n_pass > 1 and is_same and np.abs(change[:6]).max() < CONVERGED:
+        change = solved.values - now.values
+        step = change[: len(last)]
+        if n_pass > 1 and is_same and np.abs(step).max() < CONVERGED:
+            state = unknowns.moved(now.state, solved.values, solved.turns)
             return _bundle_of(unknowns, state, now.used, solved, weight_sigma)
+        share = 0.5 if step @ last < -OPPOSED * (last @ last) else 1.0
+        last = share * step
+        values = now.values + share * change
+        state = unknowns.moved(now.state, values, share * solved.turns)
         views = unknowns.views_at(state, pixels)
-        values = _held_by_state(unknowns, solved.values)
+        values = _held_by_state(unknowns, values)
         now = _Linearised(state, values, views, used, components, solved.sigma)
     raise CalibrationError("bundle.not-settled", n_steps=MAX_PASSES)
 
