@@ -241,7 +241,8 @@ def fit_bundle(
         if n_pass > 1 and is_same and np.abs(step).max() < CONVERGED:
             state = unknowns.moved(now.state, solved.values, solved.turns)
             return _bundle_of(unknowns, state, now.used, solved, weight_sigma)
-        share = 0.5 if step @ last < -OPPOSED * (last @ last) else 1.0
+        is_opposed = step @ last < -OPPOSED * (last @ last)
+        share = 0.5 if is_opposed and not finding else 1.0
         last = share * step
         values = now.values + share * change
         state = unknowns.moved(now.state, values, share * solved.turns)
