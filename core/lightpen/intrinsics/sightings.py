@@ -362,7 +362,9 @@ def _stretched(grey: Any) -> Any:
 
 def _evened(grey: Any) -> Any:
     """Return an image as it would be in even light."""
-    around = cv2.GaussianBlur(grey, (0, 0), EVENED * max(grey.shape))
+    tiny = cv2.resize(grey, None, fx=0.125, fy=0.125, interpolation=cv2.INTER_AREA)
+    around = cv2.GaussianBlur(tiny, (0, 0), EVENED * max(tiny.shape))
+    around = cv2.resize(around, grey.shape[::-1])
     return _stretched(cv2.divide(grey, around, scale=128.0))
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from time import process_time
 
 import cv2
 import numpy as np
@@ -12,7 +13,13 @@ from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.sightings import MARKED_WHOLE, count_corners, find_points
+from lightpen.intrinsics.sightings import (
+    EVENED,
+    MARKED_WHOLE,
+    _evened,
+    count_corners,
+    find_points,
+)
 from lightpen.intrinsics.squares import CornerCount, count_from, goes_on
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
@@ -164,6 +171,23 @@ def test_circles_in_dim_and_uneven_light_are_found() -> None:
     points = find_points((image_of(board) * light).astype(np.uint8), board)
 
     assert error_of(points, board) < 0.1  # of the few levels that are left
+
+
+def test_uneven_light_is_found_in_a_reduced_image() -> None:
+    grain = np.random.default_rng(1).integers(0, 30, (360, 640))
+    grey = (np.linspace(60, 200, 640) + grain).astype(np.uint8)
+    times = [process_time()]
+    around = cv2.GaussianBlur(grey, (0, 0), EVENED * 640)
+    times.append(process_time())
+    even = _evened(grey)
+    times.append(process_time())
+    slowly, fast = np.diff(times)
+
+    whole = cv2.normalize(
+        cv2.divide(grey, around, scale=128.0), around, 0, 255, cv2.NORM_MINMAX
+    )
+    assert np.abs(even.astype(float) - whole).mean() < 3.0
+    assert fast < 0.3 * slowly
 
 
 def test_rows_numbered_in_a_mirror_are_put_right() -> None:
