@@ -74,7 +74,8 @@ class DiscFits(NamedTuple):
     centers : (N, 2) array
         px from the middle of the window.
     sigmas : (N,) array
-        Standard deviation of one coordinate, px.
+        Standard deviation of one coordinate, px, larger for discs of other shapes
+        than most.
     """
 
     centers: FloatArray
@@ -150,8 +151,10 @@ def fit_discs(
     values, squares, pulls = _fitted(windows, values)
     field = np.zeros((len(light), 2, light[0].size))
     np.put_along_axis(field, chosen[:, None], pulls, axis=2)
-    sigmas = np.sqrt(squares * _correlated(field.reshape(-1, *light.shape[1:])))
-    return DiscFits(values[:, CENTER], sigmas)
+    squares = squares * _correlated(field.reshape(-1, *light.shape[1:]))
+    return DiscFits(
+        values[:, CENTER], np.sqrt(squares + (_misshapen(values) * radii) ** 2)
+    )
 
 
 def _fitted(
@@ -242,6 +245,18 @@ def _correlated(pulls: FloatArray) -> float:
     pairs = np.vdot(pulls[:, 1:], pulls[:, :-1])
     pairs += np.vdot(pulls[:, :, 1:], pulls[:, :, :-1])
     return 1 + 2 * max(float(pairs) / max(float(np.vdot(pulls, pulls)), TINY), 0.0)
+
+
+def _misshapen(values: FloatArray) -> FloatArray:
+    """Return how much more than usual shapes are off that of the most discs, (N,).
+
+    Light beside a disc draws its shape and its centre alike.
+    """
+    m11, m12, m22 = values[:, [M11, M12, M22]].T
+    sizes = np.maximum(np.abs(m11 + m22), TINY)
+    stretches = np.stack([m11 - m22, 2 * m12]) / sizes
+    off = np.hypot(*(stretches - np.median(stretches, axis=1, keepdims=True)))
+    return np.asarray(np.maximum(off - np.median(off), 0.0))
 
 
 def _diagonal(matrices: _Reals) -> _Reals:

@@ -67,7 +67,7 @@ def follow_spots(
     Followed or None
         None where anything but small motion is seen.
     """
-    if not len(spots):
+    if not len(spots) or np.isfinite(spots.tiny_width):
         return None
     there = camera.project(pen.leds @ rotation.T + translation)
     x, y = there.T

@@ -206,10 +206,10 @@ def detections_of(
 ) -> list[PenDetection]:
     """Return the detections of images by their spots and labels.
 
-    An image is of use if its LEDs are labelled and four of them or more are whole. If
-    not, the reason is the first that holds:
+    An image is of use if its LEDs are labelled, four of them or more are whole, and
+    few are too small. If not, the reason is the first that holds:
 
-    * too small, where hardly any but tiny spots are seen;
+    * too small, where most spots are tiny;
     * blurred, where most spots are or where there is light but no spot, since stillness
       comes first: it may part merged LEDs, and distinguish alike ones;
     * empty, without any spot;
@@ -325,11 +325,11 @@ def _detection_of(spots: Spots, labels: Labels, seen: FloatArray) -> PenDetectio
     """Return the detection of an image with labelled LEDs at (L, 2), px."""
     pixels = np.where(labels.whole[:, None], seen, np.nan)
     detection = partial(PenDetection, pixels, seen, spots=spots, labels=labels)
+    if np.isfinite(spots.tiny_width):
+        return detection(Reason.TOO_SMALL)
     is_labelled = labels.reason is LabelStatus.LABELLED
     if is_labelled and _n_seen(pixels) >= MIN_POSE_LEDS:
         return detection(Reason.NONE, labels.R, labels.t)
-    if np.isfinite(spots.tiny_width):
-        return detection(Reason.TOO_SMALL)
     return detection(Reason.BLURRED if spots.are_blurred else _REASONS[labels.reason])
 
 

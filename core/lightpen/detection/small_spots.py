@@ -52,7 +52,6 @@ DARK = 0.08  # of the light, round a spot that is alone
 MIN_WIDTH = 4.0  # px, at half level; less shows no centre
 LEAST_TINY = 1.2  # px; what is smaller is a hot pixel
 LARGEST_TINY = 12  # px, of the box at the foot
-FEWEST_TINY = 4
 MAX_TINY = 4000  # contours examined
 LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
 
@@ -153,8 +152,8 @@ def measure_small(
     )
 
 
-def width_of_tiny(image: Image, level: float, background: float) -> float:
-    """Return the width of spots too small for a centre, px; NaN of fewer than 4.
+def widths_of_tiny(image: Image, level: float, background: float) -> list[float]:
+    """Return the widths of spots too small for a centre, px.
 
     Parameters
     ----------
@@ -174,8 +173,7 @@ def width_of_tiny(image: Image, level: float, background: float) -> float:
         soft = np.clip((light / light.max() - FOOT) / (HEAD - FOOT), 0, 1)
         widths.append(2 * np.sqrt(soft.sum() / np.pi))
     # One pixel is a hot one.
-    tiny = [width for width in widths if LEAST_TINY < width < MIN_WIDTH]
-    return float(np.median(tiny)) if len(tiny) >= FEWEST_TINY else float("nan")
+    return [width for width in widths if LEAST_TINY < width < MIN_WIDTH]
 
 
 def _brightest(image: Image, centers: FloatArray, radii: FloatArray) -> FloatArray:

@@ -33,7 +33,7 @@ from lightpen.detection.disc_moments import (
 )
 from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pose import MIN_POSE_LEDS
-from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, width_of_tiny
+from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, widths_of_tiny
 from lightpen.formats.decoding import bits_of
 from lightpen.model.quantiles import normal_quantile
 
@@ -67,6 +67,12 @@ MAX_AXIS_RATIO = 4.0
 MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
 
 SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
+
+HARDLY_AREA = 18.0  # px^2, usual, of spots of which some may be too small
+FEWEST_TINY = 4
+FOUND_TINY = 0.75  # of as many tiny ones, that are found where LEDs are large enough
+LEAST_OF_USUAL = 0.3  # of the height of others, above which tiny ones are counted
+HEAD = 0.4  # of the height of the brightest
 
 BELL_RADIUS = 6.0  # px; blur leaves less no even inside
 LIT = 0.25  # of the spots with foreign light
@@ -117,8 +123,8 @@ class Spots:
         Whether there is light, but no spot: discs moved by many times their size during
         the exposure leave streaks, a dark image leaves nothing.
     tiny_width : float
-        Usual width of spots that are too small for a centre, px, where there are too
-        few others for a pose; else NaN.
+        Usual width of spots that are too small for a centre, px, where most are; else
+        NaN.
     """
 
     centers: FloatArray
@@ -287,13 +293,26 @@ def _spots_of(
     discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
     discs = discs[:MAX_SPOTS]
     spots = _as_spots(discs, full_scale, scene.noise)
-    if len(spots) < MIN_POSE_LEDS:
-        rise = max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * full_scale)
-        width = width_of_tiny(image, scene.background + rise, scene.background)
-        spots = replace(spots, tiny_width=width)
+    if len(spots) < MIN_POSE_LEDS or np.median(spots.areas) < HARDLY_AREA:
+        spots = replace(spots, tiny_width=_tiny_width(scene, spots, full_scale))
     if len(spots) and np.median(spots.areas) < np.pi * LARGEST_RADIUS**2:
         spots = _with_small(spots, discs, image, scene.noise, full_scale)
     return replace(spots, has_smears=has_smears)
+
+
+def _tiny_width(scene: "_Survey", spots: Spots, full_scale: int) -> float:
+    """Return the usual width of spots too small for a centre; NaN where few are."""
+    rise = max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * full_scale)
+    if len(spots):
+        usual = float(np.median(spots.contrasts)) * full_scale
+        rise = max(rise, LEAST_OF_USUAL * usual)
+    # Blur joins the feet of small LEDs, but not their heads.
+    for height in (rise, max(rise, HEAD * (scene.peak - scene.background))):
+        level = scene.background + height
+        widths = widths_of_tiny(scene.image, level, scene.background)
+        if len(widths) >= FEWEST_TINY and len(spots) < FOUND_TINY * len(widths):
+            return float(np.median(widths))
+    return float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -566,6 +585,7 @@ def _with_small(
     # Foreign light at a quarter of the LEDs is, less of it, at the others too.
     raised &= fits
     are_lit = raised.sum() > LIT * fits.sum()
+    raised |= fits & ((spots.flaws & SpotFlaw.SATURATED) > 0)
     small = np.flatnonzero(spots.are_small | (fits if are_lit else raised))
     if not len(small):
         return spots

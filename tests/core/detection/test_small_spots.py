@@ -19,6 +19,7 @@ EASY = Panel(6.0)
 HARD = Panel(
     6.0, reflections=(0.1, 0.5), bloom=0.3, background=0.08, quality=80
 )  # as photographs of boards are
+CLIPPED = Panel(5.0, gains=(1.2, 6.0), reflections=(0.05, 0.2), bloom=0.1)
 CLEAN = Panel(6.0, reflections=(0.0, 0.0), bloom=0.0, quality=None)
 
 
@@ -77,6 +78,7 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
         (replace(HARD, width=8.0, darkening=0.75), 0.031),
         (replace(HARD, width=14.0), 0.018),
         (replace(EASY, width=10.0, gains=(2.0, 6.0), bloom=0.15), 0.018),
+        (replace(CLIPPED, width=10.0, gains=(1.2, 3.0)), 0.009),
     ],
 )
 def test_centers_are_better_than_by_a_gaussian_fit(panel: Panel, limit: float) -> None:
@@ -114,6 +116,11 @@ def test_the_stated_standard_deviation_is_about_the_error(panel: Panel) -> None:
     found = found_on(panel, 6)
     typical = 1.2 * np.median(np.linalg.norm(found.errors, axis=1)) / np.sqrt(2)
     assert 0.5 < np.median(found.sigmas) / typical < 2.0
+
+
+def test_light_beside_clipped_leds_enters_the_standard_deviation() -> None:
+    found = found_on(CLIPPED, 6)
+    assert np.sqrt(np.mean((found.errors / found.sigmas[:, None]) ** 2)) < 1.3
 
 
 def test_leds_among_foreign_light_count_less_than_such_in_the_dark() -> None:
@@ -167,11 +174,13 @@ def test_a_pen_of_small_leds_is_found(diameter: float) -> None:
         assert (detection.sigmas >= EXACT_SIGMA).all()
 
 
-@pytest.mark.parametrize(("diameter", "width"), [(0.3, 1.9), (0.6, 2.7)])
+@pytest.mark.parametrize(
+    ("diameter", "blur", "width"), [(0.3, 0.6, 1.9), (0.6, 0.6, 2.7), (0.7, 0.6, 2.9)]
+)
 def test_spots_of_one_to_three_pixels_are_refused_as_too_small(
-    diameter: float, width: float
+    diameter: float, blur: float, width: float
 ) -> None:
-    scene = small_pen(diameter, 0.6)
+    scene = small_pen(diameter, blur)
     plan = plan_scene(scene)
     image = render_plan(scene, plan.image_plans[0])
     detection = detect_pen(image, scene.camera, plan.measured_pen)
@@ -184,3 +193,9 @@ def test_hot_pixels_are_no_leds_that_are_too_small() -> None:
     image = np.zeros((600, 800), np.uint8)
     image[np.arange(20, 580, 40), np.arange(20, 580, 40)] = 200
     assert np.isnan(detect_spots(image).tiny_width)
+
+
+def test_blur_that_joins_small_leds_leaves_them_too_small() -> None:
+    panel = replace(CLEAN, width=2.0, psf=1.0, gains=(2.5, 6.0))
+    shown = panel_image(panel, np.random.default_rng(1)).image
+    assert detect_spots(shown).tiny_width == pytest.approx(3.0, abs=0.4)
