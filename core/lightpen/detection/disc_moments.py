@@ -287,7 +287,7 @@ def _measure_window(
     )
     if is_inside and not (is_even and moments.edge_width < WIDE_EDGE):
         rim = _rim_start(soft, around)
-        if not is_whole:
+        if not is_whole and _has_dark_middle(moments, soft, around):
             filled = _moments(_without_hole(soft), around, (high - low) / contrast)
             if filled is not None and not (
                 filled.area > HOLE * moments.area
@@ -405,6 +405,13 @@ def _is_even(
 def _corrects_shading(moments: DiscMoments) -> bool:
     """Return whether the inside of a disc is large enough to measure its shading."""
     return moments.radius >= LEAST_SHADED * moments.rim_width
+
+
+def _has_dark_middle(moments: DiscMoments, soft: MatLike, frame: PixelBox) -> bool:
+    x, y = round(moments.x) - frame.left, round(moments.y) - frame.top
+    reach = round(moments.radius / 2)
+    rows, columns = (slice(max(at - reach, 0), at + reach + 1) for at in (y, x))
+    return bool(soft[rows, columns].min(initial=255) < FULLY)
 
 
 def _without_hole(soft: MatLike) -> MatLike:
