@@ -2,7 +2,7 @@
 
 MESSAGES = {
     "discover.no-start": "No focal length from 0.3 to 12 image widths explains the tracks. Check that the tip stayed in the cone, and tilt the pen in all directions, with roll.",
-    "discover.no-fit": "No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.",
+    "discover.no-fit": "No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, that camera and cone stand still, and that zoom and focus are locked.",
     "discover.camera-changed": "The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.",
     "discover.halves-apart": "Both halves of the swing fit alone, but not together: the residuals are {times:.0f} times larger. Lock zoom, focus and image stabilisation, clamp camera and cone, and repeat the swing.",
     "discover.drawn-in": "The pen was not seen in the corners of the image, where the distortion would fold it. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Keep the pen out of them, or repeat the swing over the whole image.",
@@ -22,7 +22,7 @@ MESSAGES = {
     "discover.length-of-others": "The length of {length:g} mm does not fit LEDs {first} and {second}: it gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. It may be the length between LEDs {other} and {another}. Check which LEDs were measured, and the diameter of the discs.",
     "discover.length-not-sketched": "The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.",
     "discover.cones-contradict": "The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.",
-    "discover.not-settled": "The adjustment of pen and camera did not converge: the swing shows too little of them, or the zoom changed. Tilt the pen by 30 degrees in all directions, turn it about its axis, come closer to the camera, and lock the zoom.",
+    "discover.not-settled": "The adjustment of pen and camera did not converge: the swing shows too little of them, LEDs move on the pen, or the zoom changed. Tilt the pen by 30 degrees in all directions, turn it about its axis, come closer to the camera, fasten the LEDs, and lock the zoom.",
     "discover.one-cone": "The tip was in the same place in both swings. Give a swing in each of the two cones, before the same camera.",
     "discover.cones-not-settled": "The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.",
     "discover.touched-length": "The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.",

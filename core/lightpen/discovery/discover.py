@@ -174,7 +174,11 @@ def _adjusted(
         *(calibration, choice, lengths, request.rough_leds, second),
         is_relative=request.is_relative,
     )
-    require_certain(discovery, sightings)
+    try:
+        require_certain(discovery, sightings)
+    except CalibrationError:  # perhaps for that reason
+        require_one_focal_length(swing.pieces, sightings.size, request.camera)
+        raise
     return replace(discovery, hypotheses=swing.hypotheses, n_lamps=swing.n_lamps)
 
 

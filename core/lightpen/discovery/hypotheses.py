@@ -33,29 +33,17 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 
 USUAL_FOCAL = 1.7  # image widths, where the shape shows none
-FOCAL_LENGTHS = (1.0, 1.7, 3.0)  # image widths, of cameras
 # Parts of the images, and what is assumed of the depth of a shape; in turn, until one
-# fits well: first with the focal length that the shape implies, then with several.
+# fits well, with the focal length that the shape implies.
 ATTEMPTS = (
     (0.0, 1.0, 1e-6),
     (0.0, 1.0, 0.2),
     (0.0, 0.67, 1e-6),
     (0.33, 1.0, 1e-6),
     (0.17, 0.83, 0.2),
-    (0.0, 1.0, 0.5),
-    (0.33, 1.0, 0.5),
-    (0.0, 0.67, 0.5),
     (0.25, 0.75, 1e-6),
 )
-# A flat pen shows depth by perspective alone, and has wrong starts that nearly fit.
-MORE_ATTEMPTS = (
-    (0.17, 0.83, 1e-6),
-    (0.33, 0.67, 1e-6),
-    (0.0, 0.33, 1e-6),
-    (0.67, 1.0, 1e-6),
-    (0.33, 1.0, 1e-6),
-    (0.33, 1.0, 0.2),
-)
+N_CHECKING = 3  # of the attempts, where only the reason of a refusal is sought
 SHORTEST, LONGEST = 0.3, 12.0  # image widths, of a focal length that may be
 MIN_PIECES = 5  # of a part of the swing to begin with
 MIN_IMAGES = 25
@@ -66,7 +54,6 @@ N_USED = 80  # images of a part that are adjusted
 UNIT = 100.0  # mm: the largest distance of two LEDs, until a length is known
 POINT = 1e-3  # mm: radius of a disc before the size is known
 ROUGH, FINER = 2.0, 0.5  # px: noise that residuals are measured by at first
-PROMISING = 30.0  # times the least misfit, within which all of the camera is adjusted
 FITTING = 0.7  # px: a start that fits
 WELL = 0.1  # px: one after which no other is sought
 ALIKE = 0.02  # of the pen's size, within which two shapes are one
@@ -136,8 +123,7 @@ def solve_seed(
     CalibrationError
         No part is long enough, or shape and mirror image fit alike.
     """
-    images, chosen = _best_part(pieces)
-    seed = _solved(pieces, images, chosen, size, known)
+    seed = _somewhere_solved(pieces, size, known)
     fits = seed.start.sigma <= FITTING
     if fits and seed.margin >= DECIDED:
         return seed
@@ -149,23 +135,49 @@ def solve_seed(
     raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
 
 
+def _somewhere_solved(
+    pieces: Pieces, size: tuple[int, int], known: Camera | None
+) -> Seed:
+    """Return the best of all hypotheses for a swing, or else for either half.
+
+    A flat pen shows depth by perspective alone, and has wrong starts that nearly fit.
+    These differ from part to part, and other LEDs are seen there.
+    """
+    every = np.arange(len(pieces.spots))
+    solved, failures = list[Seed](), list[CalibrationError]()
+    for some in (every, *np.array_split(every, 2)):
+        part = Pieces(pieces.pixels[some], pieces.spots[some])
+        try:
+            seed = _solved(part, *_best_part(part), size, known)
+        except CalibrationError as error:
+            failures.append(error)
+            continue
+        solved.append(replace(seed, images=some[seed.images]))
+        if _is_certain(seed):
+            break
+    if not solved:
+        raise failures[0]
+    return _best(solved)
+
+
+def _is_certain(seed: Seed) -> bool:
+    return seed.start.sigma < WELL and seed.margin >= DECIDED
+
+
 def _solved(
     pieces: Pieces,
     images: IntArray,
     chosen: IntArray,
     size: tuple[int, int],
     known: Camera | None,
+    n_attempts: int | None = None,
 ) -> Seed:
     """Return the best of all hypotheses for a part of a swing.
 
-    Where none fits well, smaller parts, other depths of the shape and other focal
-    lengths are tried.
+    Where none fits well, smaller parts and other depths of the shape are tried.
     """
-    given = [focal * size[0] for focal in FOCAL_LENGTHS]
-    attempts = [(*each, list[float]()) for each in ATTEMPTS]
-    attempts += [(*each, given) for each in MORE_ATTEMPTS]
     tried: list[Seed] = []
-    for first, last, least_metric, focal_lengths in attempts:
+    for first, last, least_metric in ATTEMPTS[:n_attempts]:
         n = len(images)
         part = images[int(first * n) : int(last * n)]
         shown = (pieces.spots[np.ix_(part, chosen)] >= 0).mean(axis=0)
@@ -181,40 +193,47 @@ def _solved(
             centroids=shape.centroids[used],
         )
         trial = _Trial(pixels[used], size, known)
-        seed = _attempted(trial, shape, part[used], own, focal_lengths)
+        seed = _attempted(trial, shape, part[used], own)
         if seed is not None:
             tried.append(seed)
-            if seed.start.sigma < WELL and seed.margin >= DECIDED:
+            if _is_certain(seed):
                 break
     if not tried:
         raise CalibrationError("discover.no-start")
-    least = min(seed.start.sigma for seed in tried)
+    return _best(tried)
+
+
+def _best(tried: Sequence[Seed]) -> Seed:
+    """Return the solution that fits best, with the hypotheses of all."""
+    least = min(map(_misfit, tried))
     near = [seed for seed in tried if seed.start.sigma <= DECIDED * least]
     decided = [seed for seed in near if seed.margin >= DECIDED]
-    best = min(decided or near, key=lambda seed: seed.start.sigma)
+    best = min(decided or near, key=_misfit)
     others = [each for seed in tried if seed is not best for each in seed.hypotheses]
     failed = tuple(replace(each, is_best=False) for each in others)
     return replace(best, hypotheses=best.hypotheses + failed)
 
 
+def _misfit(seed: Seed) -> float:
+    return seed.start.sigma
+
+
 def _attempted(
-    trial: "_Trial",
-    shape: WeakShape,
-    images: IntArray,
-    chosen: IntArray,
-    focal_lengths: Sequence[float],
+    trial: "_Trial", shape: WeakShape, images: IntArray, chosen: IntArray
 ) -> Seed | None:
     """Return the best of both mirror images; None without a focal length."""
     if trial.known is not None:
-        focal_lengths = [trial.known.fx]
-    elif not focal_lengths:
+        focal = trial.known.fx
+    else:
         # The mirrored shape has the same focal length, but for its sign.
         focal, width = abs(focal_length_of(shape)), trial.size[0]
-        focal_lengths = [focal if focal >= SHORTEST * width else USUAL_FOCAL * width]
-    tried = trial.starts(shape, focal_lengths, mirrored=False)
-    tried += trial.starts(shape.mirrored, focal_lengths, mirrored=True)
-    if not tried:
-        return None
+        focal = focal if focal >= SHORTEST * width else USUAL_FOCAL * width
+        if focal > LONGEST * width:
+            return None
+    tried = [
+        trial.started(shape, focal, mirrored=False),
+        trial.started(shape.mirrored, focal, mirrored=True),
+    ]
     _, start = min(tried, key=lambda pair: pair[0].misfit)
     hypotheses = tuple(
         replace(each, is_best=_are_alike(other, start)) for each, other in tried
@@ -257,7 +276,7 @@ def _require_one_pen(
         larger = seed.pieces[side if 2 * side.sum() >= len(side) else ~side]
         if not MIN_PIECES <= len(larger) <= len(seed.pieces) - 2:
             continue
-        part = _solved(pieces, images, larger, size, known)
+        part = _solved(pieces, images, larger, size, known, N_CHECKING)
         if part.start.sigma < APART * seed.start.sigma:
             n_others = len(seed.pieces) - len(larger)
             raise CalibrationError("discover.two-pens", n_others=n_others)
@@ -278,11 +297,11 @@ def require_one_focal_length(
     """
     n = len(pieces.spots)
     n_end = max(MIN_IMAGES, int(END * n))
-    focal_lengths, sigmas = [], []
+    focal_lengths, sigmas, misfits = [], [], []
     for end in (slice(0, n_end), slice(n - n_end, n)):  # it changed in between
         part = Pieces(pieces.pixels[end], pieces.spots[end])
         try:
-            seed = _solved(part, *_best_part(part), size, known)
+            seed = _solved(part, *_best_part(part), size, known, N_CHECKING)
         except CalibrationError:
             return
         if seed.start.sigma > most_misfit:
@@ -294,8 +313,11 @@ def require_one_focal_length(
         apart = np.linalg.norm(leds[:, None] - leds, axis=2)
         first, second = np.unravel_index(np.argmax(apart), apart.shape)
         length = KnownLength(int(first), int(second), float(apart.max()), 1e-4 * UNIT)
+        misfits.append(seed.start.sigma)
         focal_lengths.append(camera.fx)
         sigmas.append(focal_sigma(seed.start, pixels, prior, (length,)))
+    if max(misfits) > DECIDED * min(misfits):
+        return  # the worse one is at another minimum
     first_focal, last_focal = focal_lengths
     by_chance = ENDS_APART * float(np.linalg.norm(sigmas))
     if abs(last_focal - first_focal) > by_chance:
@@ -312,46 +334,20 @@ class _Trial:
     size: tuple[int, int]
     known: Camera | None
 
-    def starts(
-        self, shape: WeakShape, focal_lengths: Sequence[float], *, mirrored: bool
-    ) -> list[tuple[Hypothesis, Start]]:
-        """Return the result of the adjustments of a shape."""
-        width = self.size[0]
+    def started(
+        self, shape: WeakShape, focal: float, *, mirrored: bool
+    ) -> tuple[Hypothesis, Start]:
+        """Return the result of the adjustment of a shape."""
         first, second, unit = _longest(shape)
         length = (KnownLength(first, second, UNIT, 1e-4 * UNIT),)
-        found: list[tuple[float, Start]] = []
-        for focal in focal_lengths:
-            if not SHORTEST * width < focal < LONGEST * width:
-                continue
-            camera = (
-                ideal_camera(*self.size, focal) if self.known is None else self.known
-            )
-            start = state_of(shape, camera, POINT, unit)
-            rough = adjust_start(
-                start, self.pixels, held_camera(camera), 12, length, ROUGH
-            )
-            if self.known is None:
-                prior = free_focal_length(camera)
-                rough = adjust_start(rough.state, self.pixels, prior, 20, length, FINER)
-            found.append((focal, rough))
-        least = min((start.sigma for _, start in found), default=0.0)
-        return [
-            self._finished(focal, start, length, least, mirrored=mirrored)
-            for focal, start in found
-        ]
-
-    def _finished(
-        self,
-        focal: float,
-        start: Start,
-        length: tuple[KnownLength, ...],
-        least: float,
-        *,
-        mirrored: bool,
-    ) -> tuple[Hypothesis, Start]:
-        if start.sigma <= PROMISING * max(least, FITTING / PROMISING):
-            prior = camera_prior(start.state.rig.cameras[0], self.known)
-            start = adjust_start(start.state, self.pixels, prior, 40, length)
+        camera = self.known or ideal_camera(*self.size, focal)
+        state, held = state_of(shape, camera, POINT, unit), held_camera(camera)
+        start = adjust_start(state, self.pixels, held, 12, length, ROUGH)
+        if self.known is None:
+            prior = free_focal_length(camera)
+            start = adjust_start(start.state, self.pixels, prior, 20, length, FINER)
+        prior = camera_prior(start.state.rig.cameras[0], self.known)
+        start = adjust_start(start.state, self.pixels, prior, 40, length)
         after = start.state.rig.cameras[0].fx
         return Hypothesis(mirrored, float(focal), after, start.sigma), start
 

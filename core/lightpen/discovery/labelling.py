@@ -29,6 +29,7 @@ MIN_FOUND = 5  # LEDs by which an image is found again
 AT_LED = 0.003  # of the image width: a spot that is an LED
 SURE = 0.0015  # of the image width, of an LED in an image that is found again
 FIXED_TO_PEN = 1.0e-3  # of the image width: rms of a spot that goes with the pen
+TRIMMED, OFF, MOSTLY = 4, 4.0, 0.8  # passes, times the median, and share of the images
 MIN_TRIANGULATED = 12  # images that show a spot that may be a new LED
 MIN_PARALLAX = 0.1  # rad, between its rays
 REACH, GRID = 4, np.radians(8)  # steps of a turn to each side, and rad a step
@@ -249,24 +250,15 @@ class _Search:
 
     def _add_led(self, images: IntArray, lengths: IntArray) -> bool:
         """Add the longest piece that is fixed to the pen as a new LED."""
-        state, camera = self.state, self.state.rig.cameras[0]
+        state = self.state
         for p in np.argsort(-lengths, kind="stable"):
             if lengths[p] < MIN_TRIANGULATED:
                 return False
             if self.led[p] >= 0:
                 continue
             own = images[self.pieces.spots[images, p] >= 0]
-            pixels = self.pieces.pixels[own, p]
-            point = _triangulated(
-                camera.unproject(pixels), self.rotations[own], state.cone_rig
-            )
-            if point is None:
-                continue
-            seen_at = self.rotations[own] @ point + state.cone_rig
-            if seen_at[:, 2].min() <= 0:
-                continue
-            misses = np.linalg.norm(camera.project(seen_at) - pixels, axis=1)
-            if np.sqrt(np.mean(misses**2)) < FIXED_TO_PEN * self.width:
+            point = self._fixed_to_pen(own, self.pieces.pixels[own, p])
+            if point is not None:
                 pen = state.pen
                 self.state = replace(
                     state,
@@ -280,6 +272,27 @@ class _Search:
                 self.sought[:] = False
                 return True
         return False
+
+    def _fixed_to_pen(self, images: IntArray, pixels: FloatArray) -> FloatArray | None:
+        """Return the point of the pen, (3,), that is seen at pixels (M, 2), or None.
+
+        Of a few images the turn is wrong, as hardly any LED is known there.
+        """
+        camera, cone = self.state.rig.cameras[0], self.state.cone_rig
+        rays, R = camera.unproject(pixels), self.rotations[images]
+        good = np.ones(len(images), bool)
+        for _ in range(TRIMMED):
+            point = _triangulated(rays[good], R[good], cone)
+            if point is None:
+                return None
+            places = R @ point + cone
+            with np.errstate(all="ignore"):
+                misses = np.linalg.norm(camera.project(places) - pixels, axis=1)
+            good = misses <= OFF * np.median(misses)
+        rms = np.sqrt(np.mean(misses[good] ** 2))
+        in_front = places[good, 2].min() > 0
+        is_fixed = in_front and rms < FIXED_TO_PEN * self.width
+        return point if is_fixed and np.mean(good) > MOSTLY else None
 
     def find_again(self) -> bool:
         """Look for an image in which tracks broke, by all spots and any posture."""

@@ -284,6 +284,14 @@ def test_a_zoom_midway_is_refused(zoom: float) -> None:
 
 
 @pytest.mark.slow
+def test_leds_that_move_on_the_pen_are_refused() -> None:
+    phases = np.random.default_rng(1).uniform(0, 2 * np.pi, SHORT.pixels.shape[1:])
+    moves = np.sin(np.arange(60)[:, None, None] / 15 + phases)  # px
+    loose = replace(SHORT, pixels=SHORT.pixels + moves)
+    assert refused(loose.sightings, loose) == "discover.not-settled"
+
+
+@pytest.mark.slow
 def test_halves_that_do_not_fit_together_are_refused() -> None:
     station = random_station(901, n_images=N)
     middle = np.array([station.camera.width, station.camera.height]) / 2

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from tests.simulated_stations import Station, errors_of, random_station, seen_station
 
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.hypotheses import Seed
-from lightpen.discovery.labelling import label
+from lightpen.discovery.labelling import MOST_IN_VAIN, Labelled, _Search, label
 from lightpen.discovery.starts import Start, ideal_camera
 from lightpen.discovery.tracks import Pieces
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import simulate_centers, swing_from_postures
+from lightpen.simulator.swings import Swing, simulate_centers, swing_from_postures
 
 STATION = random_station(31000)
 
@@ -63,22 +65,75 @@ def test_a_small_slip_shifts_neither_lens_nor_normal() -> None:
     require_true(discover(station.sightings, station.request), station)
 
 
-def test_a_flat_pen_that_passes_the_view_from_the_front_does_not_turn_back() -> None:
-    n, n_solved, cone = 40, 18, np.array([0.0, 200.0, 5000.0])
-    camera = ideal_camera(2448, 2048, 10000.0)
-    tip = STATION.pen.leds.mean(axis=0) * [1, 1, 0] - [0, 200, 0]
-    pen = replace(STATION.pen, leds=STATION.pen.leds * [1, 1, 0] - tip)
+N_SOLVED, CONE = 18, np.array([0.0, 200.0, 5000.0])
+CAMERA = ideal_camera(2448, 2048, 10000.0)
+FLAT = replace(
+    STATION.pen,
+    leds=STATION.pen.leds * [1, 1, 0]
+    - (STATION.pen.leds.mean(axis=0) * [1, 1, 0] - [0, 200, 0]),
+)
+
+
+def turning(n: int) -> tuple[Swing, FloatArray]:
+    """Return a swing past the view from the front, and its images (n, L, 2), px."""
     postures = Postures(np.linspace(-0.6, 0.6, n), np.full(n, np.pi / 2), np.zeros(n))
-    swing = swing_from_postures(postures, np.zeros(3), cone)
-    R = swing.rotations
+    swing = swing_from_postures(postures, np.zeros(3), CONE)
     rng = np.random.default_rng(5)
-    pixels = simulate_centers(camera, pen, R, swing.translations, 0.03, rng)
-    pieces = Pieces(pixels, np.tile(np.arange(pen.n_leds), (n, 1)))
-    state = BundleState(rig_of(camera), pen, np.zeros(3), cone, R[:n_solved])
-    start = Start(state, 0.03)
-    seed = Seed(np.arange(n_solved), np.arange(pen.n_leds), start, (), np.inf)
+    R, t = swing.rotations, swing.translations
+    return swing, simulate_centers(CAMERA, FLAT, R, t, 0.03, rng)
 
-    found = label(seed, pieces, pieces, tuple(pixels), camera.width)
 
-    assert len(found.images) == n
-    np.testing.assert_allclose(found.state.rotations, R, atol=np.radians(2))
+def labelled(swing: Swing, pixels: FloatArray, spots: IntArray) -> Labelled:
+    """Return the labels by the first images, of which the turns are known."""
+    pieces = Pieces(pixels, spots)
+    R = swing.rotations[:N_SOLVED]
+    start = Start(BundleState(rig_of(CAMERA), FLAT, np.zeros(3), CONE, R), 0.03)
+    seed = Seed(np.arange(N_SOLVED), np.arange(FLAT.n_leds), start, (), np.inf)
+    return label(seed, pieces, pieces, tuple(pixels), CAMERA.width)
+
+
+def test_a_flat_pen_that_passes_the_view_from_the_front_does_not_turn_back() -> None:
+    swing, pixels = turning(40)
+
+    found = labelled(swing, pixels, np.tile(np.arange(FLAT.n_leds), (40, 1)))
+
+    assert len(found.images) == 40
+    np.testing.assert_allclose(
+        found.state.rotations, swing.rotations, atol=np.radians(2)
+    )
+
+
+def test_a_pen_that_is_gone_is_sought_in_some_images_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    swing, pixels = turning(120)
+    gone = pixels[N_SOLVED:]
+    gone[:] = np.random.default_rng(6).uniform(0, 2000, gone.shape)
+    spots = np.full(pixels.shape[:2], -1)
+    spots[:N_SOLVED] = np.arange(FLAT.n_leds)
+    sought = set()
+    monkeypatch.setattr(_Search, "_settles", lambda self, i, spots: sought.add(i))
+
+    found = labelled(swing, pixels, spots)
+
+    assert found.images.tolist() == list(range(N_SOLVED))
+    assert len(sought) == MOST_IN_VAIN
+    assert np.ptp(list(sought)) > 80
+
+
+def test_an_led_is_found_though_some_turns_are_wrong() -> None:
+    swing, pixels = turning(40)
+    state = BundleState(rig_of(CAMERA), FLAT, np.zeros(3), CONE, swing.rotations)
+    none = Pieces(pixels, np.full(pixels.shape[:2], -1))
+    search = _Search(state, none, tuple(pixels), CAMERA.width)
+    wrong = rotation_from_vector(np.array([[0.0, 0.2, 0.0]]))
+    search.rotations[:] = swing.rotations
+    search.rotations[:4] = wrong @ swing.rotations[:4]
+    every = np.arange(40)
+
+    point = search._fixed_to_pen(every, pixels[:, 3])
+
+    assert point is not None
+    np.testing.assert_allclose(point, FLAT.leds[3], atol=0.5)
+    apart = pixels[:, 3] + np.linspace(0, 40, 40)[:, None] * [1, -1]
+    assert search._fixed_to_pen(every, apart) is None
