@@ -98,9 +98,10 @@ def discovery_record(discovery: Discovery) -> dict[str, Any]:
 
 def discovery_text(discovery: Discovery) -> str:
     """Return the result of a discovery as text, in English."""
-    um = TO_MICROMETRES
     tip, U = discovery.tip_pen, discovery.expanded_uncertainty
-    unit = "% of the largest LED distance" if discovery.is_relative else "mm"
+    unit, fine, factor = "mm", "µm", TO_MICROMETRES
+    if discovery.is_relative:
+        unit, fine, factor = "% of the largest LED distance", "%", 1.0
     lines = [
         f"{'':12}{'value':>14}{'U (k = 2)':>12}",
         *(
@@ -115,7 +116,7 @@ def discovery_text(discovery: Discovery) -> str:
         for name, value, sigma in zip(names, values, sigmas, strict=True)
     ]
     lines += [
-        f"  LED {j:<6}{x:10.4f}{y:11.4f}{z:11.4f}   U {u.max() * um:.1f} µm"
+        f"  LED {j:<6}{x:10.4f}{y:11.4f}{z:11.4f}   U {u.max() * factor:#.3g} {fine}"
         for j, ((x, y, z), u) in enumerate(
             zip(discovery.pen.leds, discovery.led_uncertainty, strict=True), 1
         )

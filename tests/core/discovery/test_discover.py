@@ -15,6 +15,7 @@ from tests.simulated_stations import (
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.hypotheses import require_one_focal_length
+from lightpen.discovery.report import discovery_text
 from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import require_sketched
 from lightpen.discovery.scale import MeasuredLength
@@ -134,6 +135,7 @@ def test_without_a_length_the_result_is_relative() -> None:
     found = discover(STATION.sightings, replace(STATION.request, lengths=()))
 
     assert found.is_relative
+    assert "µm" not in discovery_text(found)
     leds = found.pen.leds
     longest = np.linalg.norm(leds[:, None] - leds, axis=2).max()
     assert longest == pytest.approx(100, rel=1e-4)
