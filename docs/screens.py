@@ -536,7 +536,7 @@ def _touched(
 
 def _verified(setup: SessionSetup, scene: Scene) -> SessionState:
     """Return a verification with the results of all its tasks."""
-    return _touched(setup, scene, n_on_ring=10, n_ends=2)
+    return _touched(setup, scene, n_on_ring=11, n_ends=2)
 
 
 def _measuring(setup: SessionSetup, scene: Scene) -> SessionState:

@@ -100,7 +100,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         return self._pages.pageCount()
 
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Calibration report"))
+        self.setWindowTitle(self._paper.margins.title)
         self._pages.setAccessibleName(self.tr("Pages"))
         self._smaller.setText(self.tr("Smaller"))
         self._larger.setText(self.tr("Larger"))
@@ -110,7 +110,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     def _ask_file(self) -> None:
         path = self._place.folder() / f"{self._stem}.pdf"
-        ask_file(self, self.tr("Save calibration report"), path, self.write)
+        ask_file(self, self.tr("Save report"), path, self.write)
 
     def write(self, path: Path) -> None:
         """Save it as PDF in a file."""

@@ -20,6 +20,7 @@ from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.folder.verifications import StoredVerification
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import grade_text, origin_text
+from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.print_report.blocks import (
     RIGHT,
@@ -256,4 +257,4 @@ def _plain(name: str, value: Any) -> str:
 def _number(name: str, value: float) -> str:
     """Return a length with decimals, and any other number with significant digits."""
     is_length = isinstance(value, float) and name.endswith("_mm")
-    return f"{value:.{N_DECIMALS}f}" if is_length else f"{value:.{N_DIGITS}g}"
+    return number_text(value, N_DECIMALS) if is_length else f"{value:.{N_DIGITS}g}"

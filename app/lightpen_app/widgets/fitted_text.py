@@ -14,7 +14,7 @@ WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
 class FittedText(QWidget):
-    """Words that wrap, and shrink only where they would not fit.
+    """Words that shrink only where they would not fit.
 
     Parameters
     ----------
@@ -24,6 +24,8 @@ class FittedText(QWidget):
         Lines of that size for which the widget asks.
     least : float
         Size of the letters, px, in which all words always have room.
+    wraps : bool
+        Whether the words may take several lines.
     """
 
     def __init__(
@@ -32,13 +34,16 @@ class FittedText(QWidget):
         n_lines: int = 1,
         alignment: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
         least: float = 0.0,
+        *,
+        wraps: bool = True,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._least = least
         self._largest = largest
         self._n_lines = n_lines
-        self._flags = WRAPPED | int(alignment | Qt.AlignmentFlag.AlignVCenter)
+        self._flags = int(alignment | Qt.AlignmentFlag.AlignVCenter)
+        self._flags |= WRAPPED if wraps else 0
         self._text = ""
         self._tone = Tone.PLAIN
         self._bold = True

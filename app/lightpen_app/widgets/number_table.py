@@ -60,14 +60,15 @@ class NumberTable(QTableWidget):
         down.setDefaultAlignment(_LEFT)
         down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         down.setHighlightSections(False)
-        self.set_large(False)
+        self.set_letters(TextSize.BODY)
 
-    def set_large(self, large: bool) -> None:
-        """Show the figures larger, for a large window, or as usual."""
+    def set_letters(self, size: TextSize) -> None:
+        """Show the figures larger, for a large window, smaller or as usual."""
         # Before the heights: none is less than the letters are high.
         for each in (self, self.horizontalHeader(), self.verticalHeader()):
-            set_size(each, TextSize.LEAD if large else TextSize.BODY)
-        self._row_height = LARGE_ROW_HEIGHT if large else ROW_HEIGHT
+            set_size(each, size)
+        is_large = size > TextSize.BODY
+        self._row_height = LARGE_ROW_HEIGHT if is_large else ROW_HEIGHT
         self.horizontalHeader().setFixedHeight(self._row_height)
         self.verticalHeader().setDefaultSectionSize(self._row_height)
         self.updateGeometry()

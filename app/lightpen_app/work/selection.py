@@ -15,7 +15,7 @@ from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, preparation_of, station_of
 
 # Nothing that is chosen for a trial is remembered.
-TRIAL = Names("Trial", "Trial", "SIM-1", "T-1", "C-1", 10.0)
+TRIAL = Names("Trial", "Trainee", "SIM-1", "T-1", "C-1", 10.0)
 
 
 def trial_of(preparation: Preparation) -> Preparation:

@@ -39,7 +39,7 @@ MESSAGES = {
     "session.touch-ends": "Probe one end of the length, then the other, and hold still on each: {n_touches} of 2.",
     "session.at-rest": "The pen rests. Pick it up: a point counts once the pen has moved.",
     "session.done": "Verification complete. You can put the pen down.",
-    "session.touch-cone": "Put the tip into the cone and hold it still, each time with another tilt: {n_touches} of {needed}.",
+    "session.touch-cone": "Put the tip into the cone and hold it still, each time with another tilt.",
     "session.touch-ring": "Probe the ring all round and hold still on each point. Points: {n_touches}.",
     "session.touch-postures": "Probe the cone {needed} times in one posture and lift the tip in between: {n_touches} of {needed}. Posture {posture} of {n_postures}: upright, and tilted to four sides.",
     "session.touch-witness": "Has the camera moved? Probe the cone {needed} times with the pen upright, and lift the tip in between: {n_touches} of {needed}. Visit {visit} of {n_visits}.",

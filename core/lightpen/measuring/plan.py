@@ -24,7 +24,7 @@ from lightpen.formats.documents import parse_document
 from lightpen.formats.files import printable, read_text, write_whole
 from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.measuring.zones import Criterion
-from lightpen.messages import message
+from lightpen.messages import Message, message
 from lightpen.model.decision_rules import DecisionRule
 
 PLAN = message("measuring.plan")
@@ -84,6 +84,27 @@ class CharacteristicKind(StrEnum):
     PARALLELISM = "parallelism"
     PERPENDICULARITY = "perpendicularity"
     CONCENTRICITY = "concentricity"
+
+
+QUANTITIES = {  # the others are letters
+    CharacteristicKind.DIAMETER: message("measuring.diameter"),
+    CharacteristicKind.RADIUS: message("measuring.radius"),
+    CharacteristicKind.WIDTH: message("measuring.width"),
+    CharacteristicKind.LENGTH: message("measuring.length"),
+    CharacteristicKind.CONE_ANGLE: message("measuring.cone-angle"),
+    CharacteristicKind.DISTANCE: message("measuring.distance"),
+    CharacteristicKind.ANGLE: message("measuring.angle"),
+    CharacteristicKind.STRAIGHTNESS: message("measuring.straightness"),
+    CharacteristicKind.FLATNESS: message("measuring.flatness"),
+    CharacteristicKind.ROUNDNESS: message("measuring.roundness"),
+    CharacteristicKind.CYLINDRICITY: message("measuring.cylindricity"),
+    CharacteristicKind.FORM: message("measuring.form"),
+    CharacteristicKind.POSITION: message("measuring.position"),
+    CharacteristicKind.PARALLELISM: message("measuring.parallelism"),
+    CharacteristicKind.PERPENDICULARITY: message("measuring.perpendicularity"),
+    CharacteristicKind.CONCENTRICITY: message("measuring.concentricity"),
+}
+SIMULATED_PLATE = message("measuring.simulated-plate")
 
 
 class _Entry(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -201,6 +222,15 @@ class PlannedCharacteristic(_Entry, frozen=True):
         return self.name or f"{self.quantity} {' - '.join(self.of)}"
 
     @property
+    def words(self) -> Message:
+        """Its label for display."""
+        if self.name:
+            return message("measuring.named", name=self.name)
+        quantity = QUANTITIES.get(self.quantity, self.quantity.value)
+        of = " - ".join(self.of)
+        return message("measuring.characteristic", quantity=quantity, of=of)
+
+    @property
     def features(self) -> tuple[str, ...]:
         """Features that it needs."""
         return (*self.of, *filter(None, [self.datum]))
@@ -237,6 +267,16 @@ class Plan(_Entry, frozen=True):
     alignment: PlannedAlignment | None = None
     characteristics: tuple[PlannedCharacteristic, ...] = ()
     rule: DecisionRule = DecisionRule.GUARD_BAND
+
+    @property
+    def words(self) -> Message:
+        """Its name for display."""
+        is_simulated = self.name == SIMULATED_PLATE.template
+        return (
+            SIMULATED_PLATE
+            if is_simulated
+            else message("measuring.named", name=self.name)
+        )
 
     def feature(self, name: str) -> PlannedFeature:
         """Return a feature to probe by its name."""

@@ -37,7 +37,7 @@ EVIDENCES = {
 class PartRow:
     """A row of a table: numbers or words, None for a blank, and a remark."""
 
-    name: str
+    name: Message | str
     values: tuple[float | str | None, ...]
     remark: Message | str
 
@@ -82,7 +82,7 @@ def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:
     """Yield nominal, tolerance, actual, deviation, U, U alone, P and decision."""
     for result in part.results:
         yield PartRow(
-            result.planned.label,
+            result.planned.words,
             (
                 result.planned.nominal,
                 _tolerance(result.planned),

@@ -25,6 +25,7 @@ ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
 OUTER_MARGIN = 2.0  # squares or distances beyond the points, also in the image
 MAX_TRIES = 100
 N_HELD, HELD_S = 40, 2.0  # poses in which a board is held live; s of each
+HELD_IMAGES = 10  # and images of each, if these take longer
 MARGIN = 10  # px round what is seen of it
 
 

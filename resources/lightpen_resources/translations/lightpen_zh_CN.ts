@@ -355,6 +355,10 @@
         <translation>打印 (PDF)...</translation>
     </message>
     <message>
+        <source>Scale check (optional): stated, measured, U / mm</source>
+        <translation>比例核查（可选）：标称值、实测值、U / mm</translation>
+    </message>
+    <message>
         <source>Scale check (optional)</source>
         <translation>比例核查（可选）</translation>
     </message>
@@ -385,6 +389,10 @@
     <message>
         <source>Exclude view and recalibrate</source>
         <translation>剔除视图并重新标定</translation>
+    </message>
+    <message>
+        <source>Waiting for the first image</source>
+        <translation>正在等待第一幅图像</translation>
     </message>
     <message>
         <source>Start, then align the board with the outline.</source>
@@ -954,6 +962,10 @@
     <message>
         <source>{0} of {1} tips in use at this station are due.</source>
         <translation>本工位使用中的 {1} 个测头中，{0} 个已到期。</translation>
+    </message>
+    <message>
+        <source>No tip is in use at this station.</source>
+        <translation>本工位没有正在使用的测头。</translation>
     </message>
     <message>
         <source>Calibrated</source>
@@ -1616,10 +1628,6 @@
     <message>
         <source>Exclude {0} above {1} px</source>
         <translation>剔除高于 {1} px 的 {0} 幅</translation>
-    </message>
-    <message>
-        <source>{0} of {1} included</source>
-        <translation>计入 {0} / {1} 幅</translation>
     </message>
     <message>
         <source>{0} {1}</source>
@@ -3461,10 +3469,6 @@
 <context>
     <name>PlanPanel</name>
     <message>
-        <source>Simulated plate</source>
-        <translation>模拟平板</translation>
-    </message>
-    <message>
         <source>Open plan...</source>
         <translation>打开测量计划...</translation>
     </message>
@@ -3619,10 +3623,6 @@ needed</source>
 <context>
     <name>PrintReportWindow</name>
     <message>
-        <source>Calibration report</source>
-        <translation>标定报告</translation>
-    </message>
-    <message>
         <source>Pages</source>
         <translation>页面</translation>
     </message>
@@ -3647,8 +3647,8 @@ needed</source>
         <translation>关闭</translation>
     </message>
     <message>
-        <source>Save calibration report</source>
-        <translation>保存标定报告</translation>
+        <source>Save report</source>
+        <translation>保存报告</translation>
     </message>
 </context>
 <context>
@@ -4273,6 +4273,10 @@ needed</source>
 <context>
     <name>SelectionPanel</name>
     <message>
+        <source>To adjust together, select {0} or more calibrations.</source>
+        <translation>联合平差需选择 {0} 个或更多标定。</translation>
+    </message>
+    <message>
         <source>Select two entries with a tip to compare them.</source>
         <translation>选择两个带测头数据的条目即可比较。</translation>
     </message>
@@ -4327,10 +4331,6 @@ needed</source>
     <message>
         <source>LED file and camera file by all selected swings of a pen</source>
         <translation>用同一光笔的所选全部摆动求 LED 文件和相机文件</translation>
-    </message>
-    <message>
-        <source>Select {0} or more calibrations.</source>
-        <translation>请选择至少 {0} 次标定。</translation>
     </message>
     <message>
         <source>Repeatability report...</source>
@@ -6401,8 +6401,8 @@ mm</translation>
         <translation>触测平板</translation>
     </message>
     <message>
-        <source>Probe the plate all over and hold still on each point: {n_points} of {needed}.</source>
-        <translation>在整个平板上触测，在每个点上保持不动：{n_points} / {needed}。</translation>
+        <source>Probe the plate all over and hold still on each point.</source>
+        <translation>在整个平板上触测，在每个点上保持不动。</translation>
     </message>
     <message>
         <source>Probe the ring</source>
@@ -6413,8 +6413,8 @@ mm</translation>
         <translation>触测球</translation>
     </message>
     <message>
-        <source>Probe the upper half of the sphere all over and hold still on each point: {n_points} of {needed}.</source>
-        <translation>在球的整个上半部触测，并在每个点保持静止：{n_points} / {needed}。</translation>
+        <source>Probe the upper half of the sphere all over and hold still on each point.</source>
+        <translation>在球的整个上半部触测，并在每个点保持静止。</translation>
     </message>
     <message>
         <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
@@ -6925,6 +6925,10 @@ mm</translation>
         <translation>封印文件</translation>
     </message>
     <message>
+        <source>straightness</source>
+        <translation>直线度</translation>
+    </message>
+    <message>
         <source>the compliance of stylus, seat and stand. Use a stiffer stylus, press gently, and clamp cone and camera</source>
         <translation>探针、锥座和支架的柔度。请使用更刚的探针、轻压，并夹紧锥孔和相机</translation>
     </message>
@@ -6963,6 +6967,10 @@ mm</translation>
     <message>
         <source>what is not simultaneous. Trigger all cameras by one signal, use a global shutter, and light all LEDs at once</source>
         <translation>不同步的影响。请用同一信号触发所有相机、使用全局快门，并同时点亮所有 LED</translation>
+    </message>
+    <message>
+        <source>width</source>
+        <translation>宽度</translation>
     </message>
     <message>
         <source>x, y, z in mm, separated by tabs</source>
@@ -8429,8 +8437,8 @@ mm</translation>
         <translation>处理速度不足：{n_offered} 幅图像中有 {n_missed} 幅未处理。请关闭其他程序，否则采集时间更长。</translation>
     </message>
     <message>
-        <source>Put the tip into the cone and hold it still, each time with another tilt: {n_touches} of {needed}.</source>
-        <translation>把测头放入锥孔并保持不动，每次改变倾斜：{n_touches} / {needed}。</translation>
+        <source>Put the tip into the cone and hold it still, each time with another tilt.</source>
+        <translation>把测头放入锥孔并保持不动，每次改变倾斜。</translation>
     </message>
     <message>
         <source>Residuals are large: {sigma:.2f} px; usual is {usual} px or less. Check that the camera file belongs to this camera, lens and focus, and the LED file to this pen.</source>
@@ -8471,6 +8479,10 @@ mm</translation>
     <message>
         <source>Settings saved, but another program had locked {file} for {seconds:g} s. End that program if it hangs; it may overwrite the settings.</source>
         <translation>设置已保存，但另一个程序将 {file} 锁定了 {seconds:g} s。如果该程序无响应，请结束它，否则它可能覆盖设置。</translation>
+    </message>
+    <message>
+        <source>Simulated plate</source>
+        <translation>模拟平板</translation>
     </message>
     <message>
         <source>Slide along the {kind} {name}: {n_points} of {needed} points.</source>
@@ -9553,6 +9565,10 @@ mm</translation>
         <translation>将点从测头坐标系映射到光笔坐标系的 ITK 变换 (.tfm)</translation>
     </message>
     <message>
+        <source>angle</source>
+        <translation>角度</translation>
+    </message>
+    <message>
         <source>approach</source>
         <translation>接近方向</translation>
     </message>
@@ -9589,8 +9605,28 @@ mm</translation>
         <translation>圆</translation>
     </message>
     <message>
+        <source>concentricity</source>
+        <translation>同心度</translation>
+    </message>
+    <message>
+        <source>cone angle</source>
+        <translation>锥角</translation>
+    </message>
+    <message>
         <source>cylinder</source>
         <translation>圆柱</translation>
+    </message>
+    <message>
+        <source>cylindricity</source>
+        <translation>圆柱度</translation>
+    </message>
+    <message>
+        <source>diameter</source>
+        <translation>直径</translation>
+    </message>
+    <message>
+        <source>distance</source>
+        <translation>距离</translation>
     </message>
     <message>
         <source>entry {number} of chain {chain}</source>
@@ -9621,12 +9657,24 @@ mm</translation>
         <translation>固定点验证记录</translation>
     </message>
     <message>
+        <source>flatness</source>
+        <translation>平面度</translation>
+    </message>
+    <message>
+        <source>form</source>
+        <translation>形状</translation>
+    </message>
+    <message>
         <source>guard band (ISO 14253-1)</source>
         <translation>保护带（ISO 14253-1）</translation>
     </message>
     <message>
         <source>inside</source>
         <translation>内侧</translation>
+    </message>
+    <message>
+        <source>length</source>
+        <translation>长度</translation>
     </message>
     <message>
         <source>length verification</source>
@@ -9681,6 +9729,14 @@ mm</translation>
         <translation>外侧</translation>
     </message>
     <message>
+        <source>parallelism</source>
+        <translation>平行度</translation>
+    </message>
+    <message>
+        <source>perpendicularity</source>
+        <translation>垂直度</translation>
+    </message>
+    <message>
         <source>plane</source>
         <translation>平面</translation>
     </message>
@@ -9701,8 +9757,16 @@ mm</translation>
         <translation>位姿 {pose:g} 已在第 {line} 行给出。请删除重复复制的内容。</translation>
     </message>
     <message>
+        <source>position</source>
+        <translation>位置度</translation>
+    </message>
+    <message>
         <source>program error</source>
         <translation>程序错误</translation>
+    </message>
+    <message>
+        <source>radius</source>
+        <translation>半径</translation>
     </message>
     <message>
         <source>reference</source>
@@ -9715,6 +9779,10 @@ mm</translation>
     <message>
         <source>rotation of cam_from_rig about {axis}</source>
         <translation>cam_from_rig 绕 {axis} 的旋转</translation>
+    </message>
+    <message>
+        <source>roundness</source>
+        <translation>圆度</translation>
     </message>
     <message>
         <source>same as another image</source>
@@ -9927,6 +9995,10 @@ mm</translation>
     <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
         <translation>{path} 是 Windows 上的设备名，而不是文件名。请选择其他名称。</translation>
+    </message>
+    <message>
+        <source>{quantity} {of}</source>
+        <translation>{of} 的{quantity}</translation>
     </message>
     <message>
         <source>{reason} {power}</source>

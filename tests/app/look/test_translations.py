@@ -41,7 +41,7 @@ UNSEEN = {"setObjectName", "TypeVar", "ValueError"}  # whose words no user reads
 ENGLISH = ("self_test", "crash.py", "desktop_entry.py")  # files, and both languages
 NAMES = {
     *("Lightpen", "English", "Fusion", "Lightpen Sans", "Lightpen Sans SC", "Cgk"),
-    *("Demo", "Trial"),  # of stations, pens and tips
+    *("Demo", "Trial", "Trainee"),  # of stations, pens and tips
     *("yyyy-MM-dd hh:mm", "fixed point", "export folder", "under way"),  # for programs
     *("other windows", "without images"),  # causes of notifications
 }

@@ -9,12 +9,20 @@ from msgspec import structs
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.part import MeasuredPart, measure_part
-from lightpen.measuring.plan import Plan, Side, parse_plan
+from lightpen.measuring.plan import (
+    QUANTITIES,
+    SIMULATED_PLATE,
+    CharacteristicKind,
+    Plan,
+    Side,
+    parse_plan,
+)
 from lightpen.measuring.report import feature_rows
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.measuring.touches import PartTouches
 from lightpen.model.decision_rules import Decision
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.plate import plate_plan
 
 R = rotation_from_vector(np.array([0.4, -0.7, 0.2]))
 T = np.array([120.0, -80.0, 1400.0])
@@ -258,3 +266,26 @@ def replace_side(plan: Plan, name: str):  # type: ignore[no-untyped-def]
     import msgspec
 
     return msgspec.structs.replace(plan.feature(name), side=Side.AUTO, touches=None)
+
+
+def test_quantities_and_the_simulated_plate_are_shown_in_the_chosen_language() -> None:
+    chinese = {"diameter": "直径", "{quantity} {of}": "{of} 的{quantity}"}
+    diameter, *_, named = (
+        *parse_plan(PLAN, "plan.yaml").characteristics,
+        structs.replace(parse_plan(PLAN, "plan.yaml").characteristics[0], name="D1"),
+    )
+
+    def translate(template: str) -> str:
+        return chinese.get(template, template)
+
+    assert diameter.words.text(translate) == "hole 的直径"
+    assert str(diameter.words) == diameter.label == "diameter hole"
+    assert named.words.text(translate) == "D1"
+    assert plate_plan().words == SIMULATED_PLATE
+    assert str(parse_plan(PLAN, "plan.yaml").words) == "Plate"
+
+
+def test_every_characteristic_of_more_than_a_letter_has_words() -> None:
+    assert set(CharacteristicKind) - set(QUANTITIES) == {"x", "y", "z"}
+    for kind, words in QUANTITIES.items():
+        assert str(words) == kind

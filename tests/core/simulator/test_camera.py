@@ -22,7 +22,7 @@ from lightpen.formats.images import ImageSource
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.sightings import find_points
 from lightpen.model.camera import Camera
-from lightpen.simulator.boards import HELD_S
+from lightpen.simulator.boards import HELD_IMAGES, HELD_S
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
@@ -318,6 +318,22 @@ def test_a_camera_in_use_is_busy_until_it_is_free() -> None:
 def test_settings_cannot_change_while_images_come() -> None:
     with pytest.raises(ValueError, match="stopped"):
         streaming_camera().configure(CameraSettings())
+
+
+def test_a_board_is_held_still_for_a_slow_reader_too() -> None:
+    clock = SkippingClock()
+    board = parse_board("chessboard:7x5:20")
+    camera = streaming_camera(clock=clock)
+    camera.operator.board = board
+    seen = []
+    for _ in range(HELD_IMAGES + 1):
+        (frame,) = read(camera, 1)
+        seen.append(find_points(frame.image, board))
+        clock.wait(HELD_S)
+
+    moved = [float(np.abs(each - seen[0]).max()) for each in seen]
+    assert max(moved[:-1]) < 1  # px
+    assert moved[-1] > 10
 
 
 def test_a_board_is_held_in_view_in_many_poses_until_the_pen_is_again() -> None:

@@ -248,7 +248,9 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Camera calibration"))
         self._print.setText(self.tr("Print (PDF)..."))
-        self._measured_name.setText(self.tr("Scale check (optional)"))
+        self._measured_name.setText(
+            self.tr("Scale check (optional): stated, measured, U / mm")
+        )
         self._measured.setAccessibleName(self.tr("Scale check (optional)"))
         self._measured.setPlaceholderText(self.tr("200 200.12 0.04 (mm)"))
         self._measured.setToolTip(
@@ -272,9 +274,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         )
         self._remove.setText(self.tr("Exclude view and recalibrate"))
         self._save.setText(self.tr("Save and use..."))
-        self._image.set_message(
-            self.tr("Start, then align the board with the outline.")
-        )
         self._list_views()
         self._refresh()
 
@@ -282,6 +281,11 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         state, found = self._capture.state, self._calibration.found
         is_live = state.sought is not None
         self._begin.setText(self.tr("Stop") if is_live else self.tr("Start"))
+        self._image.set_message(
+            self.tr("Waiting for the first image")
+            if is_live
+            else self.tr("Start, then align the board with the outline.")
+        )
         views = None if state.capture is None else state.capture.views
         if found is not None:
             views = found.views

@@ -15,7 +15,7 @@ from lightpen.cameras.protocol import (
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone, text_label
-from lightpen_app.look.words import PARTED
+from lightpen_app.look.words import PARTED, on_one_line
 from lightpen_app.steps.camera.setting_field import SettingField
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
@@ -216,7 +216,7 @@ class SettingsPanel(Translated, QGroupBox):
             self.tr("Lost: {0}").format(stats.missed),
             self.tr("Not processed: {0}").format(stats.skipped),
         )
-        self._counts.setText(PARTED.join(counts))
+        self._counts.setText(PARTED.join(map(on_one_line, counts)))
 
     def _retranslate_triggers(self) -> None:
         words = {

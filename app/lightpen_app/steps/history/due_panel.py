@@ -118,6 +118,8 @@ class DuePanel(Translated, QWidget):
             self.tr("{0} of {1} tips in use at this station are due.").format(
                 n_due, len(self._tips)
             )
+            if self._tips
+            else self.tr("No tip is in use at this station.")
         )
         self._table.setVisible(bool(self._tips))
         columns = (

@@ -19,7 +19,7 @@ from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
-DATE_WIDTH = 17 * GRID
+LEAST_DATE, DATE_WIDTH = 14 * GRID, 17 * GRID
 LEAST_CHOICE = 12 * GRID
 
 
@@ -53,6 +53,7 @@ class FilterBar(Translated, QWidget):
         for label, field in zip(self._labels, self._fields, strict=True):
             add_labelled(layout, label, field, stretch=1)
         for day in (self._begin, self._end):
+            day.setMinimumWidth(LEAST_DATE)
             day.setMaximumWidth(DATE_WIDTH)
 
         # Connections

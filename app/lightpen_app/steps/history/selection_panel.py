@@ -83,7 +83,7 @@ class SelectionPanel(Translated, QWidget):
         layout.addWidget(self._study, 4, 1)
         for row, button in enumerate((self._adjust, self._report), 5):
             layout.addWidget(button, row, 0, Qt.AlignmentFlag.AlignLeft)
-        layout.addWidget(self._adjusted, 5, 1)
+        layout.addWidget(self._adjusted, 5, 1, Qt.AlignmentFlag.AlignVCenter)
         layout.setRowStretch(7, 1)
 
         # Connections
@@ -151,7 +151,9 @@ class SelectionPanel(Translated, QWidget):
         self._adjust.setToolTip(
             self.tr("LED file and camera file by all selected swings of a pen")
         )
-        too_few = self.tr("Select {0} or more calibrations.").format(MIN_JOINT + 1)
+        too_few = self.tr(
+            "To adjust together, select {0} or more calibrations."
+        ).format(MIN_JOINT + 1)
         why_not = too_few if len(self._selected) <= MIN_JOINT else ""
         self._adjust.set_why_not(why_not)
         if why_not or self._adjusted.value().sign is Sign.RING:

@@ -208,12 +208,10 @@ class ImagesPanel(Translated, QWidget):
         if solution is None:
             self._count.clear()
             return
-        used = solution.calibration.used
-        counted = self.tr("{0} of {1} included").format(int(used.sum()), len(used))
         reasons = count_left_out(solution).items()
         each = self.tr("{0} {1}")
         parts = [each.format(count, reason_text(reason)) for reason, count in reasons]
-        self._count.setText(self.tr("; ").join([counted, *parts]))
+        self._count.setText(self.tr("; ").join(parts))
 
     def _refresh_buttons(self) -> None:
         rows = self._table.selected()

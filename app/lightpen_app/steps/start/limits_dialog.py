@@ -148,7 +148,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         no_limit = self.tr("No limit")
         for limit, label in zip(LIMITS, self._labels, strict=True):
             field, text = self._fields[limit.key], worded(limit.label)
-            label.setText(text)
+            label.setText(text.replace("(k = 2)", "(k\xa0=\xa02)"))
             field.setAccessibleName(text)
             if isinstance(field, _RuleField):
                 usually = field.retranslate()

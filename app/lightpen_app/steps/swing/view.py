@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -33,7 +33,7 @@ SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
 VAST_SIDE_SHARES, VAST_ROW_SHARES = (5, 0, 6), (1, 1)  # and where there is more
-PEN_PLACE = 4  # below the count, its bar, its note and its button
+PEN_PLACE = 3  # below the count, its bar and its note
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
@@ -73,7 +73,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self.dial.setSizePolicy(
             QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
         )
-        self._count = FittedText(TextSize.DISPLAY)
+        self._count = FittedText(TextSize.DISPLAY, wraps=False)
         self._note = text_label(TextSize.SMALL, Tone.QUIET)
         self._progress = QProgressBar()
         self._progress.setRange(0, PROGRESS_STEPS)
@@ -89,8 +89,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._body = grid_layout(self._content, spacing=(3 * GRID, GRID))
         self._body.addWidget(self.dial, 0, 0)
         self._side = grid_layout(self._body, at=(0, 1), spacing=2 * GRID)
-        left = Qt.AlignmentFlag.AlignLeft
-        numbers = (self._count, self._progress, self._note, (self.swapped, 0, left), 1)
+        numbers = (self._count, self._progress, self._note, 1)
         self._numbers = vertical_layout(self._side, *numbers, at=(0, 0))
         self._body.setRowStretch(0, 1)
         self._body.setColumnStretch(0, DIAL_SHARE)
@@ -98,7 +97,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._scroll = PageScroll()
         self._scroll.setWidget(self._content)
         layout = grid_layout(self)
-        layout.addWidget(self._hint, 1, 0)
         layout.addWidget(self._warning, 2, 0)
         layout.addWidget(self._verdict, 3, 0)
         layout.addWidget(self._scroll, 4, 0)
@@ -106,6 +104,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         # if somebody has chosen it.
         head = ((self._instruction, 1), self.side, self.start_over)
         horizontal_layout(layout, *head, at=(0, 0))
+        horizontal_layout(layout, (self._hint, 1), self.swapped, at=(1, 0))
+        layout.setRowMinimumHeight(1, 5 * GRID)  # with its button and without
         layout.setRowStretch(0, 1)
         layout.setRowStretch(4, 10)
 
@@ -204,7 +204,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._instruction.setMinimumHeight(
             (5 if is_small else 9 if is_large else 7) * GRID
         )
-        self._count.set_largest(TextSize.HUGE if is_large else TextSize.DISPLAY)
+        usual = TextSize.TITLE if is_small else TextSize.DISPLAY
+        self._count.set_largest(TextSize.HUGE if is_large else usual)
 
     def _share_room(self) -> None:
         """Divide the space beside the dial among numbers, pen, image and plots."""

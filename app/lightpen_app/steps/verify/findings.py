@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QWidget
 from typing_extensions import override
 
@@ -32,6 +33,7 @@ MOST_TABLES = 2  # of a task; others are only printed
 HEAD_HEIGHT, ROW_HEIGHT = 7 * GRID, 3 * GRID  # px, of the points during probing
 NOWHERE = Qt.AlignmentFlag(0)  # but all over
 LEAST_HEIGHT = 16 * GRID  # px, of the results
+USUAL_WIDTH = 96 * GRID  # px, with less the tables of a part have small letters
 DIAL_SIZE = 22 * GRID  # px
 PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 5, 9, 13  # of the width
 
@@ -117,9 +119,9 @@ class FiguresView(Translated, QWidget):
         self._value = value
         self._retranslate()
 
-    def set_large(self, large: bool) -> None:
-        """Show the figures larger, for a large window, or as usual."""
-        self._table.set_large(large)
+    def set_letters(self, size: TextSize) -> None:
+        """Show the figures larger, for a large window, smaller or as usual."""
+        self._table.set_letters(size)
 
     @override
     def _retranslate(self) -> None:
@@ -175,6 +177,17 @@ class TaskFinding(ResponsiveLayout, QWidget):
             vertical_layout(self, scroll)
         self._use_room()
 
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._set_letters()
+
+    def _set_letters(self) -> None:
+        is_tight = self._task is PART and self.width() < USUAL_WIDTH
+        usual = TextSize.SMALL if is_tight else TextSize.BODY
+        for table in self._tables:
+            table.set_letters(TextSize.LEAD if self._room.is_large else usual)
+
     def set_value(self, setup: SessionSetup | None, state: SessionState | None) -> None:
         """Show a session; None for none."""
         tables: tuple[ResultTable, ...] = ()
@@ -224,8 +237,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
         self._side.setStretch(0, 0 if is_stacked else 1)
         self._side.setStretch(1, 1)
         is_large = self._room.is_large
-        for table in self._tables:
-            table.set_large(is_large)
+        self._set_letters()
         if self._pictured is not None:
             share = LARGE_PICTURE_SHARE if is_large else PICTURE_SHARE
             self._columns.setStretch(0, share)

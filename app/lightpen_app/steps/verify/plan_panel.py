@@ -86,9 +86,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         """Show a measurement."""
         self._status = status
         plan = self._plan()
-        name = "" if plan is None else plan.name
-        is_simulated = name == plate_plan().name
-        self._name.setText(self.tr("Simulated plate") if is_simulated else name)
+        self._name.setText("" if plan is None else worded(plan.words))
         planned = self._planned()
         for each in (self._kind_label, self._kind, self._scan, self._moved):
             each.setVisible(planned is not None)

@@ -107,7 +107,7 @@ class RingView(Translated, QWidget):
         colors = colors_of(self.palette())
         box = QRectF(middle.x() - side / 2, middle.y() - side / 2, side, 0.6 * side)
         flags = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextSingleLine)
-        words = f"{self._value.covered:.0f}\N{DEGREE SIGN}"
+        words = f"{math.floor(self._value.covered)}\N{DEGREE SIGN}"
         size = fitted_size(words, box, TextSize.HUGE, bold=True, flags=flags)
         painter.setPen(QColor(colors.text))
         painter.setFont(font(size, bold=True))
@@ -124,7 +124,7 @@ class RingView(Translated, QWidget):
         words = self.tr("Ring: {0} of {1} degrees, points: {2}")
         self.setAccessibleName(
             words.format(
-                round(self._value.covered),
+                math.floor(self._value.covered),
                 round(self._value.needed),
                 len(self._value.angles),
             )

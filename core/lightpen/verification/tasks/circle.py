@@ -6,7 +6,7 @@ compared with what noise alone makes of an ideal ring.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
+from math import floor, pi
 from typing import Annotated, Any
 
 import numpy as np
@@ -467,7 +467,8 @@ def _fraction(options: CircleOptions, progress: TaskProgress) -> float:
 
 
 def _count(options: CircleOptions, progress: TaskProgress) -> Message:
-    return message("circle.count", covered=covered(progress.points), needed=MIN_ANGLE)
+    angle = floor(covered(progress.points))  # 269.9 is not yet 270
+    return message("circle.count", covered=angle, needed=MIN_ANGLE)
 
 
 def _instruction(options: CircleOptions, progress: TaskProgress) -> Message:

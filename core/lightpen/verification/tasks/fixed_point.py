@@ -381,12 +381,6 @@ def _spread(name: Message, scatter: Scatter) -> list[ResultRow]:
     ]
 
 
-def _instruction(options: FixedPointOptions, progress: TaskProgress) -> Message:
-    return message(
-        "session.touch-cone", n_touches=len(progress.points), needed=options.n_touches
-    )
-
-
 FIXED_POINT = VerificationTask(
     kind="fixed point",
     summary="the cone, probed in new postures",
@@ -409,7 +403,7 @@ FIXED_POINT = VerificationTask(
         tilt=TILTS[step % 2], direction=2 * pi * step / options.n_touches
     ),
     n_points=lambda options: options.n_touches,
-    instruction=_instruction,
+    instruction=lambda options, progress: message("session.touch-cone"),
     screen=_screen,
     newness=lambda options: (NEW_POSTURE, ANY),
     is_pooled=True,

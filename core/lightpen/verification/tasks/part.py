@@ -196,20 +196,24 @@ def _owned(runs: Runs, options: PartOptions) -> list[tuple[str, ProbedPoint]]:
 
 
 def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAssessment:
-    def named(decision: Decision) -> list[str]:
+    def named(decision: Decision) -> list[Message]:
         results = part.results
-        return [each.planned.label for each in results if each.decision is decision]
+        return [each.planned.words for each in results if each.decision is decision]
 
     out, unclear = named(Decision.REJECTED), named(Decision.OPEN)
     n_judged = len(out) + len(unclear) + len(named(Decision.ACCEPTED))
-    name = part.plan.name
+    name = part.plan.words
     if out:
         reason = message(
             "part.out", n_out=len(out), names=_listed(out), part=name, n_judged=n_judged
         )
         return refused(reason, message("part.rework"))
     if missing and n_judged:
-        reason = message("part.incomplete", part=name, names=_listed(missing))
+        reason = message(
+            "part.incomplete",
+            part=name,
+            names=_listed([message("measuring.named", name=each) for each in missing]),
+        )
         return check(reason, message("part.complete"))
     if unclear:
         reason = message(
@@ -222,16 +226,16 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
         return check(reason, message("part.more-points"))
     if not n_judged:
         n_features = len(part.features)
-        reason = message("part.measured", part=part.plan.name, n_features=n_features)
+        reason = message("part.measured", part=name, n_features=n_features)
         return accepted(reason, message("part.done"))
     return accepted(
         message("part.good", part=name, n_judged=n_judged), message("part.done")
     )
 
 
-def _listed(names: Sequence[str]) -> str:
-    more = ", ..." if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more
+def _listed(names: Sequence[Message]) -> tuple[Message, ...]:
+    more = [message("measuring.named", name="...")] if len(names) > MOST_NAMED else []
+    return (*names[:MOST_NAMED], *more)
 
 
 def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from msgspec import Meta
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.messages import Message, message
+from lightpen.messages import message
 from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
@@ -360,12 +360,6 @@ def _figures_so_far(
     )
 
 
-def _instruction(options: PlaneOptions, progress: TaskProgress) -> Message:
-    return message(
-        "plane.instruction", n_points=len(progress.points), needed=options.n_points
-    )
-
-
 def _hand(options: PlaneOptions, run: int, step: int) -> HandGoal:
     angle = 2 * pi * step / options.n_points
     spoke = np.array([np.cos(angle), np.sin(angle)]) @ SIMULATED_AXES
@@ -399,7 +393,7 @@ PLANE = VerificationTask(
     figures_so_far=_figures_so_far,
     hand=_hand,
     n_points=lambda options: options.n_points,
-    instruction=_instruction,
+    instruction=lambda options, progress: message("plane.instruction"),
     screen=away_from_cones,
     newness=lambda options: (ANY, NEW_PLACE),
 )

@@ -351,12 +351,6 @@ def _figures_so_far(
     )
 
 
-def _instruction(options: SphereOptions, progress: TaskProgress) -> Message:
-    return message(
-        "sphere.instruction", n_points=len(progress.points), needed=options.n_points
-    )
-
-
 def sphere_directions(n_points: int = USUAL_POINTS) -> FloatArray:
     """Return unit vectors of the points of the standard, pole first, repeated, (N, 3).
 
@@ -419,7 +413,7 @@ SPHERE = VerificationTask(
     figures_so_far=_figures_so_far,
     hand=_hand,
     n_points=lambda options: options.n_points,
-    instruction=_instruction,
+    instruction=lambda options, progress: message("sphere.instruction"),
     screen=away_from_cones,
     newness=lambda options: (ANY, NEW_PLACE),
     missing=_missing,

@@ -22,6 +22,8 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QPushButton,
+    QStyle,
+    QStyleOptionFrame,
     QTabWidget,
     QWidget,
 )
@@ -66,6 +68,7 @@ from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
+from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.steps.history.history_table import (
     PEN,
     STATION,
@@ -387,6 +390,22 @@ def test_what_is_no_day_is_marked_and_chooses_nothing(desk: Desk) -> None:
 
 
 @pytest.mark.slow
+def test_an_example_of_a_date_is_seen_whole_in_a_small_window(
+    desk: Desk, qtbot: QtBot
+) -> None:
+    bar = FilterBar()
+    qtbot.addWidget(bar)
+    bar.resize(637, bar.sizeHint().height())
+    bar.show()
+
+    for day in bar.findChildren(DateField):
+        text = day.fontMetrics().horizontalAdvance(day.placeholderText())
+        option = QStyleOptionFrame()
+        day.initStyleOption(option)
+        contents = QStyle.SubElement.SE_LineEditContents
+        assert text <= day.style().subElementRect(contents, option, day).width() - 4
+
+
 def test_lines_are_read_when_they_are_seen(desk: Desk) -> None:
     desk.enter(MANY)
     desk.open()
@@ -511,7 +530,7 @@ def test_several_swings_are_adjusted_together(desk: Desk, tmp_path: Path) -> Non
     desk.select(0, 1)
     assert not desk.button("Adjust together").isEnabled()
     remark = panel.findChildren(SignLabel)[-1]
-    assert remark.value().text == "Select 3 or more calibrations."
+    assert remark.value().text == "To adjust together, select 3 or more calibrations."
     desk.select(0, 1, 2)
     assert not remark.value().text
     desk.click("Adjust together")
@@ -699,6 +718,7 @@ def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
     desk.until(lambda: desk.page.findChildren(PrintReportWindow))
     window = desk.child(PrintReportWindow)
     desk.until(lambda: window.n_pages() > 0)
+    assert window.windowTitle() == "Verification report"
     window.close()
     assert desk.notices == []
 

@@ -12,7 +12,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import Tone
+from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.message_list import MOST, StatusMessageList
 from lightpen_app.steps.review.residual_view import Arrows, ResidualView
@@ -95,8 +95,8 @@ def test_a_table_is_wide_enough_for_its_longest_figure(qtbot: QtBot) -> None:
     table.set_value(Figures(("x", "y"), rows, (("1", "2"), ("-1087.4606", "4"))))
     table.show()
 
-    for large in (False, True):
-        table.set_large(large)
+    for size in (TextSize.SMALL, TextSize.BODY, TextSize.LEAD):
+        table.set_letters(size)
         table.resize(table.minimumSizeHint())
         QApplication.processEvents()
         assert table.columnWidth(0) >= table.sizeHintForColumn(0)

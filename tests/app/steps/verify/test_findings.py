@@ -25,7 +25,15 @@ def test_a_ring_says_how_much_of_it_is_covered(qtbot: QtBot) -> None:
     qtbot.addWidget(view)
     view.set_value(RingValue((0.0, 1.0, 2.0), 114.6))
 
-    assert view.accessibleName() == "Ring: 115 of 270 degrees, points: 3"
+    assert view.accessibleName() == "Ring: 114 of 270 degrees, points: 3"
+
+
+def test_a_ring_that_is_not_quite_covered_is_not_said_to_be(qtbot: QtBot) -> None:
+    view = RingView()
+    qtbot.addWidget(view)
+    view.set_value(RingValue((0.0, 1.0, 2.0), 269.9))
+
+    assert view.accessibleName() == "Ring: 269 of 270 degrees, points: 3"
 
 
 def test_a_field_of_the_dial_is_full_that_was_touched_in() -> None:
