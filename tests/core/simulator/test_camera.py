@@ -328,7 +328,9 @@ def test_a_board_is_held_still_for_a_slow_reader_too() -> None:
     seen = []
     for _ in range(HELD_IMAGES + 1):
         (frame,) = read(camera, 1)
-        seen.append(find_points(frame.image, board))
+        corners = find_points(frame.image, board)
+        assert corners is not None
+        seen.append(corners)
         clock.wait(HELD_S)
 
     moved = [float(np.abs(each - seen[0]).max()) for each in seen]

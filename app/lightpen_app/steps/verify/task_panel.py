@@ -11,6 +11,7 @@ from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import GRID
 from lightpen_app.steps.verify.findings import TaskFinding
 from lightpen_app.steps.verify.images_row import ImagesRow
 from lightpen_app.steps.verify.task_form import TaskForm
@@ -52,7 +53,7 @@ class TaskPanel(Translated, QWidget):
 
         # Layout
         rows = self._form, self._images, self._verdict, (self._finding, 1)
-        vertical_layout(self, *rows)
+        vertical_layout(self, *rows, spacing=GRID // 2)
 
         # Connections
         self._form.value_changed.connect(self._on_form_changed)
