@@ -33,7 +33,8 @@ class VarianceComponents:
     view : float
         Of the smooth error of a view, px.
     between : float
-        Of each of six motions of the board in a view of a further camera, px rms.
+        Of the turns, and of the shifts, of the board in a view of a further camera, px
+        rms; alike in all directions.
     lenses : tuple of float
         Amplitude of the residual field of each camera, px.
     lines : float
@@ -241,10 +242,10 @@ def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
         mine = slice(N_POSE + n_smooth * c, N_POSE + n_smooth * (c + 1))
         own[..., mine] = by_smooth
         if c > 0:
-            sizes = np.sqrt(np.square(sight.own).sum(axis=(1, 2)))
-            sizes /= np.sqrt(np.maximum(2 * seen.sum(axis=1), 1))
+            sizes = np.square(sight.own).sum(axis=(0, 1, 2)) / max(2 * seen.sum(), 1)
+            sizes = np.repeat(np.sqrt(sizes.reshape(2, 3).mean(axis=1)), 3)
             end = n_own - N_POSE * (n_cameras - 1 - c)
-            moved = sight.own / np.where(sizes > 0, sizes, 1.0)[:, None, None]
+            moved = sight.own / np.where(sizes > 0, sizes, 1.0)
             own[..., end - N_POSE : end] = moved
         own *= weights[c]
         few, own = (each.reshape(n_views, 2 * n_points, -1) for each in (few, own))

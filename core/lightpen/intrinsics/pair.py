@@ -11,7 +11,12 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import adjust_board, stated_information
+from lightpen.intrinsics.adjustment import (
+    adjust_board,
+    fit_board_poses,
+    stated_information,
+)
+from lightpen.intrinsics.alternatives import USELESS
 from lightpen.intrinsics.board_findings import (
     board_contradictions,
     messages_on_board,
@@ -187,7 +192,12 @@ def calibrate_pair(
     both = np.all(views.found, axis=1)
     if both.sum() < MIN_PAIRS:
         raise CalibrationError("pair.few", n_pairs=int(both.sum()), least=MIN_PAIRS)
-    views, place = _ordered(views, cameras, both)
+    try:
+        views, place = _ordered(views, cameras, both)
+    except CalibrationError:
+        for c, (camera, name) in enumerate(zip(cameras, names, strict=True)):
+            _require_fit(views.of_camera(c), camera, name)
+        raise
     poses = _poses(views, cameras, place)
     state = BoardState(
         cameras,
@@ -237,6 +247,21 @@ def calibrate_pair(
         lag=lag,
         remarks=(*messages_on_board(fitted, tolerances, denied), *remarks),
     )
+
+
+def _require_fit(views: Views, camera: Camera, name: str) -> None:
+    """Refuse a camera by which no poses fit its own views.
+
+    Raises
+    ------
+    CalibrationError
+        Its lens is another.
+    """
+    poses, shape = start_board_poses(camera, views), np.zeros(N_SHAPE)
+    state = BoardState((camera,), np.eye(3)[None], np.zeros((1, 3)), poses, shape)
+    rms = float(np.sqrt(np.nanmean(np.square(fit_board_poses(views, state)))))
+    if rms > USELESS * max(camera.image_size):
+        raise CalibrationError("pair.other-lens", camera=name, rms=rms)
 
 
 def _as_alone(views: Views, alone: tuple[CameraCalibration, ...]) -> Views:

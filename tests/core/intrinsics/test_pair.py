@@ -9,9 +9,10 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import adjust_board
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.distortion import fit_camera
+from lightpen.intrinsics.effects import design_of
 from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
 from lightpen.intrinsics.start import start_board_poses
 from lightpen.intrinsics.variance_components import MixedFit, fit_effects
@@ -138,6 +139,18 @@ def test_cameras_whose_files_are_given_keep_to_them(camera: Camera) -> None:
         np.testing.assert_allclose(own.intrinsics, camera.intrinsics, atol=1e-4)
 
 
+@pytest.mark.parametrize(("zoom", "k1"), [(1.1, -0.1), (1.0, 0.6)])
+def test_a_file_of_another_lens_is_refused_with_its_camera(
+    camera: Camera, zoom: float, k1: float
+) -> None:
+    known = replace(camera, covariance=np.diag(np.full(9, 1e-12)))
+    distortion = np.array([k1, *camera.distortion[1:]])
+    other = replace(known, fx=zoom * camera.fx, distortion=distortion)
+
+    with pytest.raises(CalibrationError, match="The camera file of right"):
+        calibrate_pair(both_see(camera), BoardTolerances(), NAMES, (known, other))
+
+
 @pytest.mark.slow
 def test_cameras_out_of_step_are_reported_with_what_that_costs(camera: Camera) -> None:
     found = calibrate_pair(
@@ -158,8 +171,8 @@ def test_the_board_is_judged_by_both_cameras_together(camera: Camera) -> None:
     assert remark.values["stretch"] == pytest.approx(0.01, abs=1e-3)
 
 
-def fitted_by_both(views: Views, camera: Camera) -> MixedFit:
-    """Return the joint fit, from where the cameras are."""
+def adjusted_by_both(views: Views, camera: Camera) -> BoardFit:
+    """Return the joint fit without effects, from where the cameras are."""
     state = BoardState(
         (camera, camera),
         np.stack([np.eye(3), TURN]),
@@ -167,7 +180,22 @@ def fitted_by_both(views: Views, camera: Camera) -> MixedFit:
         start_board_poses(camera, views),
         np.zeros(N_SHAPE),
     )
-    return fit_effects(views, adjust_board(views, state, BoardTolerances()))
+    return adjust_board(views, state, BoardTolerances())
+
+
+def fitted_by_both(views: Views, camera: Camera) -> MixedFit:
+    return fit_effects(views, adjusted_by_both(views, camera))
+
+
+def test_a_board_turns_and_shifts_alike_in_all_directions(camera: Camera) -> None:
+    views = both_see(camera)
+    design = design_of(views, adjusted_by_both(views, camera), 200.0)
+    squares = np.diagonal(design.own_own.sum(axis=0))[design.of_errors[1]]
+    n = 2 * views.seen[:, 1].sum()
+
+    np.testing.assert_allclose(squares.reshape(2, 3).mean(axis=1), n, rtol=1e-2)
+    along_the_axis = squares[5] / squares[3]  # the same shift shows less
+    assert along_the_axis < 0.2
 
 
 @pytest.mark.slow
