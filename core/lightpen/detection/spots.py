@@ -75,6 +75,7 @@ LEAST_OF_USUAL = 0.3  # of the height of others, above which tiny ones are count
 HEAD = 0.4  # of the height of the brightest
 
 BELL_RADIUS = 6.0  # px; blur leaves less no even inside
+ALIKE_RADIUS = 8.0  # px, of a spot that is measured as many others are
 LIT = 0.25  # of the spots with foreign light
 RAISED = 0.35  # height of the outline above which the foot of a disc is not its own
 MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
@@ -581,16 +582,19 @@ def _with_small(
     a foot.
     """
     raised = np.array([not disc.is_whole or disc.cut_height > RAISED for disc in discs])
-    fits = np.sqrt(spots.areas / np.pi) < LARGEST_RADIUS
-    # Foreign light at a quarter of the LEDs is, less of it, at the others too.
+    rough_radii = np.sqrt(spots.areas / np.pi)
+    fits = rough_radii < LARGEST_RADIUS
     raised &= fits
+    # Foreign light at a quarter of the LEDs is, less of it, at the others too.
     are_lit = raised.sum() > LIT * fits.sum()
-    raised |= fits & ((spots.flaws & SpotFlaw.SATURATED) > 0)
-    small = np.flatnonzero(spots.are_small | (fits if are_lit else raised))
+    clipped = fits & ((spots.flaws & SpotFlaw.SATURATED) > 0)
+    chosen = spots.are_small | raised | clipped
+    if chosen.sum() > LIT * fits.sum():
+        chosen |= rough_radii < (LARGEST_RADIUS if are_lit else ALIKE_RADIUS)
+    small = np.flatnonzero(chosen)
     if not len(small):
         return spots
-    radii = np.sqrt(spots.areas[small] / np.pi)
-    found = measure_small(image, spots.centers[small], radii, full_scale)
+    found = measure_small(image, spots.centers[small], rough_radii[small], full_scale)
     unwhole = SpotFlaw.CUT | SpotFlaw.MERGED
     kept = spots.flaws[small] & (SpotFlaw.BLURRED | unwhole)
     # What was parted at high levels and is whole in its own window is not cut.

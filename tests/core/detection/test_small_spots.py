@@ -74,6 +74,7 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
         (replace(EASY, width=4.0), 0.027),
         (EASY, 0.0165),
         (replace(EASY, width=10.0), 0.012),
+        (replace(EASY, width=12.0, reflections=(0.1, 0.4)), 0.0105),
         (replace(HARD, width=8.0), 0.026),
         (replace(HARD, width=8.0, darkening=0.75), 0.031),
         (replace(HARD, width=14.0), 0.018),
