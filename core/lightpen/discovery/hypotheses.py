@@ -50,7 +50,7 @@ MIN_IMAGES = 25
 PRESENT = 0.7  # share of a part's images in which a piece is seen
 SHOWN = 0.3  # the same, of a part of these
 N_BOUNDS = 25  # images between which parts are sought
-N_USED = 80  # images of a part that are adjusted
+N_USED, N_CENTRES = 80, 1000  # images and centres of a part that are adjusted
 UNIT = 100.0  # mm: the largest distance of two LEDs, until a length is known
 POINT = 1e-3  # mm: radius of a disc before the size is known
 ROUGH, FINER = 2.0, 0.5  # px: noise that residuals are measured by at first
@@ -185,7 +185,8 @@ def _solved(
         if len(own) < MIN_PIECES or (tried and len(part) < MIN_IMAGES):
             continue
         pixels = pieces.pixels[np.ix_(part, own)]
-        used = np.unique(np.linspace(0, len(part) - 1, N_USED).astype(int))
+        n_used = min(N_USED, N_CENTRES // len(own))
+        used = np.unique(np.linspace(0, len(part) - 1, n_used).astype(int))
         shape = factorise(pixels, least_metric)
         shape = shape._replace(
             rotations=shape.rotations[used],

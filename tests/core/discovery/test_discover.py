@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tests.simulated_stations import (
     seen_station,
 )
 
+from lightpen.discovery import hypotheses
 from lightpen.discovery.discover import discover
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.hypotheses import require_one_focal_length
@@ -285,12 +287,28 @@ def test_a_zoom_midway_is_refused(zoom: float) -> None:
     }
 
 
+def with_loose_leds(station: Station, amplitude: float) -> Station:
+    """Return a station whose LEDs move on the pen, each by itself, px."""
+    pixels = station.pixels
+    phases = np.random.default_rng(1).uniform(0, 2 * np.pi, pixels.shape[1:])
+    moves = np.sin(np.arange(len(pixels))[:, None, None] / 15 + phases)
+    return replace(station, pixels=pixels + amplitude * moves)
+
+
 @pytest.mark.slow
 def test_leds_that_move_on_the_pen_are_refused() -> None:
-    phases = np.random.default_rng(1).uniform(0, 2 * np.pi, SHORT.pixels.shape[1:])
-    moves = np.sin(np.arange(60)[:, None, None] / 15 + phases)  # px
-    loose = replace(SHORT, pixels=SHORT.pixels + moves)
+    loose = with_loose_leds(SHORT, 1.0)
     assert refused(loose.sightings, loose) == "discover.not-settled"
+
+
+@pytest.mark.slow
+def test_leds_that_move_far_are_refused_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    attempts = Mock(wraps=hypotheses._attempted)
+    monkeypatch.setattr(hypotheses, "_attempted", attempts)
+    loose = with_loose_leds(STATION, 20.0)
+
+    assert refused(loose.sightings, loose) == "discover.no-fit"
+    assert attempts.call_count <= 30  # half a second each
 
 
 @pytest.mark.slow
