@@ -6213,10 +6213,6 @@ mm</translation>
         <translation>未指定可供比较的标称测头。</translation>
     </message>
     <message>
-        <source>No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, and that camera and cone stand still.</source>
-        <translation>没有任何光笔、相机和固定测头能解释这些轨迹：残差为 {misfit:.1f} px。请检查测头是否一直在锥孔中、LED 是否固定在同一支光笔上，以及相机和锥孔是否静止。</translation>
-    </message>
-    <message>
         <source>No space left on device</source>
         <translation>设备上没有空间</translation>
     </message>
@@ -6627,14 +6623,6 @@ mm</translation>
     <message>
         <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
-    </message>
-    <message>
-        <source>The images are from two cameras: {one}; {other}. Not only the focal lengths differ, so two cameras are likelier than a change of zoom or focus. Calibrate each camera with its own images.</source>
-        <translation>图像来自两台相机：{one}；{other}。不仅焦距不同，因此两台相机比变焦或调焦更有可能。请用各相机自己的图像分别标定。</translation>
-    </message>
-    <message>
-        <source>The images were taken with two settings of zoom or focus: {one}; {other}. Mainly the focal lengths differ, so two settings of one camera are likelier than two cameras. Use images with one setting.</source>
-        <translation>图像以两种变焦或调焦状态拍摄：{one}；{other}。主要是焦距不同，因此同一相机的两种状态比两台相机更有可能。请使用同一状态的图像。</translation>
     </message>
     <message>
         <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
@@ -7211,6 +7199,10 @@ mm</translation>
     <message>
         <source>Camera {camera} is not synchronised with the first camera (about {lag}). This shifts the tip and may cause other warnings. Trigger all cameras by one signal, or hold the pen still for each image.</source>
         <translation>相机 {camera} 与第一台相机不同步（约 {lag}）。这会使测头位置偏移，并可能引起其他警告。请用同一信号触发全部相机，或在每次取图时保持光笔静止。</translation>
+    </message>
+    <message>
+        <source>The adjustment of pen and camera did not converge: the swing shows too little of them, LEDs move on the pen, or the zoom changed. Tilt the pen by 30 degrees in all directions, turn it about its axis, come closer to the camera, fasten the LEDs, and lock the zoom.</source>
+        <translation>光笔与相机的平差未收敛：摆动提供的信息太少，LED 在光笔上移动，或变焦发生了变化。请将光笔向各个方向倾斜 30 度，绕其轴线转动，靠近相机，固定好 LED，并锁定变焦。</translation>
     </message>
     <message>
         <source>The swing is paused.</source>
@@ -8345,6 +8337,10 @@ mm</translation>
         <translation>图像中没有标定板 {board}，看到的是 {other}：列数与行数颠倒了。请指定该标定板。</translation>
     </message>
     <message>
+        <source>No pen, no camera and no fixed tip explain the tracks: the residuals are {misfit:.1f} px. Check that the tip stayed in the cone, that the LEDs are fixed to one pen, that camera and cone stand still, and that zoom and focus are locked.</source>
+        <translation>没有任何光笔、相机和固定测头能够解释这些轨迹：残差为 {misfit:.1f} px。请检查测头是否始终在锥孔中，LED 是否固定在同一支光笔上，相机和锥孔是否静止，变焦和对焦是否锁定。</translation>
+    </message>
+    <message>
         <source>No supervisor password is set. Set it at Start, All limits.</source>
         <translation>尚未设置主管密码。请在“开始”步骤的“所有限值”中设置。</translation>
     </message>
@@ -8561,10 +8557,6 @@ mm</translation>
         <translation>LED 依次发光，间隔 {time}；结果已修正，其余部分计入 U。请同时点亮全部 LED，或在每次取图时保持光笔静止。</translation>
     </message>
     <message>
-        <source>The adjustment of pen and camera did not converge: the swing shows too little of them, or the zoom changed. Tilt the pen by 30 degrees in all directions, turn it about its axis, come closer to the camera, and lock the zoom.</source>
-        <translation>光笔与相机的平差未收敛：摆动对它们反映不足，或变焦发生了变化。请向各方向倾斜光笔 30 度，绕其轴线转动，靠近相机，并锁定变焦。</translation>
-    </message>
-    <message>
         <source>The archive has no entry of this station, so there is nothing to timestamp.</source>
         <translation>存档中没有本工位的记录，因此没有可加时间戳的内容。</translation>
     </message>
@@ -8643,6 +8635,10 @@ mm</translation>
     <message>
         <source>The camera file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.</source>
         <translation>内参文件有偏差：文件给出的焦距为 {stated:.0f} px（{off:+.1f} %），由摆动得到的焦距为 {found:.0f} px。请检查文件是否属于这台相机及其变焦和对焦；请使用现在写出的文件。</translation>
+    </message>
+    <message>
+        <source>The camera file of {camera} contradicts the images of the board: residuals of {rms:.1f} px (RMS). The file is of another camera or zoom, or has a lens model that does not fit this lens, such as a plain one for a fisheye. Check it, or calibrate the cameras from these images.</source>
+        <translation>{camera} 的相机文件与标定板图像矛盾：残差为 {rms:.1f} px（均方根）。该文件属于另一台相机或另一变焦，或其镜头模型不适合此镜头，例如将普通模型用于鱼眼镜头。请检查该文件，或用这些图像标定相机。</translation>
     </message>
     <message>
         <source>The camera link loses images: {n_incomplete} of {n_sent} incomplete, {n_missed} lost. Lower the frame rate, use a smaller region or larger packets, or check cable and switch.</source>
@@ -8833,6 +8829,10 @@ mm</translation>
         <translation>坐标系无法确定：LED 1-4 的连线与 LED 5-10 的平面和列不平行，或相距太近。</translation>
     </message>
     <message>
+        <source>The images are from two cameras: {one}; {other}. Not only the focal lengths differ, so two cameras are likelier than a change of zoom or focus. Calibrate each camera with its own images. If there is only one, check that no image is rotated by 180°.</source>
+        <translation>图像来自两台相机：{one}；{other}。不仅焦距不同，因此是两台相机比变焦或对焦改变更有可能。请用各自的图像标定每台相机。如果只有一台相机，请检查是否有图像旋转了 180°。</translation>
+    </message>
+    <message>
         <source>The images are {time}; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
         <translation>图像{time}；结果已修正，其余部分计入 U。请用同一信号触发全部相机。</translation>
     </message>
@@ -8871,6 +8871,10 @@ mm</translation>
     <message>
         <source>The images show the board {board} mirrored. Turn off mirroring of the camera, or print the board again.</source>
         <translation>图像中的标定板 {board} 是镜像的。请关闭相机的镜像功能，或重新打印标定板。</translation>
+    </message>
+    <message>
+        <source>The images were taken with two settings of zoom or focus: {one}; {other}. Mainly the focal lengths differ, so two settings of one camera are likelier than two cameras. Use images with one setting, none of them rotated by 180°.</source>
+        <translation>图像是在两种变焦或对焦设置下拍摄的：{one}；{other}。主要是焦距不同，因此是一台相机的两种设置比两台相机更有可能。请使用同一设置下的图像，且没有图像旋转了 180°。</translation>
     </message>
     <message>
         <source>The intrinsics_covariance of {name} is not a covariance matrix: it must be symmetric, with correlations from -1 to 1. Correct or remove it.</source>
@@ -9279,6 +9283,10 @@ mm</translation>
     <message>
         <source>The tip seating varied by {distance:.4f} mm (standard deviation) from image to image; U includes this. Clean tip and cone, check for wear, and press the tip in.</source>
         <translation>测头就位在各图像之间变化 {distance:.4f} mm（标准差），已计入 U。请清洁测头和锥孔，检查磨损，并压紧测头。</translation>
+    </message>
+    <message>
+        <source>The tip was in the same place in both swings. Give a swing in each of the two cones, before the same camera.</source>
+        <translation>两次摆动中测头位于同一位置。请在同一相机前，在两个锥孔中各提供一次摆动。</translation>
     </message>
     <message>
         <source>The tips from odd and even images differ by {difference:.4f} mm; usual is {usual:.4f} mm. The tip may have moved. Repeat the swing with the tip pressed in.</source>
