@@ -121,9 +121,24 @@ def test_a_camera_file_that_is_off_is_reported(
 
     for name in OUTPUTS:
         (centers.parent / name).unlink(missing_ok=True)
-    write_camera(replace(off, covariance=0.25 * np.eye(len(off.intrinsics))), file)
-    assert main(arguments(centers, *given)) == 1
-    assert "does not fit the camera file" in capsys.readouterr().err
+    certain = 0.25 * np.eye(len(off.intrinsics))
+    for factor in (1.05, 1.01):
+        off = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
+        write_camera(replace(off, covariance=certain), file)
+        assert main(arguments(centers, *given)) == 1
+        assert "does not fit the camera file" in capsys.readouterr().err
+    assert not any((centers.parent / name).exists() for name in OUTPUTS)
+
+
+def test_an_output_in_a_folder_that_does_not_exist_is_reported_first(
+    centers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = ("--picture", str(centers.parent / "none" / "numbers.png"))
+    length = ("--length", "longest", f"{STATION.longest}")
+
+    assert main(arguments(centers, *length, *picture)) != 0
+
+    assert "folder does not exist" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
 
 

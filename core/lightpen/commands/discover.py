@@ -32,7 +32,7 @@ from lightpen.discovery.together import discover_together
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import write_whole
+from lightpen.formats.files import require_folder_of, write_whole
 from lightpen.formats.images import SUFFIXES, find_images
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
@@ -254,7 +254,7 @@ def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """Refuse outputs that replace an input or each other, or of another suffix."""
+    """Refuse outputs in no folder, over an input or each other, or of other suffix."""
     inputs = [*options.centers, options.camera, options.pen, options.pen_sketch]
     inputs = [path for path in inputs if path is not None]
     seen: list[Path] = []
@@ -262,6 +262,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
     for path in outputs:
         if path is None:
             continue
+        require_folder_of(path)
         if any(are_same(path, other) for other in (*inputs, *seen)):
             raise UsageError("cli.discover-output-twice", file=str(path))
         seen.append(path)

@@ -9,6 +9,7 @@ the length to the images.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -132,9 +133,14 @@ def _adjusted(
     scaled = start, lengths, choice = scaled_start(request, swing.found, pixels)
     if request.sketch is not None and request.lengths:
         require_sketched(lengths, request.sketch)
-    require_one_camera(
-        adjust_halves(scaled, pixels[swing.found.images], request.camera)
-    )
+    halves = partial(adjust_halves, scaled, pixels[swing.found.images])
+    try:
+        require_one_camera(halves(request.camera))
+    except CalibrationError as error:
+        if request.camera is None:
+            raise
+        require_one_camera(halves(None))
+        raise CalibrationError("discover.other-camera") from error
     report(0.6)
     second = None
     if request.second is not None:
@@ -168,6 +174,13 @@ def _adjusted(
     if not is_cleared and np.mean(~fits) > SLIPPED:
         cleared = replace(swing, found=_of_images(swing.found, fits))
         return _adjusted(cleared, request, report, is_cleared=True)
+    is_off = not all(each.of_pen for each in calibration.contradictions)
+    if (
+        request.camera is not None
+        and is_off
+        and np.mean(calibration.used) < 1 - SLIPPED
+    ):
+        raise CalibrationError("discover.other-camera")
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(

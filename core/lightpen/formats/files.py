@@ -134,6 +134,14 @@ def write_whole(path: Path, data: bytes) -> None:
         raise _unwritten(path, error) from error
 
 
+def require_folder_of(path: Path) -> None:
+    """Refuse a file whose folder does not exist, before others are written."""
+    if not path.parent.is_dir():
+        raise _unwritten(
+            path, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        )
+
+
 def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write a new file whole or not at all; raise `NameTakenError` if it exists.
 
