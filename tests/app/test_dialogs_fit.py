@@ -15,9 +15,11 @@ from lightpen_app.shell.stream_dialog import StreamDialog
 from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
 from lightpen_app.steps.start.assumptions_panel import AssumptionsDialog
+from lightpen_app.steps.start.item_form import ItemForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.newcomer_panel import Introduction
+from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FRAME, fitted_place
 from lightpen_app.work.workbench import Workbench
 
@@ -68,3 +70,19 @@ def test_a_dialog_fits_a_small_screen_and_clips_no_words(
     assert clipped_words(dialog) == ()
     assert scrolled_sideways(dialog) == ()
     dialog.close()
+
+
+def test_the_picture_of_a_tip_is_seen_whole_in_a_small_dialog(
+    dressed: QApplication, qtbot: QtBot, workbench: Workbench
+) -> None:
+    dialog = library_form(workbench)
+    qtbot.addWidget(dialog)
+    dialog.show()
+    dialog.resize(dialog.size().boundedTo(SMALL - FRAME))
+    dressed.processEvents()
+
+    form = dialog.findChild(ItemForm)
+    assert isinstance(form, ItemForm)
+    picture = form.findChild(TipPicture)
+    assert isinstance(picture, TipPicture)
+    assert picture.visibleRegion().boundingRect().width() == picture.width()

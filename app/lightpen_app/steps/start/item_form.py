@@ -40,7 +40,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LONGEST_NOTE = 500  # characters
-PICTURE_SIZE = QSize(26 * GRID, 20 * GRID)  # px
+PICTURE_SIZE = QSize(22 * GRID, 17 * GRID)  # px
 
 
 class ItemForm(Translated, QWidget):
