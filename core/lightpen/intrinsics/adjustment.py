@@ -37,7 +37,7 @@ from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.start import BoardPoses
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
-from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.ellipse import disc_centroids
 from lightpen.model.information import inverse
 from lightpen.model.rigid import rotation_from_vector, skew
 
@@ -305,7 +305,7 @@ def _modelled(
 ) -> FloatArray:
     if not board.kind.is_circles:
         return camera.project(points)
-    return ellipse_centers(camera, points, normals[:, None], 0.5 * board.detail)
+    return disc_centroids(camera, points, normals[:, None], 0.5 * board.detail)
 
 
 def _normals(state: BoardState) -> FloatArray:

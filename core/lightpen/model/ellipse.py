@@ -81,6 +81,17 @@ def disc_images(
     return Ellipses(pixels.points, J @ conics.shapes @ np.swapaxes(J, -1, -2))
 
 
+def disc_centroids(
+    camera: Camera, centers_cam: FloatArray, normals_cam: FloatArray, radius: float
+) -> FloatArray:
+    """Return the centroids (..., 2), px, of the images of discs.
+
+    To second order they are also the centres of ellipses fitted to the rims. For the
+    arguments see `ellipse_centers`; NaN where there is no ellipse.
+    """
+    return _centroids(camera, conic_images(centers_cam, normals_cam, radius))
+
+
 def conic_images(
     centers_cam: FloatArray, normals_cam: FloatArray, radius: float
 ) -> Ellipses:
@@ -134,19 +145,26 @@ def conic_centers(
 def _centroid_offsets(
     camera: Camera, centers: FloatArray, shapes: FloatArray
 ) -> FloatArray:
-    """Return centroid minus distorted centre, from four points of equal covariance.
+    """Return centroid minus distorted centre."""
+    undistorted = camera.unproject_with_jacobian(centers)
+    J = undistorted.jacobian
+    normalised = Ellipses(undistorted.points, J @ shapes @ np.swapaxes(J, -1, -2))
+    return _centroids(camera, normalised) - centers
+
+
+def _centroids(camera: Camera, conics: Ellipses) -> FloatArray:
+    """Return the centroids of distorted areas, from four points of equal covariance.
 
     The distorted mean of points ``c +- sqrt(2) l_k``, l_k the columns of a root of the
     covariance, is exact to second order; each weighs as the area it stands for.
     """
-    undistorted = camera.unproject_with_jacobian(centers)
-    J = undistorted.jacobian
-    normalised_shapes = J @ shapes @ np.swapaxes(J, -1, -2)
-    roots = np.sqrt(2) * np.swapaxes(np.linalg.cholesky(normalised_shapes), -1, -2)
-    steps = np.concatenate([roots, -roots], axis=-2)
-    there = camera.pixels_with_jacobian(undistorted.points[..., None, :] + steps)
+    steps = np.zeros((*conics.centers.shape[:-1], 4, 2))
+    steps[..., 0, 0] = np.sqrt(2 * conics.shapes[..., 0, 0])
+    steps[..., 0, 1] = 2 * conics.shapes[..., 0, 1] / steps[..., 0, 0]
+    steps[..., 1, 1] = np.sqrt(2 * conics.shapes[..., 1, 1] - steps[..., 0, 1] ** 2)
+    steps[..., 2:, :] = -steps[..., :2, :]
+    there = camera.pixels_with_jacobian(conics.centers[..., None, :] + steps)
     J = there.jacobian
     areas = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
     means = np.einsum("...k,...ki->...i", areas, there.points)
-    offsets: FloatArray = means / areas.sum(axis=-1)[..., None] - centers
-    return offsets
+    return np.asarray(means / areas.sum(axis=-1)[..., None])

@@ -10,7 +10,7 @@ from lightpen.intrinsics.board_fit import board_points
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
-from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.ellipse import disc_centroids
 from lightpen.simulator.boards import simulate_board_poses
 
 NOISE = 0.03  # px
@@ -62,4 +62,4 @@ def seen_points(
     if not board.kind.is_circles:
         return camera.project(points)
     normals = np.broadcast_to(rotations[:, None, :, 2], points.shape)
-    return ellipse_centers(camera, points, normals, 0.5 * board.detail)
+    return disc_centroids(camera, points, normals, 0.5 * board.detail)

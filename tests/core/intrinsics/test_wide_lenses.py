@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -43,12 +44,20 @@ RATIONAL = Camera(
     distortion=np.array([0.38, 0.035, -5e-4, 1e-4, 0.0147, 0.764, 0.0858, 0.0329]),
 )
 
+ANGLES = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+RING = np.c_[np.cos(ANGLES), np.sin(ANGLES), np.zeros(90)]
 FOLDING_BEYOND = np.array([0.11, -0.08, 0.36, -0.64])
 
 
-def held_before(camera: Camera, n_views: int, seed: int, least: float = 0.12) -> Views:
+def held_before(
+    camera: Camera,
+    n_views: int,
+    seed: int,
+    least: float = 0.12,
+    word: str = "chessboard:9x6:20",
+) -> Views:
     """Return views of a board that faces the camera wherever it is held."""
-    board = parse_board("chessboard:9x6:20")
+    board = parse_board(word)
     rng, size = np.random.default_rng(seed), np.array(camera.image_size)
     longer = 2 * float(np.abs(board.points[:, :2]).max())
     seen: list[FloatArray] = []
@@ -61,10 +70,16 @@ def held_before(camera: Camera, n_views: int, seed: int, least: float = 0.12) ->
         tilt = rotation_from_vector(np.append(rng.uniform(-0.6, 0.6, 2), 0.0))
         roll = rotation_from_vector(np.array([0, 0, rng.choice([0, np.pi / 2, 0.2])]))
         depth = camera.fx * longer / (rng.uniform(0.3, 0.7) * size.min())
-        points = board.points @ (facing @ tilt @ roll).T + depth * ray
+        R = facing @ tilt @ roll
+        points = board.points @ R.T + depth * ray
         if np.any(points[:, 2] < 0.06 * np.linalg.norm(points, axis=1)):
             continue
         pixels = camera.project(points)
+        if board.kind.is_circles:
+            rims = camera.project(points[:, None] + 0.5 * board.detail * RING @ R.T)
+            pixels = np.array(
+                [cv2.fitEllipse(rim)[0] for rim in rims.astype(np.float32)]
+            )
         if np.all((pixels > 5) & (pixels < size - 6)):
             seen.append(pixels + rng.normal(0, NOISE, pixels.shape))
     names = tuple(map(str, range(n_views)))
@@ -92,6 +107,14 @@ def test_the_truth_of_a_fisheye_lies_within_the_intervals(
 
     assert np.all(np.abs(found.camera.intrinsics - WIDE.intrinsics) < 3.5 * sigmas)
     assert map_uncertainty(found.camera, found.camera.covariance).worst < 0.5
+
+
+def test_circles_before_a_fisheye_are_seen_as_ellipses_about_their_centroids() -> None:
+    views = held_before(WIDE, 14, seed=2, word="circles:8x6:25:15")
+    fitted = fit_camera(views, BoardTolerances(), WIDE)
+
+    off = fitted.state.cameras[0].intrinsics - WIDE.intrinsics
+    assert np.all(np.abs(off) < 3.5 * np.sqrt(np.diag(fitted.covariance)[: len(off)]))
 
 
 @pytest.mark.slow

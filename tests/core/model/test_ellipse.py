@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.model.camera import Camera
-from lightpen.model.ellipse import centers_from_centroids, disc_images, ellipse_centers
+from lightpen.model.camera import Camera, LensModel
+from lightpen.model.ellipse import (
+    centers_from_centroids,
+    disc_centroids,
+    disc_images,
+    ellipse_centers,
+)
 from lightpen.simulator.swings import (
     leds_in_camera,
     paper_camera,
@@ -22,15 +27,17 @@ SWING = swing_poses(20, np.random.default_rng(0))
 CENTERS, NORMALS = leds_in_camera(PEN, SWING.rotations, SWING.translations)
 
 
-def rims(camera: Camera) -> FloatArray:
+def rims(
+    camera: Camera, centers: FloatArray = CENTERS, normals: FloatArray = NORMALS
+) -> FloatArray:
     """Return 720 points on the image of each rim, (20, L, 720, 2)."""
-    a = np.cross(NORMALS, [1.0, 0.2, 0.0])
+    a = np.cross(normals, [1.0, 0.2, 0.0])
     a /= np.linalg.norm(a, axis=-1, keepdims=True)
-    b = np.cross(NORMALS, a)
+    b = np.cross(normals, a)
     angles = np.linspace(0, 2 * np.pi, 720, endpoint=False)[:, None]
     radius = PEN.diameter / 2
     return camera.project(
-        CENTERS[:, :, None]
+        centers[:, :, None]
         + radius * (np.cos(angles) * a[:, :, None] + np.sin(angles) * b[:, :, None])
     )
 
@@ -90,6 +97,23 @@ def test_the_centroid_of_a_distorted_disc_leads_back_to_its_centre() -> None:
 
     assert np.abs(centroids - images.centers).max() > 5e-3
     np.testing.assert_allclose(found, images.centers, atol=1e-4)
+
+
+def test_the_centroid_before_a_fisheye_is_far_from_the_image_of_the_centre() -> None:
+    fisheye = Camera(
+        *(960, 720, 506.0, 506.0, 480.0, 360.0),
+        distortion=np.array([-0.02, 0.01, 0.0, 0.0]),
+        lens=LensModel.KANNALA_BRANDT,
+    )
+    centers = np.array([[[120.0, 20.0, 250.0], [-200.0, 40.0, 200.0]]])
+    normals = np.array([[[0.1, 0.3, -0.95], [0.0, 0.0, -1.0]]])
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    truth = area_centroids(rims(fisheye, centers, normals))
+    of_centers = ellipse_centers(fisheye, centers, normals, PEN.diameter / 2)
+
+    found = disc_centroids(fisheye, centers, normals, PEN.diameter / 2)
+    np.testing.assert_allclose(found, truth, atol=1e-3)
+    assert np.linalg.norm(of_centers - truth, axis=-1).min() > 0.05
 
 
 def test_an_led_that_was_not_seen_stays_unseen() -> None:
