@@ -41,6 +41,12 @@ def on_one_line(text: str) -> str:
     return JOINER.join(text.replace(" ", "\xa0"))
 
 
+def phrases_whole(text: str) -> str:
+    """Let a line end nowhere within a coverage factor or the number of a standard."""
+    phrase = r"k = \d|(?:ISO|JCGM) \d\S*"
+    return re.sub(phrase, lambda found: found.group().replace(" ", "\xa0"), text)
+
+
 def _parted(word: str) -> str:
     """Split a long word after its punctuation, or anywhere if there is none."""
     parts = re.findall(rf"[^/\\_,;.]{{1,{LONGEST_WORD}}}[/\\_,;.]?|[/\\_,;.]", word)

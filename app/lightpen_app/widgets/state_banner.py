@@ -18,6 +18,7 @@ from typing_extensions import override
 from lightpen_app.look.announcements import announce
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
+from lightpen_app.look.words import phrases_whole
 from lightpen_app.widgets.fitted_text import WRAPPED, fitted_size
 
 
@@ -144,7 +145,7 @@ class StateBanner(QWidget):
         width = self.width() - 4 * GRID - ceil(beside)
         metrics = QFontMetricsF(font(TextSize.SMALL))
         box = QRectF(0, 0, max(width, 1), 1e6)
-        needed = metrics.boundingRect(box, WRAPPED, self._value.detail).height()
+        needed = metrics.boundingRect(box, WRAPPED, self._detail).height()
         is_long = self._value.detail and needed > 0.38 * self._usual_height
         height = ceil(self._word_height + needed) + 2 * GRID if is_long else 0
         if height != self._long_height:
@@ -155,6 +156,10 @@ class StateBanner(QWidget):
     def _usual_height(self) -> float:
         """Height of the words, where the sentence is short, px."""
         return 1.4 * self._word_size + 1.5 * self._detail_size + GRID
+
+    @property
+    def _detail(self) -> str:
+        return phrases_whole(self._value.detail)
 
     @property
     def _detail_size(self) -> float:
@@ -216,12 +221,12 @@ class StateBanner(QWidget):
         )
         painter.setFont(font(size, bold=True))
         painter.drawText(word_box, single, state.word)
-        if state.detail:
+        if detail := self._detail:
             detail_box = box.adjusted(0, word_box.height(), 0, 0)
             wrapped = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
             size = fitted_size(
-                state.detail, detail_box, self._detail_size, bold=False, flags=wrapped
+                detail, detail_box, self._detail_size, bold=False, flags=wrapped
             )
             self._detail_px = size
             painter.setFont(font(size))
-            painter.drawText(detail_box, wrapped, state.detail)
+            painter.drawText(detail_box, wrapped, detail)

@@ -24,6 +24,7 @@ from lightpen.swing_messages import (
     too_little_tilt,
 )
 from lightpen_app.look.phrases import lean_phrase, phase_text, phrase
+from lightpen_app.look.words import phrases_whole
 
 FAR, LITTLE = math.radians(28), math.radians(14)
 RIGHT, AWAY, LEFT, TOWARDS = (quarter * math.pi / 2 for quarter in range(4))
@@ -108,3 +109,11 @@ def test_every_state_and_pause_has_a_word_of_its_own() -> None:
 
     assert len(set(words)) == len(words)
     assert phase_text(Phase.PAUSED, Pause.BY_USER) == phase_text(Phase.PAUSED)
+
+
+def test_no_line_ends_within_a_coverage_factor_or_the_number_of_a_standard() -> None:
+    text = "guard band (ISO 14253-1), U (k = 2), simple acceptance (JCGM 106, 8.2)."
+
+    assert phrases_whole(text).replace("\xa0", "_") == (
+        "guard band (ISO_14253-1), U (k_=_2), simple acceptance (JCGM_106, 8.2)."
+    )

@@ -11,6 +11,7 @@ from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import phrases_whole
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
@@ -148,7 +149,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         no_limit = self.tr("No limit")
         for limit, label in zip(LIMITS, self._labels, strict=True):
             field, text = self._fields[limit.key], worded(limit.label)
-            label.setText(text.replace("(k = 2)", "(k\xa0=\xa02)"))
+            label.setText(phrases_whole(text))
             field.setAccessibleName(text)
             if isinstance(field, _RuleField):
                 usually = field.retranslate()
