@@ -33,7 +33,7 @@ MOST_TABLES = 2  # of a task; others are only printed
 HEAD_HEIGHT, ROW_HEIGHT = 7 * GRID, 3 * GRID  # px, of the points during probing
 NOWHERE = Qt.AlignmentFlag(0)  # but all over
 LEAST_HEIGHT = 16 * GRID  # px, of the results
-USUAL_WIDTH = 96 * GRID  # px, with less the tables of a part have small letters
+USUAL_WIDTH = 84 * GRID  # px, with less the tables of a part have small letters
 DIAL_SIZE = 22 * GRID  # px
 PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 5, 9, 13  # of the width
 
