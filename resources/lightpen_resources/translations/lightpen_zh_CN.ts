@@ -6681,6 +6681,10 @@ mm</translation>
         <translation>档案库的封印文件 {file} 被改动过或已损坏。</translation>
     </message>
     <message>
+        <source>The swing does not fit the camera file. Check that the file is of this camera, zoom and focus, or find the camera without a file.</source>
+        <translation>摆动与相机文件不符。请检查文件是否属于这台相机及其变焦和对焦，或在没有文件的情况下求出相机。</translation>
+    </message>
+    <message>
         <source>The swing of the result {file} is not in {folder}. Copy it back there, then open the result again.</source>
         <translation>标定结果 {file} 对应的摆动记录不在 {folder} 中。请将其复制回该处，然后重新打开该结果。</translation>
     </message>
@@ -9155,10 +9159,6 @@ mm</translation>
     <message>
         <source>The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.</source>
         <translation>主管密码多次错误。请等待 {seconds:.0f} s 后重新输入。</translation>
-    </message>
-    <message>
-        <source>The swing does not fit the camera file: the fit did not converge. Check that the file is of this camera, zoom and focus, or find the camera without a file.</source>
-        <translation>摆动与内参文件不符：拟合未收敛。请检查文件是否属于这台相机及其变焦和对焦，或不用文件求相机。</translation>
     </message>
     <message>
         <source>The swing in {folder} cannot be read: {reason}. Check the read permission, or move the folder away.</source>
