@@ -81,7 +81,7 @@ class Trials:
     mechanics : (N, L, 2, k) array
         Derivative of the LEDs' images by the unknowns of mechanics, px by mm or px.
     mechanics_covariance : (k, k) array
-        Of these by their priors.
+        Mean square of these by their priors.
     edge_widths : (N,) array
         Of the LEDs, px; NaN where no areas are known.
     """
@@ -172,6 +172,7 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
         *(joint.rotations, axes_of_cone(joint.rotations), pen.leds),
         calibration.priors.compliance,
     )
+    means = np.concatenate([each.mean for each in mechanics])
     basis, jitter = bundle.unknowns.basis, bundle.components.jitter
     leds = bundle.budget_components.leds
     led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
@@ -198,7 +199,7 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
             else jitter.covariance
         ),
         mechanics=np.concatenate([each.columns[:, 0] for each in mechanics], axis=-1),
-        mechanics_covariance=prior_of(mechanics),
+        mechanics_covariance=prior_of(mechanics) + np.outer(means, means),
         edge_widths=_edge_widths(calibration, n_images),
         priors=calibration.priors,
         assumptions=calibration.assumptions,

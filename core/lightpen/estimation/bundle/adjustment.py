@@ -252,15 +252,14 @@ def with_effects(bundle: Bundle, effects: tuple[Effect, ...]) -> Bundle:
     The residuals stay those of the fit.
     """
     unknowns = replace(bundle.unknowns, effects=effects)
-    information = bundle.information + bundle.measured_information
-    right = (information + bundle.prior_information) @ bundle.values
+    information, right = bundle.information + bundle.measured_information, bundle.right
     # Anew, as other components may have taken the effects up.
     components = NO_COMPONENTS._replace(jitter=bundle.components.jitter)
     components = components.with_no_effects(effects)
     components = find_components(unknowns, information, right, components)
     prior = unknowns.prior_information(components)
     covariance = inverse(information + prior)
-    values = covariance @ right
+    values = covariance @ (right + unknowns.prior_right(components))
     return replace(
         bundle,
         unknowns=unknowns,
@@ -292,7 +291,10 @@ def likely_effects(bundle: Bundle) -> tuple[Effect, ...]:
     at = np.concatenate([np.arange(place.start, place.stop) for place in slices])
     known = inverse(bundle.covariance[np.ix_(at, at)])
     S = known - bundle.prior_information[np.ix_(at, at)]
-    if is_supported(gain_of(S, known @ bundle.values[at], prior_of(chosen))):
+    right = known @ bundle.values[at]
+    right -= bundle.unknowns.prior_right(bundle.components)[at]
+    means = np.concatenate([effect.mean for effect in chosen])
+    if is_supported(gain_of(S, right, prior_of(chosen), means)):
         return effects
     return tuple(effect.at_zero if effect in chosen else effect for effect in effects)
 

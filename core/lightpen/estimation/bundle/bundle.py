@@ -114,6 +114,13 @@ class Bundle:
         return self.unknowns.prior_information(self.budget_components)
 
     @property
+    def right(self) -> FloatArray:
+        """Right side of images and measurements, without priors, (p,)."""
+        known = self.information + self.measured_information + self.prior_information
+        by_priors = self.unknowns.prior_right(self.components)
+        return np.asarray(known @ self.values - by_priors)
+
+    @property
     def layout(self) -> ParameterLayout:
         """Layout of ``values`` and of every matrix."""
         return self.unknowns.layout
@@ -316,7 +323,7 @@ def _solve(
         )
     prior = unknowns.prior_information(components)
     covariance = inverse(information + prior + measured)
-    values = covariance @ right
+    values = covariance @ (right + unknowns.prior_right(components))
     step, shifts = unknowns.step(values - now.values)
     own = _follow(eliminated, step, shifts)
     residuals = _left_over(now.views, step, shifts, own)

@@ -47,11 +47,12 @@ def _found_once(
 ) -> Components:
     at, prior = unknowns.layout, unknowns.prior_information(before)
     covariance = inverse(information + prior)
-    values = covariance @ right
+    by_priors = unknowns.prior_right(before)
+    values = covariance @ (right + by_priors)
 
     def own(place: slice) -> tuple[FloatArray, FloatArray]:
         known = inverse(covariance[place, place])
-        return known - prior[place, place], known @ values[place]
+        return known - prior[place, place], known @ values[place] - by_priors[place]
 
     def find(place: slice, stated: float = 0.0) -> Component:
         return find_component(*own(place), stated)

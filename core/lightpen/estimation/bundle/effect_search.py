@@ -65,14 +65,14 @@ def search_effects(
     columns /= unknowns.noise[..., None, None]
     views = unknowns.views_at(state, pixels)
     own, with_others, right = _information(bundle, views, columns)
-    at_best = inverse(bundle.covariance) @ bundle.values
     start = bundle.values if residuals_at is None else residuals_at
     nothing = NO_COMPONENTS.with_no_effects(unknowns.effects)
     prior = unknowns.prior_information(nothing)
     plain = inverse(bundle.information + bundle.measured_information + prior)
     models = []
-    for covariance in (bundle.covariance, plain):
-        change = covariance @ at_best - start
+    without = plain @ bundle.right
+    for covariance, values in ((bundle.covariance, bundle.values), (plain, without)):
+        change = values - start
         S = own - with_others.T @ covariance @ with_others
         models.append((0.5 * (S + S.T), right - with_others.T @ change))
     found, first = [], 0

@@ -22,7 +22,8 @@ LEDs in turn   the LEDs light one after the other; interval from one to the next
 ============== =========================================================================
 
 Mechanics (compliance to camera tilt) are seldom perfect, and a swing decides little of
-their sizes. They are unknowns of every fit, with a prior of their usual size.
+their sizes. They are unknowns of every fit, with a prior of their usual size. Play and sag
+follow gravity: their priors are half-normal, with that mean and variance.
 """
 
 from collections.abc import Sequence
@@ -71,6 +72,8 @@ class EffectName(StrEnum):
 # Usual sizes of mechanics, rms, mm or px; that of compliance is an assumption.
 USUAL = {EffectName.LOOSE: 0.005, EffectName.SAG: 0.012, EffectName.TILT: 0.01}
 MECHANICS = EffectName.COMPLIANCE, *USUAL
+DOWNWARD = EffectName.LOOSE, EffectName.SAG  # in their first unknown, by gravity
+HALF_NORMAL_MEAN = float(np.sqrt(2 / np.pi))  # of a root mean square of 1
 TIMING = EffectName.DELAY, EffectName.SHUTTER, EffectName.STROBE
 # Largest standard deviations, mm, px or image intervals; a larger one is another fault.
 LARGEST = {
@@ -128,7 +131,17 @@ class Effect:
     @cached_property
     def prior(self) -> FloatArray:
         """Covariance of the unknowns by the stated standard deviation, (k, k)."""
-        return np.asarray(self.stated**2 * np.mean(self.shapes, axis=0))
+        mean_square = self.stated**2 * np.mean(self.shapes, axis=0)
+        return np.asarray(mean_square - np.diag(self.mean**2))
+
+    @cached_property
+    def mean(self) -> FloatArray:
+        """Mean of the unknowns by the prior, (k,)."""
+        mean = np.zeros(self.number)
+        if self.name in DOWNWARD:
+            mean_square = np.mean([shape[0, 0] for shape in self.shapes])
+            mean[0] = HALF_NORMAL_MEAN * self.stated * np.sqrt(mean_square)
+        return mean
 
     @cached_property
     def roots(self) -> tuple[FloatArray, ...]:
@@ -221,7 +234,9 @@ def prior_of(effects: Sequence[Effect]) -> FloatArray:
     return prior
 
 
-def gain_of(S: FloatArray, right: FloatArray, prior: FloatArray) -> float:
+def gain_of(
+    S: FloatArray, right: FloatArray, prior: FloatArray, means: FloatArray
+) -> float:
     """Return twice the log likelihood ratio of k unknowns with a prior to none.
 
     Parameters
@@ -232,9 +247,13 @@ def gain_of(S: FloatArray, right: FloatArray, prior: FloatArray) -> float:
         Right side that belongs to it.
     prior : (k, k) array
         Their covariance.
+    means : (k,) array
+        By the prior.
     """
-    spectrum = _Spectrum.of(S, right, _root_of(prior))
-    return -float(spectrum.costs(np.ones(1))[0])
+    left = right - S @ means
+    spectrum = _Spectrum.of(S, left, _root_of(prior))
+    by_means = float(means @ (right + left))
+    return by_means - float(spectrum.costs(np.ones(1))[0])
 
 
 def _root_of(covariance: FloatArray) -> FloatArray:

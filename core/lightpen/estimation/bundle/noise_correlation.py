@@ -179,7 +179,8 @@ def _noise_model(
         components = find_components(unknowns, information, both, components)
         prior = unknowns.prior_information(components)
         covariance = inverse(information + prior)
-        values = covariance @ both
+        by_priors = unknowns.prior_right(components)
+        values = covariance @ (both + by_priors)
         change = values - current
         left = each.squares - 2 * float(change @ each.gradient)
         left += float(change @ each.information @ change)
@@ -189,5 +190,5 @@ def _noise_model(
     cost = each.n_free * np.log(variance) + each.log_volume
     cost += np.linalg.slogdet(information + prior)[1]
     cost -= np.linalg.slogdet(prior[np.ix_(known, known)])[1]
-    cost += left / variance + float(values @ prior @ values)
+    cost += left / variance + float(values @ (prior @ values - 2 * by_priors))
     return _NoiseModel(float(cost), variance, components)

@@ -239,6 +239,16 @@ class Unknowns:
             prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior
 
+    def prior_right(self, components: Components) -> FloatArray:
+        """Return the right side by the means of the priors, (p,)."""
+        right = np.zeros(self.number)
+        for place, effect, found in zip(
+            self.layout.effects, self.effects, components.effects, strict=True
+        ):
+            if found.covariance is effect.prior:
+                right[place] = effect.prior_information @ effect.mean
+        return right
+
     @cached_property
     def _of_files(self) -> FloatArray:
         """Prior information of all but LEDs, seat and drift, (p, p)."""

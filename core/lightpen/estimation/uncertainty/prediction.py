@@ -269,7 +269,7 @@ def _linear_bundle(
     for _ in range(SEAT_ROUNDS):
         # The jitter first: without it, what other errors there are take it up.
         covariance = inverse(information + unknowns.prior_information(components))
-        change = covariance @ right
+        change = covariance @ (right + unknowns.prior_right(components))
         jitter = jitter_of(unknowns, equations, spread, seen, change, covariance)
         information, right = (
             alone
@@ -291,7 +291,7 @@ def _linear_bundle(
     return Bundle(
         unknowns=unknowns,
         state=unknowns.start,
-        values=covariance @ right,
+        values=covariance @ (right + unknowns.prior_right(components)),
         components=components,
         budget_components=components,
         residuals=_by_camera(joint.residuals, n_cameras),
@@ -334,12 +334,13 @@ def _shift_from(bundle: Bundle, priors: Priors) -> FloatArray:
         return np.zeros(6)
     unknowns = replace(bundle.unknowns, priors=shrunk, effects=likely)
     information = bundle.information
-    right = (information + bundle.prior_information) @ bundle.values
+    right = bundle.right
     of_effects = zip(likely, bundle.components.effects, strict=True)
     components = bundle.components._replace(
         effects=tuple(held(one) if one.is_exact else own for one, own in of_effects)
     )
     prior = unknowns.prior_information(components)
+    right = right + unknowns.prior_right(components)
     return np.asarray((inverse(information + prior) @ right - bundle.values)[:6])
 
 

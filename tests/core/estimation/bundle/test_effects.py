@@ -192,13 +192,25 @@ def test_the_size_of_an_effect_is_found_by_likelihood() -> None:
 def test_mechanics_gain_as_much_as_they_make_the_images_likelier() -> None:
     rng = np.random.default_rng(7)
     S, prior = np.diag([1e8, 1e6, 1e4]), np.diag([1e-8, 1e-6, 1e-6])
-    right = S @ rng.normal(0, 2e-3, 3)
+    right, means = S @ rng.normal(0, 2e-3, 3), np.array([1e-4, 0.0, 2e-3])
     # As if each unknown were seen by itself: its value has the variance of both.
     seen, noise = right / np.diag(S), 1 / np.diag(S)
     both = noise + np.diag(prior)
-    expected = np.sum(seen**2 / noise - seen**2 / both - np.log(both / noise))
-    assert gain_of(S, right, prior) == pytest.approx(float(expected))
-    assert gain_of(S, np.zeros(3), prior) < 0
+    misfit = (seen - means) ** 2 / both
+    expected = np.sum(seen**2 / noise - misfit - np.log(both / noise))
+    assert gain_of(S, right, prior, means) == pytest.approx(float(expected))
+    assert gain_of(S, np.zeros(3), prior, means) < 0
+
+
+def test_play_and_sag_are_expected_downward_with_their_usual_mean_square() -> None:
+    columns, shapes = np.zeros((1, 3)), tuple(np.diag(one) for one in np.eye(3))
+    play = Effect(EffectName.LOOSE, 0, columns, shapes, 0.005)
+    drawn = np.abs(np.random.default_rng(3).normal(0, 0.005 / np.sqrt(3), 100_000))
+    assert play.mean[0] == pytest.approx(drawn.mean(), rel=0.01)
+    assert play.prior[0, 0] == pytest.approx(drawn.var(), rel=0.02)
+    assert (play.mean[1:] == 0).all()
+    assert np.diag(play.prior)[1:] == pytest.approx(0.005**2 / 3)
+    assert (play.at_zero.mean == 0).all()
 
 
 def test_the_likelier_of_two_shapes_is_taken() -> None:

@@ -266,7 +266,7 @@ def test_a_camera_that_states_nothing_is_assumed_and_counted() -> None:
 
     marked = {share.name for share in assumed.shares if share.assumed}
     assert marked == {ContributionName.CAMERA, *OF_STATION}
-    assert (assumed.expanded_uncertainty > stated.expanded_uncertainty).all()
+    assert assumed.weakest_uncertainty > stated.weakest_uncertainty
     # The height of the cone goes with cy, which one swing hardly tells.
     assert assumed.expanded_uncertainty[4] > 2 * stated.expanded_uncertainty[4]
 

@@ -99,7 +99,7 @@ def test_what_is_assumed_of_the_station_counts_during_the_swing() -> None:
             *(RIG, PEN, np.arange(40), centers(swing)[:, None]),
             *(swing.rotations, swing.translations, assumed),
         )
-        for assumed in (USUAL, replace(USUAL, form_error=0.01))
+        for assumed in (USUAL, replace(USUAL, form_error=0.02))
     )
     assert worn.uncertainty > 2 * usual.uncertainty
     assert worn.predicted.floor > usual.predicted.floor
@@ -153,14 +153,6 @@ def test_images_from_before_a_slip_need_not_be_far_out() -> None:
     _, suspected = without_slipped(RIG, PEN, kept, since=3.75)
     assert sure < suspected
     assert suspected <= {39, 40}
-
-
-def test_the_uncertainty_is_that_of_the_direction_known_least() -> None:
-    kept = grown(swing_poses(20, np.random.default_rng(0)))
-    assert kept.joint is not None
-
-    along_axes = 2 * np.sqrt(np.diag(kept.joint.covariance)[:3])
-    assert along_axes.max() <= kept.uncertainty < 1.3 * np.linalg.norm(along_axes)
 
 
 def test_images_from_before_an_interruption_are_from_before_any_slip() -> None:
