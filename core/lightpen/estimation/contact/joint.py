@@ -39,6 +39,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
 
+LEAST_SIGMA = 0.005  # px; dim discs are off by more where bright ones are by less
 OUTLIER = 5.0  # standard deviations; a normal vector in 2-D exceeds it in 4e-6
 MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
 SETTLED = 1e-4  # mm, change of tip and cone after which the loss is dropped
@@ -347,7 +348,7 @@ def inliers(residuals: FloatArray) -> BoolArray:
     None of an image that has too few of them.
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
-    threshold = OUTLIER * robust_sigma(residuals, 3)
+    threshold = OUTLIER * max(robust_sigma(residuals, 3), LEAST_SIGMA)
     within = np.nan_to_num(lengths, nan=np.inf) < threshold
     enough = within.sum(axis=1, keepdims=True) >= MIN_TURN_LEDS
     return np.asarray(within & enough)
