@@ -22,8 +22,8 @@ LEDs in turn   the LEDs light one after the other; interval from one to the next
 ============== =========================================================================
 
 Mechanics (compliance to camera tilt) are seldom perfect, and a swing decides little of
-their sizes. They are unknowns of every fit, with a prior of their usual size. Play and sag
-follow gravity: their priors are half-normal, with that mean and variance.
+their sizes. They are unknowns of every fit, with a prior of their usual size. Play and
+sag follow gravity: their priors are half-normal, with that mean and variance.
 """
 
 from collections.abc import Sequence
