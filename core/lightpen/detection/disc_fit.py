@@ -74,8 +74,8 @@ class DiscFits(NamedTuple):
     centers : (N, 2) array
         px from the middle of the window.
     sigmas : (N,) array
-        Standard deviation of one coordinate, px, larger for discs of other shapes
-        than most.
+        Standard deviation of one coordinate, px, larger for discs whose shape differs
+        from the others.
     """
 
     centers: FloatArray
@@ -248,9 +248,9 @@ def _correlated(pulls: FloatArray) -> float:
 
 
 def _misshapen(values: FloatArray) -> FloatArray:
-    """Return how much more than usual shapes are off that of the most discs, (N,).
+    """Return by how much more than usual each shape differs from the median, (N,).
 
-    Light beside a disc draws its shape and its centre alike.
+    Light beside a disc distorts its shape and shifts its centre by about as much.
     """
     m11, m12, m22 = values[:, [M11, M12, M22]].T
     sizes = np.maximum(np.abs(m11 + m22), TINY)

@@ -132,7 +132,7 @@ def _refitted(
 
 
 def pulled(near: Camera, pull: float) -> Camera:
-    """Return a camera like no other, but for folding coefficients drawn towards 0."""
+    """Return a camera with wide priors, its folding coefficients drawn towards 0."""
     folding = 4 + np.array(FOLDING[len(near.distortion)])
     values, covariance = near.intrinsics.copy(), any_covariance(near)
     values[folding] = 0.0

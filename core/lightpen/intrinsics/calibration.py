@@ -9,6 +9,7 @@ views that no single camera can have taken is refused, by what it is instead.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import date
+from functools import cached_property
 
 import numpy as np
 
@@ -279,7 +280,7 @@ class _Found:
             or (components.lenses[0] > UNEVEN_LENS * noise and self.has_skew)
         )
 
-    @property
+    @cached_property
     def has_skew(self) -> bool:
         """Whether the lens field is nothing but a skew of the image, as no lens has."""
         even = without_fields(self.views, self.effects.fields)

@@ -250,12 +250,12 @@ def calibrate_pair(
 
 
 def _require_fit(views: Views, camera: Camera, name: str) -> None:
-    """Refuse a camera by which no poses fit its own views.
+    """Refuse a camera file that does not fit the views of its own camera.
 
     Raises
     ------
     CalibrationError
-        Its lens is another.
+        The residuals are too large at any poses of the board.
     """
     poses, shape = start_board_poses(camera, views), np.zeros(N_SHAPE)
     state = BoardState((camera,), np.eye(3)[None], np.zeros((1, 3)), poses, shape)

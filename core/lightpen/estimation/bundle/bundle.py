@@ -49,7 +49,7 @@ CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
 FINDING_PASSES = 4  # at most, in which standard deviations are found; then they stand
 MAX_PASSES = 20
-OPPOSED = 0.5  # of the last step, by which a step goes back that is halved
+OPPOSED = 0.5  # share of the last step; a step back by more is halved
 
 
 @dataclass(frozen=True, eq=False)

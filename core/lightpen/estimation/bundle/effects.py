@@ -72,7 +72,7 @@ class EffectName(StrEnum):
 # Usual sizes of mechanics, rms, mm or px; that of compliance is an assumption.
 USUAL = {EffectName.LOOSE: 0.005, EffectName.SAG: 0.012, EffectName.TILT: 0.01}
 MECHANICS = EffectName.COMPLIANCE, *USUAL
-DOWNWARD = EffectName.LOOSE, EffectName.SAG  # in their first unknown, by gravity
+DOWNWARD = EffectName.LOOSE, EffectName.SAG  # first unknown positive, by gravity
 HALF_NORMAL_MEAN = float(np.sqrt(2 / np.pi))  # of a root mean square of 1
 TIMING = EffectName.DELAY, EffectName.SHUTTER, EffectName.STROBE
 # Largest standard deviations, mm, px or image intervals; a larger one is another fault.

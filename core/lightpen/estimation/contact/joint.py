@@ -39,7 +39,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
 
-LEAST_SIGMA = 0.005  # px; dim discs are off by more where bright ones are by less
+LEAST_SIGMA = 0.005  # px, for outliers; centres of dim discs are hardly better
 OUTLIER = 5.0  # standard deviations; a normal vector in 2-D exceeds it in 4e-6
 MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
 SETTLED = 1e-4  # mm, change of tip and cone after which the loss is dropped
