@@ -74,18 +74,10 @@ def in_english(template: str) -> str:
 
 @dataclass(frozen=True)
 class Message:
-    """A message, or a few words that are part of one.
+    """A message, or a few words that are part of one."""
 
-    Attributes
-    ----------
-    code : str
-        Key of the template in the catalogue. It stays when the words change.
-    values : mapping of str to Value
-        Values for the fields of the template, named as for `str.format`. A tuple of
-        messages is joined by commas.
-    """
-
-    code: str
+    code: str  # key of the template in the catalogue; it stays when the words change
+    # For the fields of the template; a tuple of messages is joined by commas.
     values: Mapping[str, Value] = field(default_factory=dict)
 
     @property

@@ -31,13 +31,7 @@ GONE = {2, 3, 4, 5, 10}  # of ArvDeviceError: lost, broken, timed out, not contr
 
 
 class AravisError(Exception):
-    """A call failed.
-
-    Attributes
-    ----------
-    is_gone : bool
-        Whether the camera does not answer, or no longer obeys this program.
-    """
+    """A call failed; `is_gone` if the camera no longer answers or obeys."""
 
     def __init__(self, message: str, is_gone: bool) -> None:
         super().__init__(message)

@@ -42,27 +42,15 @@ MOST_MISSED = 10_000  # at once; a larger gap is a camera that counts again
 
 @dataclass(frozen=True, eq=False)
 class DeliveredFrame:
-    """An image as a library delivers it.
+    """An image as a library delivers it."""
 
-    Attributes
-    ----------
-    data : (N,) array
-        A copy of what was sent.
-    number : int
-        Frame number of the camera.
-    padding : int
-        Bytes at the end of each row.
-    is_complete : bool
-        Whether all of it arrived.
-    """
-
-    data: Bytes
+    data: Bytes  # (N,), a copy of what was sent
     width: int
     height: int
-    number: int
+    number: int  # frame number of the camera
     device_ts_ns: int | None = None
-    padding: int = 0
-    is_complete: bool = True
+    padding: int = 0  # bytes at the end of each row
+    is_complete: bool = True  # whether all of it arrived
 
 
 class Device(Protocol):

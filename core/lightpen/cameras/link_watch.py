@@ -20,21 +20,11 @@ SLOW_SHARE = 0.8  # of the rate that is set
 
 @dataclass(frozen=True)
 class LinkWatch:
-    """Frame counters of a time window.
+    """Frame counters of a time window."""
 
-    Attributes
-    ----------
-    since : Stats or None
-        Counts at the beginning of the window.
-    began : float
-        s.
-    is_reported : bool
-        Whether a fault was reported; once for each set of settings.
-    """
-
-    since: Stats | None = None
-    began: float = 0.0
-    is_reported: bool = False
+    since: Stats | None = None  # counts at the beginning of the window
+    began: float = 0.0  # s
+    is_reported: bool = False  # one fault for each set of settings
 
     def after(
         self, stats: Stats, now: float, settings: CameraSettings

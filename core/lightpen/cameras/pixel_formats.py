@@ -29,27 +29,15 @@ class Layout(Enum):
 
 @dataclass(frozen=True)
 class PixelFormat:
-    """A pixel format that can be decoded.
-
-    Attributes
-    ----------
-    bits : int
-        Bits per value; full scale is ``2**bits - 1``.
-    n_channels : int
-        Values of a pixel.
-    to_grey : int or None
-        Conversion of OpenCV; None for grey formats, and for those whose values hold the
-        luminance separately.
-    luminance : int
-        The first of two values is the luminance, or the second.
-    """
+    """A pixel format that can be decoded."""
 
     name: str
-    bits: int = 8
+    bits: int = 8  # bits per value; full scale is ``2**bits - 1``
     layout: Layout = Layout.WHOLE
-    n_channels: int = 1
+    n_channels: int = 1  # values of a pixel
+    # Conversion of OpenCV; None where values hold grey or the luminance.
     to_grey: int | None = None
-    luminance: int = 0
+    luminance: int = 0  # its index among the values of a pixel
 
     @property
     def is_mono(self) -> bool:

@@ -64,38 +64,18 @@ class EndOfImages(Exception):  # noqa: N818 - not an error
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One complete image of a camera.
+    """One complete image of a camera."""
 
-    Attributes
-    ----------
-    image : (H, W) array
-        Read-only and nobody else's memory, see `sealed`.
-    seq : int
-        Number given by the camera. It ascends over the life of the `ImageCamera`; a gap
-        is an image that got lost.
-    host_ts_ns : int
-        When the image was there, by the monotonic clock of the machine.
-    device_ts_ns : int or None
-        Time stamp of the camera, ns.
-    exposure_us, gain_db : float or None
-        Exposure and gain of this image; None if unknown, as shortly after a change.
-    pixel_format : str
-        Name in the GenICam Pixel Format Naming Convention.
-    bits : int
-        Full scale is ``2**bits - 1``.
-    others : tuple of Frame
-        Simultaneous frames of the other cameras of a rig.
-    """
-
-    image: Image
-    seq: int
-    host_ts_ns: int
-    device_ts_ns: int | None = None
+    image: Image  # (H, W), read-only and nobody else's memory, see `sealed`
+    seq: int  # ascends over the life of the `ImageCamera`; a gap is a lost image
+    host_ts_ns: int  # when the image was there, by the monotonic clock of the machine
+    device_ts_ns: int | None = None  # time stamp of the camera, ns
+    # Exposure and gain of this image; None if unknown, as shortly after a change.
     exposure_us: float | None = None
     gain_db: float | None = None
-    pixel_format: str = "Mono8"
-    bits: int = 8
-    others: tuple["Frame", ...] = ()
+    pixel_format: str = "Mono8"  # by the GenICam Pixel Format Naming Convention
+    bits: int = 8  # full scale is ``2**bits - 1``
+    others: tuple["Frame", ...] = ()  # simultaneous, of the other cameras of a rig
 
     @property
     def full_scale(self) -> int:
@@ -115,30 +95,14 @@ def sealed(image: Image) -> Image:
 
 @dataclass(frozen=True)
 class Stats:
-    """Frame counters since the `ImageCamera` was made.
+    """Frame counters since the `ImageCamera` was made."""
 
-    Attributes
-    ----------
-    delivered : int
-        Complete images.
-    incomplete : int
-        Arrived damaged and discarded.
-    missed : int
-        Never arrived: gaps in the sequence numbers.
-    skipped : int
-        Discarded because processing was too slow.
-    timeouts : int
-        Reads that timed out.
-    unpaired : int
-        Discarded without a simultaneous image of the other camera.
-    """
-
-    delivered: Count = 0
-    incomplete: Count = 0
-    missed: Count = 0
-    skipped: Count = 0
-    timeouts: Count = 0
-    unpaired: Count = 0
+    delivered: Count = 0  # complete images
+    incomplete: Count = 0  # arrived damaged and discarded
+    missed: Count = 0  # never arrived: gaps in the sequence numbers
+    skipped: Count = 0  # discarded because processing was too slow
+    timeouts: Count = 0  # reads that timed out
+    unpaired: Count = 0  # discarded without a simultaneous image of the other camera
 
     def since(self, earlier: "Stats") -> "Stats":
         """Return the difference from earlier counters."""
@@ -153,17 +117,11 @@ class Stats:
 
 @dataclass(frozen=True)
 class Range:
-    """Values that a feature of a camera takes: ``low + k step`` up to ``high``.
-
-    Attributes
-    ----------
-    step : float
-        0 if any value between is taken.
-    """
+    """Values that a feature of a camera takes: ``low + k step`` up to ``high``."""
 
     low: float
     high: float
-    step: float = 0.0
+    step: float = 0.0  # 0 if any value between is taken
 
     def nearest(self, value: float) -> float:
         """Return the nearest possible value.
@@ -198,19 +156,11 @@ class Region:
 
 @dataclass(frozen=True)
 class RegionLimits:
-    """Regions that a camera can read out.
+    """Regions that a camera can read out."""
 
-    Attributes
-    ----------
-    width, height : Range
-        ``high`` is that of the sensor.
-    x_step, y_step : int
-        Step of the region's position; 0 if it is fixed.
-    """
-
-    width: Range
+    width: Range  # up to that of the sensor
     height: Range
-    x_step: int = 0
+    x_step: int = 0  # of the position; 0 if it is fixed
     y_step: int = 0
 
     @property
@@ -237,43 +187,22 @@ def _place(wanted: int, most: float, step: int) -> int:
 
 @dataclass(frozen=True)
 class CameraCapabilities:
-    """Capabilities of an open camera.
+    """Capabilities of an open camera."""
 
-    Attributes
-    ----------
-    width, height : int
-        Of the images, px.
-    pixel_formats : tuple of str
-        Available formats, the default first.
-    exposure_us, gain_db, frame_rate, packet_size : Range or None
-        None if it cannot be set.
-    gain_in_db : bool
-        Whether the gain is in dB and not in device units.
-    regions : RegionLimits or None
-        None if the region cannot be set.
-    triggers : tuple of TriggerMode
-        Available modes, free running first.
-    has_link : bool
-        Whether images come over a cable that may lose some.
-    waits : bool
-        Whether no image is lost when nobody reads, as with a file.
-    n_images : int or None
-        After so many images a recording restarts.
-    """
-
-    width: int
+    width: int  # of the images, px
     height: int
-    pixel_formats: tuple[str, ...]
+    pixel_formats: tuple[str, ...]  # the default first
+    # Each of the next four is None if it cannot be set.
     exposure_us: Range | None = None
     gain_db: Range | None = None
     frame_rate: Range | None = None
     packet_size: Range | None = None
-    gain_in_db: bool = True
-    regions: RegionLimits | None = None
-    triggers: tuple[TriggerMode, ...] = (TriggerMode.FREE,)
-    waits: bool = False
-    has_link: bool = False
-    n_images: int | None = None
+    gain_in_db: bool = True  # whether the gain is in dB and not in device units
+    regions: RegionLimits | None = None  # None if the region cannot be set
+    triggers: tuple[TriggerMode, ...] = (TriggerMode.FREE,)  # free running first
+    waits: bool = False  # whether no image is lost when nobody reads, as with a file
+    has_link: bool = False  # whether images come over a cable that may lose some
+    n_images: int | None = None  # after so many images a recording restarts
 
 
 @dataclass(frozen=True)
@@ -281,11 +210,6 @@ class CameraSettings:
     """Requested or actual settings of a camera.
 
     In a request None means unchanged; in an answer, not supported.
-
-    Attributes
-    ----------
-    packet_size : int or None
-        Packet size of a network camera, bytes.
     """
 
     exposure_us: float | None = None
@@ -294,7 +218,7 @@ class CameraSettings:
     pixel_format: str | None = None
     region: Region | None = None
     trigger: TriggerMode | None = None
-    packet_size: int | None = None
+    packet_size: int | None = None  # of a network camera, bytes
 
 
 class ImageCamera(Protocol):

@@ -20,58 +20,31 @@ class SourceNeeds(Enum):
 
 @dataclass(frozen=True)
 class SourcePlace:
-    """Location of the images of a source.
+    """Location of the images of a source."""
 
-    Attributes
-    ----------
-    name : str
-        Folder, pattern or video; or serial number or address of a camera.
-    producer : str
-        File of a GenTL producer; empty for those that the system names.
-    """
-
-    name: str
-    producer: str = ""
+    name: str  # folder, pattern or video; or serial number or address of a camera
+    producer: str = ""  # file of GenTL; empty for those that the system names
 
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A camera that was found.
+    """A camera that was found."""
 
-    Attributes
-    ----------
-    place : str
-        Serial number or another identifier.
-    label : str
-        Vendor, model and serial number.
-    """
-
-    place: str
-    label: str
+    place: str  # serial number or another identifier
+    label: str  # vendor, model and serial number
 
 
 @dataclass(frozen=True)
 class Source:
-    """A kind of camera.
+    """A kind of camera."""
 
-    Attributes
-    ----------
-    key : str
-        Identifies it in settings and records; must not change.
-    why_absent : callable
-        Returns what must be installed first, or None.
-    find : callable
-        Returns the cameras that are there, given the file of a producer or nothing.
-        Takes seconds; not to be called while one of them streams. Raises
-        `CameraFailure`.
-    camera : callable or None
-        Returns a camera that is not open. None for what the simulator makes, which
-        needs its scene.
-    """
-
-    key: str
+    key: str  # identifies it in settings and records; must not change
     name: Message
     needs: SourceNeeds
+    # Returns a camera that is not open; None for the simulator, which needs its scene.
     camera: Callable[[SourcePlace, Clock], ImageCamera] | None = None
+    # Returns the cameras that are there, given the file of a producer or nothing. Takes
+    # seconds; not to be called while one of them streams. Raises `CameraFailure`.
     find: Callable[[str], tuple[FoundDevice, ...]] = lambda producer: ()
+    # Returns what must be installed first, or None.
     why_absent: Callable[[], Message | None] = lambda: None

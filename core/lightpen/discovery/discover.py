@@ -68,17 +68,11 @@ SLIPPED = 0.03  # of the images, that are left out after a slip
 
 @dataclass(frozen=True, eq=False)
 class _Swing:
-    """A swing with its spots labelled.
-
-    Attributes
-    ----------
-    centers, kept : tuple of array
-        Spots that are no lamps, px, and the numbers that they have in the sightings.
-    """
+    """A swing with its spots labelled."""
 
     sightings: Sightings
-    centers: tuple[FloatArray, ...]
-    kept: tuple[IntArray, ...]
+    centers: tuple[FloatArray, ...]  # spots that are no lamps, px
+    kept: tuple[IntArray, ...]  # their numbers in the sightings
     pieces: Pieces
     found: Labelled
     hypotheses: tuple[Hypothesis, ...]

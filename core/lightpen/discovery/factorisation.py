@@ -21,24 +21,12 @@ LEAST_METRIC = 1e-6  # of the largest eigenvalue, that the least is taken to be
 
 
 class WeakShape(NamedTuple):
-    """Shape and motion, up to a mirror along the line of sight.
+    """Shape and motion, up to a mirror along the line of sight."""
 
-    Attributes
-    ----------
-    points : (L, 3) array
-        About their centroid, in units in which the mean scale is 1 px.
-    rotations : (N, 3, 3) array
-        Of cam_from_shape.
-    scales : (N,) array
-        px a unit.
-    centroids : (N, 2) array
-        Image of the centroid, px.
-    """
-
-    points: FloatArray
-    rotations: FloatArray
-    scales: FloatArray
-    centroids: FloatArray
+    points: FloatArray  # (L, 3), about their centroid; the mean scale is 1 px a unit
+    rotations: FloatArray  # (N, 3, 3), of cam_from_shape
+    scales: FloatArray  # (N,), px a unit
+    centroids: FloatArray  # (N, 2), image of the centroid, px
 
     @property
     def mirrored(self) -> "WeakShape":

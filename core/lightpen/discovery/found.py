@@ -31,43 +31,22 @@ from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """Tip, pen and camera that a swing showed.
+    """Tip, pen and camera that a swing showed."""
 
-    Attributes
-    ----------
-    pen : Pen
-        In its frame, with the covariance of its LEDs.
-    camera : Camera
-        With its covariance.
-    tip_pen : (3,) array
-        mm.
-    covariance : (q, q) array
-        Of tip, camera, diameter and LEDs, as `parameters` has them, in the frame in
-        which the LEDs fit the true ones best.
-    beyond_fit : (3, 3) array
-        Share of lens and mechanics in the covariance of the tip, mm^2.
-    calibration : Calibration
-        By which they were adjusted.
-    lengths : tuple of KnownLength
-    is_relative : bool
-        Whether there was no length.
-    hypotheses : tuple of Hypothesis
-    n_lamps : int
-        Lights that did not move with the pen.
-    lens_choice : Choice or None
-        Why this lens model; None where the camera is known.
-    """
-
-    pen: Pen
-    camera: Camera
-    tip_pen: FloatArray
+    pen: Pen  # in its frame, with the covariance of its LEDs
+    camera: Camera  # with its covariance
+    tip_pen: FloatArray  # (3,), mm
+    # (q, q), of tip, camera, diameter and LEDs, as `parameters` has them, in the frame
+    # in which the LEDs fit the true ones best
     covariance: FloatArray
+    # (3, 3), share of lens and mechanics in the covariance of the tip, mm^2
     beyond_fit: FloatArray
-    calibration: Calibration
+    calibration: Calibration  # by which they were adjusted
     lengths: tuple[KnownLength, ...]
-    is_relative: bool
+    is_relative: bool  # whether there was no length
     hypotheses: tuple[Hypothesis, ...]
-    n_lamps: int
+    n_lamps: int  # lights that did not move with the pen
+    # Why this lens model; None where the camera is known.
     lens_choice: Choice | None = None
 
     @property

@@ -21,21 +21,12 @@ TURNS_NEEDED = (-0.35, 0.35)  # rad, about the pen's own axis
 
 @dataclass(frozen=True, eq=False)
 class Guide:
-    """Postures of a swing so far, and what is missing.
+    """Postures of a swing so far, and what is missing."""
 
-    Attributes
-    ----------
-    outlook : GuidanceInput
-        Pen and camera as found, and the postures of the images so far.
-    needed : (3, 8) array of int
-        Images wanted in each field of the dial; none where the LEDs are not seen.
-    target : Posture or None
-        Next posture; None once none is missing.
-    """
-
-    outlook: GuidanceInput
+    outlook: GuidanceInput  # as found, with the postures of the images so far
+    # (3, 8), images wanted in each field of the dial; none where the LEDs are not seen
     needed: IntArray
-    target: Posture | None = None
+    target: Posture | None = None  # next posture; None once none is missing
 
     @property
     def pen(self) -> Pen:

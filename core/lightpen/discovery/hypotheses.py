@@ -64,46 +64,24 @@ DECIDED = 2.0  # times the misfit of the best that the mirrored one must have
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A start that was tried.
+    """A start that was tried."""
 
-    Attributes
-    ----------
-    mirrored : bool
-        Whether near and far are exchanged against the first shape.
-    started_at, focal_length : float
-        Before and after the adjustment, px.
-    misfit : float
-        Robust noise of one coordinate about it, px.
-    is_best : bool
-        Whether it ended at the shape that fits best, wherever it began.
-    """
-
-    mirrored: bool
-    started_at: float
-    focal_length: float
-    misfit: float
-    is_best: bool = False
+    mirrored: bool  # near and far are exchanged against the first shape
+    started_at: float  # focal length before the adjustment, px
+    focal_length: float  # after it, px
+    misfit: float  # robust noise of one coordinate about it, px
+    is_best: bool = False  # ended at the shape that fits best, wherever it began
 
 
 @dataclass(frozen=True, eq=False)
 class Seed:
-    """A part of the swing that is solved.
+    """A part of the swing that is solved."""
 
-    Attributes
-    ----------
-    images, pieces : (M,) and (L,) array of int
-    start : Start
-        LED j is that of ``pieces[j]``.
-    hypotheses : tuple of Hypothesis
-    margin : float
-        Least misfit of another shape in the same images, times that of the start.
-    """
-
-    images: IntArray
-    pieces: IntArray
-    start: Start
+    images: IntArray  # (M,)
+    pieces: IntArray  # (L,)
+    start: Start  # LED j is that of ``pieces[j]``
     hypotheses: tuple[Hypothesis, ...]
-    margin: float
+    margin: float  # least misfit of another shape over that of the start
 
 
 def solve_seed(

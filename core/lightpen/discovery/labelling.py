@@ -42,23 +42,12 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
-    """The spots of all N images by LED.
+    """The spots of all N images by LED."""
 
-    Attributes
-    ----------
-    state : BundleState
-        Of the M images that have a rotation.
-    images : (M,) array of int
-    spots : (N, L) array of int
-        Spot of each LED in each image; -1 without one.
-    unexplained : (N, P) array of bool
-        Where pieces that move and are no LEDs are seen.
-    """
-
-    state: BundleState
-    images: IntArray
-    spots: IntArray
-    unexplained: BoolArray
+    state: BundleState  # of the M images that have a rotation
+    images: IntArray  # (M,)
+    spots: IntArray  # (N, L), spot of each LED in each image; -1 without one
+    unexplained: BoolArray  # (N, P), where pieces that move and are no LEDs are seen
 
 
 def label(

@@ -15,34 +15,17 @@ from lightpen.verification.tasks.probed_point import ProbedPoint
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """Prior knowledge, and the form of the results.
+    """Prior knowledge, and the form of the results."""
 
-    Attributes
-    ----------
-    lengths : tuple of MeasuredLength
-        Without any the result is relative: the largest distance is `RELATIVE`.
-    diameter : float
-        Of the LED discs, mm.
-    camera : Camera or None
-        Of a camera file, with its covariance.
-    sketch : Pen or None
-        Rough LEDs, which give numbers and frame.
-    second : SecondSightings or None
-        A swing in a second cone, before the same camera, not moved. The distance of
-        the cones gives the scale where there is no length.
-    touched : TouchedLength or None
-        A certified length, of which both ends were touched with the pen.
-    n_coefficients : int or None
-        Lens model that other swings need; None: it is chosen.
-    """
-
-    lengths: tuple[MeasuredLength, ...]
-    diameter: float
-    camera: Camera | None = None
-    sketch: Pen | None = None
+    lengths: tuple[MeasuredLength, ...]  # none: the largest distance is `RELATIVE`
+    diameter: float  # of the LED discs, mm
+    camera: Camera | None = None  # of a camera file, with its covariance
+    sketch: Pen | None = None  # rough LEDs, which give numbers and frame
+    # A swing in a second cone, before the same camera, not moved. The distance of the
+    # cones gives the scale where there is no length.
     second: "SecondSightings | None" = None
-    touched: "TouchedLength | None" = None
-    n_coefficients: int | None = None
+    touched: "TouchedLength | None" = None  # a certified length
+    n_coefficients: int | None = None  # that other swings need; None: it is chosen
 
     @property
     def is_relative(self) -> bool:
@@ -65,13 +48,8 @@ class SecondSightings:
 
 @dataclass(frozen=True, eq=False)
 class TouchedLength:
-    """Touches of both ends of a certified length, after the swing.
+    """Touches of both ends of a certified length, after the swing."""
 
-    Attributes
-    ----------
-    touches : callable
-        Returns the touches as measured with pen, camera and tip as found.
-    """
-
+    # Returns the touches as measured with pen, camera and tip as found.
     touches: Callable[[Instrument], Sequence[ProbedPoint]]
     separation: ConeSeparation

@@ -35,19 +35,11 @@ WORST_TIP, WORST_FOCAL = 0.02, 0.03  # U over the pen's size, and relative
 
 
 class Halves(NamedTuple):
-    """The two halves of a swing, each adjusted alone.
+    """The two halves of a swing, each adjusted alone."""
 
-    Attributes
-    ----------
-    focal_lengths, sigmas : (2,) array
-        With standard uncertainties, px.
-    misfit : float
-        Noise of both about the common start, by that of the noisier half alone.
-    """
-
-    focal_lengths: FloatArray
-    sigmas: FloatArray
-    misfit: float
+    focal_lengths: FloatArray  # (2,), px
+    sigmas: FloatArray  # (2,), their standard uncertainties, px
+    misfit: float  # noise about the common start, by that of the noisier half alone
 
 
 def require_enough(sightings: Sightings) -> None:

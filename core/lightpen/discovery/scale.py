@@ -20,19 +20,11 @@ SHAPE = 2e-4  # relative: more than ratios of lengths within the shape are uncer
 
 @dataclass(frozen=True)
 class MeasuredLength:
-    """A length that was measured on the pen.
+    """A length that was measured on the pen."""
 
-    Attributes
-    ----------
-    leds : tuple of int or None
-        Numbers of the two LEDs, from 1; None: the two farthest apart.
-    length, sigma : float
-        With its standard uncertainty, mm.
-    """
-
-    leds: tuple[int, int] | None
-    length: float
-    sigma: float
+    leds: tuple[int, int] | None  # numbers from 1; None: the two farthest apart
+    length: float  # mm
+    sigma: float  # its standard uncertainty, mm
 
 
 def known_lengths(

@@ -39,19 +39,11 @@ LEAST_LENGTH_SIGMA = 1e-4  # mm
 
 
 class ScaledStart(NamedTuple):
-    """Start of the adjustment of all images.
-
-    Attributes
-    ----------
-    lengths : tuple of KnownLength
-        One at least; relative where none is known.
-    choice : Choice or None
-        Why this lens model; None where the camera is known.
-    """
+    """Start of the adjustment of all images."""
 
     state: BundleState
-    lengths: tuple[KnownLength, ...]
-    choice: Choice | None
+    lengths: tuple[KnownLength, ...]  # one at least; relative where none is known
+    choice: Choice | None  # why this lens model; None where the camera is known
 
 
 def numbered(found: Labelled, request: Request) -> Labelled:

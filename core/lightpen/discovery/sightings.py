@@ -21,30 +21,15 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Unlabelled spots of N images in time order.
+    """Unlabelled spots of N images in time order."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        File or frame, one an image.
-    centers : tuple of (S, 2) array
-        Centres of the spots of each image, px; centroids where there are shapes.
-    size : tuple of int
-        Width and height of the images, px.
-    shapes : tuple of (S, 2, 2) array or None
-        Covariance of the area of each spot, px^2; None where only centres are given.
-    areas : tuple of (S,) array or None
-        px^2; NaN of saturated ones.
-    edge_widths : (N,) array
-        Mean edge width of the LEDs in each image, px; NaN where only centres are given.
-    """
-
-    names: tuple[str, ...]
-    centers: tuple[FloatArray, ...]
-    size: tuple[int, int]
+    names: tuple[str, ...]  # file or frame, one an image
+    centers: tuple[FloatArray, ...]  # (S, 2) each, px; centroids if there are shapes
+    size: tuple[int, int]  # width and height of the images, px
+    # (S, 2, 2) each, covariances of the areas, px^2; None if only centres are given
     shapes: tuple[FloatArray, ...] | None = None
-    areas: tuple[FloatArray, ...] | None = None
-    edge_widths: FloatArray | None = None
+    areas: tuple[FloatArray, ...] | None = None  # (S,) each, px^2; NaN if saturated
+    edge_widths: FloatArray | None = None  # (N,), mean of each image, px
 
     def __len__(self) -> int:
         return len(self.names)

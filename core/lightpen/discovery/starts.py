@@ -41,17 +41,10 @@ WORST = 1e12  # misfit of a state that is none
 
 
 class CameraPrior(NamedTuple):
-    """Prior knowledge of the intrinsics of a camera.
+    """Prior knowledge of the intrinsics of a camera."""
 
-    Attributes
-    ----------
-    intrinsics : (k,) array
-        As `Camera.intrinsics`.
-    information : (k, k) array
-    """
-
-    intrinsics: FloatArray
-    information: FloatArray
+    intrinsics: FloatArray  # (k,), as `Camera.intrinsics`
+    information: FloatArray  # (k, k)
 
     @classmethod
     def of(cls, camera: Camera, covariance: FloatArray) -> "CameraPrior":
@@ -100,18 +93,10 @@ def ideal_camera(width: int, height: int, focal: float) -> Camera:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A state and how well it fits.
+    """A state and how well it fits."""
 
-    Attributes
-    ----------
-    state : BundleState
-        Tip at the origin of the pen's frame.
-    sigma : float
-        Robust noise of one coordinate about it, px.
-    """
-
-    state: BundleState
-    sigma: float
+    state: BundleState  # tip at the origin of the pen's frame
+    sigma: float  # robust noise of one coordinate about it, px
 
 
 def focal_length_of(shape: WeakShape) -> float:

@@ -35,20 +35,11 @@ class HeldOut:
     """A swing that took no part, against the others.
 
     The common error of the lengths is no part of the differences.
-
-    Attributes
-    ----------
-    tip : (3,) array
-        Difference of the tips, mm.
-    tip_sigma : (3,) array
-        Its standard uncertainty, mm.
-    focal_length, focal_length_sigma : float
-        The same of fx, px.
     """
 
-    tip: FloatArray
-    tip_sigma: FloatArray
-    focal_length: float
+    tip: FloatArray  # (3,), difference of the tips, mm
+    tip_sigma: FloatArray  # (3,), its standard uncertainty, mm
+    focal_length: float  # difference of fx, px
     focal_length_sigma: float
 
     @property
@@ -60,21 +51,11 @@ class HeldOut:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Joint result of several swings.
+    """Joint result of several swings."""
 
-    Attributes
-    ----------
-    found : Discovery
-        Of all; its calibration is that of the first swing.
-    swings : tuple of Discovery
-        Of each.
-    held_out : HeldOut
-        The last against the others.
-    """
-
-    found: Discovery
-    swings: tuple[Discovery, ...]
-    held_out: HeldOut
+    found: Discovery  # of all; its calibration is that of the first swing
+    swings: tuple[Discovery, ...]  # of each
+    held_out: HeldOut  # the last against the others
 
 
 def discover_together(

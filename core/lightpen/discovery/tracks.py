@@ -34,18 +34,10 @@ AFFINE = 4  # spots that fix an affine map, and check it
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Spots of N images by the piece of a track that they belong to.
+    """Spots of N images by the piece of a track that they belong to."""
 
-    Attributes
-    ----------
-    pixels : (N, P, 2) array
-        px; NaN where a piece has no spot.
-    spots : (N, P) array of int
-        Number of the spot in its image; -1 where there is none.
-    """
-
-    pixels: FloatArray
-    spots: IntArray
+    pixels: FloatArray  # (N, P, 2), px; NaN where a piece has no spot
+    spots: IntArray  # (N, P), number of the spot in its image; -1 where there is none
 
     @property
     def lengths(self) -> IntArray:

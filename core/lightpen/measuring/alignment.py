@@ -28,20 +28,11 @@ THIN = 1e-3  # of the extent: points on a line determine no frame
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """A part's frame.
+    """A part's frame."""
 
-    Attributes
-    ----------
-    motion : Quantity
-        Rotation vector and translation of part_from_cam, (6,), rad and mm.
-    residuals : (N,) array
-        Distances of datum points from their nominals; empty for 3-2-1.
-    residual_uncertainties : (N,) array
-        U (k = 2) of them where both touches of a point are known; else empty.
-    """
-
-    motion: Quantity
-    residuals: FloatArray
+    motion: Quantity  # rotation vector and translation of part_from_cam, rad and mm
+    residuals: FloatArray  # (N,), of datum points from nominals; empty for 3-2-1
+    # (N,), U (k = 2) of them where both touches of a point are known; else empty
     residual_uncertainties: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property

@@ -62,27 +62,13 @@ DEVIATIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A feature with all that characteristics are evaluated from.
+    """A feature with all that characteristics are evaluated from."""
 
-    Attributes
-    ----------
-    surface : TouchedSurface
-        Compensated by the ball radius, camera frame.
-    in_part : Quantity
-        The same in the frame of the part.
-    feature : Feature or None
-        The fit to the ball centres; None of a constructed feature.
-    points : Quantity or None
-        Ball centres, (3 n,), camera frame.
-    nominal : Nominal or None
-        By design.
-    """
-
-    surface: TouchedSurface
-    in_part: Quantity
-    feature: Feature | None = None
-    points: Quantity | None = None
-    nominal: Nominal | None = None
+    surface: TouchedSurface  # compensated by the ball radius, camera frame
+    in_part: Quantity  # the same in the frame of the part
+    feature: Feature | None = None  # fit to the ball centres; None if constructed
+    points: Quantity | None = None  # ball centres, (3 n,), camera frame
+    nominal: Nominal | None = None  # by design
 
     @property
     def kind(self) -> FeatureKind:

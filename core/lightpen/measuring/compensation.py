@@ -48,20 +48,13 @@ class Evidence(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class TouchedSurface:
-    """A feature at the surface of a part.
-
-    Attributes
-    ----------
-    quantity : Quantity
-        Origin, axis and sizes. The axis of a plane points out of the material, that of
-        line and cylinder from the first touch to the last.
-    side : Side
-        Inside or outside; outside of planes, lines and points.
-    """
+    """A feature at the surface of a part."""
 
     kind: FeatureKind
+    # Origin, axis and sizes. The axis of a plane points out of the material, that of
+    # line and cylinder from the first touch to the last.
     quantity: Quantity
-    side: Side
+    side: Side  # inside or outside; outside of planes, lines and points
     evidence: Evidence
 
 

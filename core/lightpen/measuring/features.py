@@ -41,36 +41,22 @@ PLACE, AXIS = slice(0, 3), slice(3, 6)
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """A fitted feature.
-
-    Attributes
-    ----------
-    origin : (3,) array
-        mm: centre of point, circle, slot, sphere; of line, plane, cylinder and cone the
-        point nearest to the mean of the points.
-    axes : (3, 3) array
-        Of its frame, as columns; z is the axis of cylinder and cone, the direction of a
-        line, the normal of plane, circle and slot, x the direction of a slot.
-    sizes : (S,) array
-        As `FeatureModel.sizes` names them; the radius of a cone is that at its origin.
-    distances : (N, K) array
-        Of the points from it, mm.
-    by_points : (6 + S, 3 N) array
-        Derivative of origin, axis and sizes by the points.
-    distances_by_points : (N K, 3 N) array
-        Derivative of the distances by the points, the feature following.
-    offsets : (N, 3) array
-        From the feature to the points, mm.
-    """
+    """A fitted feature."""
 
     kind: FeatureKind
+    # (3,), mm: centre of point, circle, slot, sphere; of line, plane, cylinder and cone
+    # the point nearest to the mean of the points
     origin: FloatArray
+    # (3, 3), of its frame, as columns; z is the axis of cylinder and cone, direction of
+    # a line, normal of plane, circle and slot; x the direction of a slot
     axes: FloatArray
-    sizes: FloatArray
-    distances: FloatArray
+    sizes: FloatArray  # (S,), see `FeatureModel.sizes`; radius of a cone at its origin
+    distances: FloatArray  # (N, K), of the points from it, mm
+    # (6 + S, 3 N), derivative of origin, axis and sizes by the points
     by_points: FloatArray
+    # (N K, 3 N), derivative of the distances by the points, the feature following
     distances_by_points: FloatArray
-    offsets: FloatArray
+    offsets: FloatArray  # (N, 3), from the feature to the points, mm
 
     @property
     def axis(self) -> FloatArray:

@@ -35,30 +35,15 @@ BY_CHANCE = 0.005  # that touches on known form deviate from it by more
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Refinement of the instrument by touches on known form.
+    """Refinement of the instrument by touches on known form."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Features of known form.
-    is_used : bool
-        Whether the touches agree with the known form; otherwise they refine nothing.
-    shift : (q,) array
-        Of the parameters of the instrument.
-    before, after : (q, q) array
-        Covariance of the parameters.
-    chi_square, n_free : float, int
-        Deviation of the touches from the known form by their covariance, and its
-        degrees of freedom.
-    """
-
-    names: tuple[str, ...]
-    is_used: bool
-    shift: FloatArray
-    before: FloatArray
-    after: FloatArray
-    chi_square: float
-    n_free: int
+    names: tuple[str, ...]  # features of known form
+    is_used: bool  # the touches agree with the known form; else they refine nothing
+    shift: FloatArray  # (q,), of the parameters of the instrument
+    before: FloatArray  # (q, q), covariance of the parameters
+    after: FloatArray  # (q, q)
+    chi_square: float  # deviation of the touches by their covariance
+    n_free: int  # its degrees of freedom
 
 
 def refine(

@@ -31,23 +31,14 @@ USUAL_LENGTH = 20.0  # mm, of a feature whose nominal has none
 
 @dataclass(frozen=True, eq=False)
 class ProbedArea:
-    """A feature and how far it reaches.
-
-    Attributes
-    ----------
-    origin, axes, sizes : (3,), (3, 3), (S,) array
-        As `features.Feature` has them.
-    half : (3,) array
-        Half of its extent along its axes, mm.
-    pole : (3,) array
-        Direction to the accessible side of a sphere, frame of the feature.
-    """
+    """A feature and how far it reaches."""
 
     kind: FeatureKind
-    origin: FloatArray
-    axes: FloatArray
-    sizes: FloatArray
-    half: FloatArray
+    origin: FloatArray  # (3,), as `features.Feature` has them
+    axes: FloatArray  # (3, 3)
+    sizes: FloatArray  # (S,)
+    half: FloatArray  # (3,), half of its extent along its axes, mm
+    # (3,), direction to the accessible side of a sphere, frame of the feature
     pole: FloatArray
 
     def local(self, points: FloatArray) -> FloatArray:

@@ -52,27 +52,15 @@ MAX_SPREAD = 0.1  # rad of an axis, or of a size: more is not determined
 
 @dataclass(frozen=True, eq=False)
 class CharacteristicResult:
-    """A characteristic beside its tolerance.
-
-    Attributes
-    ----------
-    independent_uncertainty : float or None
-        U (k = 2) if the touches shared nothing, for comparison; None for geometrical
-        deviations.
-    decision : Decision or None
-        None without a tolerance.
-    probability : float or None
-        Probability of conformity (JCGM 106).
-    quantity : Quantity or None
-        The value with its derivative; None for geometrical deviations.
-    """
+    """A characteristic beside its tolerance."""
 
     planned: PlannedCharacteristic
     value: Value
+    # U (k = 2) if the touches shared nothing; None for geometrical deviations.
     independent_uncertainty: float | None
-    decision: Decision | None
-    probability: float | None
-    quantity: Quantity | None = None
+    decision: Decision | None  # None without a tolerance
+    probability: float | None  # probability of conformity (JCGM 106)
+    quantity: Quantity | None = None  # None for geometrical deviations
 
     @property
     def deviation(self) -> float | None:
@@ -83,23 +71,14 @@ class CharacteristicResult:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPart:
-    """A measured part.
-
-    Attributes
-    ----------
-    features : mapping of str to Measured
-        All features and constructed features by name.
-    alignment : Alignment or None
-        None if results are in the frame of the camera.
-    ties : mapping of int to Alignment
-        Motion of each later position to the first one, by datum points.
-    """
+    """A measured part."""
 
     plan: Plan
     touches: PartTouches
-    features: Mapping[str, Measured]
-    alignment: Alignment | None
+    features: Mapping[str, Measured]  # all features and constructed features by name
+    alignment: Alignment | None  # None if results are in the frame of the camera
     results: tuple[CharacteristicResult, ...]
+    # Motion of each later position to the first one, by datum points.
     ties: Mapping[int, Alignment] = field(default_factory=dict)
 
     def uncertainty(self, name: str) -> FloatArray:

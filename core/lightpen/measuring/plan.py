@@ -112,55 +112,34 @@ class _Entry(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Nominal(_Entry, frozen=True):
-    """A feature by design, in the part's frame, mm.
-
-    Attributes
-    ----------
-    axis : triple of float or None
-        Axis or normal; its length does not matter.
-    diameter : float or None
-        Of circle, sphere, cylinder and cone (at its origin); of a slot its width.
-    length, width : float or None
-        Extent of a line, plane, cylinder or cone; overall length of a slot.
-    angle : float or None
-        Of a cone, from side to side, degrees.
-    """
+    """A feature by design, in the part's frame, mm."""
 
     origin: Vector | None = None
-    axis: Vector | None = None
+    axis: Vector | None = None  # axis or normal; its length does not matter
+    # Of circle, sphere, cylinder and cone (at its origin); of a slot its width.
     diameter: Positive | None = None
+    # Extent of a line, plane, cylinder or cone; overall length of a slot.
     length: Positive | None = None
     width: Positive | None = None
+    # Of a cone, from side to side, degrees.
     angle: Annotated[float, Meta(gt=0, lt=180)] | None = None
 
 
 class PlannedFeature(_Entry, frozen=True):
-    """A feature to probe.
-
-    Attributes
-    ----------
-    kind : FeatureKind or None
-        None to recognise it from the touches.
-    touches : int or None
-        Number of points; None for the usual one.
-    air : triple of float or None
-        Ball centre in air beside the surface, camera frame, mm: decides the side.
-    known : float or None
-        U (k = 2) of the nominal diameter, mm, of a feature of known form, whose touches
-        refine the tip; None to measure the feature.
-    scan : bool
-        Whether the pen slides along the surface after its first touch.
-    """
+    """A feature to probe."""
 
     name: Name
-    kind: FeatureKind | None = None
+    kind: FeatureKind | None = None  # None to recognise it from the touches
+    # Number of points; None for the usual one.
     touches: Annotated[int, Meta(ge=1, le=10_000)] | None = None
     side: Side = Side.AUTO
     criterion: str = NEVER
     nominal: Nominal | None = None
-    air: Vector | None = None
+    air: Vector | None = None  # ball centre beside the surface, camera frame, mm
+    # U (k = 2) of the nominal diameter, mm, of a feature of known form, whose touches
+    # refine the tip; None to measure the feature.
     known: Annotated[float, Meta(ge=0)] | None = None
-    scan: bool = False
+    scan: bool = False  # whether the pen slides along the surface after its first touch
 
     @property
     def n_touches(self) -> int:
@@ -196,24 +175,15 @@ class PlannedAlignment(_Entry, frozen=True):
 
 
 class PlannedCharacteristic(_Entry, frozen=True):
-    """A characteristic with its tolerance.
-
-    Attributes
-    ----------
-    datum : str
-        Feature to which an orientation or location refers.
-    nominal : float or None
-        mm or degrees; geometrical tolerances have none.
-    tolerance : float, pair of float or None
-        Upper limit of a geometrical deviation; else plus and minus, or lower and upper
-        deviation from nominal. None to report the value alone.
-    """
+    """A characteristic with its tolerance."""
 
     quantity: CharacteristicKind
     of: tuple[Name, ...]
     name: str = ""
-    datum: str = ""
-    nominal: Coordinate | None = None
+    datum: str = ""  # feature to which an orientation or location refers
+    nominal: Coordinate | None = None  # mm or degrees; geometrical tolerances have none
+    # Upper limit of a geometrical deviation; else plus and minus, or lower and upper
+    # deviation from nominal. None to report the value alone.
     tolerance: float | tuple[float, float] | None = None
 
     @property
@@ -253,20 +223,14 @@ class PlannedCharacteristic(_Entry, frozen=True):
 
 
 class Plan(_Entry, frozen=True):
-    """A measuring plan.
-
-    Attributes
-    ----------
-    rule : DecisionRule
-        How values are compared with their limits.
-    """
+    """A measuring plan."""
 
     name: Name
     features: Annotated[tuple[PlannedFeature, ...], Meta(min_length=1)]
     constructions: tuple[PlannedConstruction, ...] = ()
     alignment: PlannedAlignment | None = None
     characteristics: tuple[PlannedCharacteristic, ...] = ()
-    rule: DecisionRule = DecisionRule.GUARD_BAND
+    rule: DecisionRule = DecisionRule.GUARD_BAND  # for values and their limits
 
     @property
     def words(self) -> Message:

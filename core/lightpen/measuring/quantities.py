@@ -19,16 +19,10 @@ STEP = float(np.finfo(float).eps ** (1 / 3))  # of central differences
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """Values with their derivative by the inputs of the session.
+    """Values with their derivative by the inputs of the session."""
 
-    Attributes
-    ----------
-    values : (M,) array
-    by_inputs : (M, P) array
-    """
-
-    values: FloatArray
-    by_inputs: FloatArray
+    values: FloatArray  # (M,)
+    by_inputs: FloatArray  # (M, P)
 
     def covariance(self, inputs: FloatArray) -> FloatArray:
         """Return the covariance (M, M), from that of the inputs (P, P)."""

@@ -34,41 +34,21 @@ class FeatureKind(Enum):
 
 
 class Distances(NamedTuple):
-    """Residuals of N points from a feature, K each.
+    """Residuals of N points from a feature, K each."""
 
-    Attributes
-    ----------
-    values : (N, K) array
-        mm.
-    by_point : (N, K, 3) array
-        Gradient by the point, frame of the feature.
-    by_sizes : (N, K, S) array
-        Derivative by the sizes of the feature.
-    """
-
-    values: FloatArray
-    by_point: FloatArray
-    by_sizes: FloatArray
+    values: FloatArray  # (N, K), mm
+    by_point: FloatArray  # (N, K, 3), gradient by the point, frame of the feature
+    by_sizes: FloatArray  # (N, K, S), derivative by the sizes of the feature
 
 
 @dataclass(frozen=True)
 class FeatureModel:
-    """Properties of a kind of feature.
+    """Properties of a kind of feature."""
 
-    Attributes
-    ----------
-    distances : callable
-        Distances of points (N, 3) in the feature's frame, given its sizes (S,).
-    free : tuple of int
-        Indices of the translations along x y z (0 to 2) and rotations (3 to 5) that
-        change the feature.
-    sizes : tuple of str
-        Names; lengths in mm, angles in rad.
-    """
-
+    # Distances of points (N, 3) in the feature's frame, given its sizes (S,).
     distances: Callable[[FloatArray, FloatArray], Distances]
-    free: tuple[int, ...]
-    sizes: tuple[str, ...] = ()
+    free: tuple[int, ...]  # translations (0 to 2) and rotations (3 to 5) that change it
+    sizes: tuple[str, ...] = ()  # names; lengths in mm, angles in rad
 
     def derivatives(
         self, q: FloatArray, sizes: FloatArray

@@ -16,33 +16,17 @@ def at_position(name: str, position: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class PartTouches:
-    """Touches of a part in order.
+    """Touches of a part in order."""
 
-    Attributes
-    ----------
-    points_cam : (N, 3) array
-        Centres of the ball, camera frame, mm.
-    covariance : (3 N, 3 N) array
-        Of all coordinates, with what they share, mm^2.
-    approaches_cam : (N, 3) array
-        Unit vectors along which the ball came to the surface; NaN if unknown.
-    styli_cam : (N, 3) array
-        Unit vectors from the ball along its stylus into the pen.
-    owners : tuple of str
-        Feature of each touch, see `at_position`.
-    ball_radius, ball_uncertainty : float
-        Radius of the ball and its U (k = 2), mm; 0 to measure at the centre of the tip.
-    joint : (P, P) array or None
-        Covariance of all inputs, if the ball is correlated with the touches, mm^2.
-    """
-
-    points_cam: FloatArray
-    covariance: FloatArray
+    points_cam: FloatArray  # (N, 3), centres of the ball, camera frame, mm
+    covariance: FloatArray  # (3 N, 3 N), of all coordinates, with what they share, mm^2
+    # (N, 3), unit vectors along which the ball came to the surface; NaN if unknown
     approaches_cam: FloatArray
-    styli_cam: FloatArray
-    owners: tuple[str, ...]
-    ball_radius: float = 0.0
-    ball_uncertainty: float = 0.0
+    styli_cam: FloatArray  # (N, 3), unit vectors from the ball into the pen
+    owners: tuple[str, ...]  # feature of each touch, see `at_position`
+    ball_radius: float = 0.0  # mm; 0 to measure at the centre of the tip
+    ball_uncertainty: float = 0.0  # U (k = 2) of the radius, mm
+    # (P, P), covariance of all inputs, if the ball is correlated with the touches, mm^2
     joint: FloatArray | None = None
 
     @property

@@ -53,66 +53,33 @@ def lens_model_of(n_coefficients: int) -> LensModel:
 
 
 class PointMap(NamedTuple):
-    """Image of points under a map, with the Jacobian at each.
+    """Image of points under a map, with the Jacobian at each."""
 
-    Attributes
-    ----------
-    points : (..., 2) array
-    jacobian : (..., 2, k) array
-        Derivative of ``points`` by the k coordinates of the input.
-    """
-
-    points: FloatArray
-    jacobian: FloatArray
+    points: FloatArray  # (..., 2)
+    jacobian: FloatArray  # (..., 2, k), by the k coordinates of the input
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Intrinsics of a camera.
+    """Intrinsics of a camera."""
 
-    Attributes
-    ----------
-    width, height : int
-        Image size, px.
-    fx, fy : float
-        Focal length, px.
-    cx, cy : float
-        Principal point, px; (0, 0) is the centre of the top-left pixel.
-    distortion : (5,), (8,) or (4,) array
-        ``k1 k2 p1 p2 k3 [k4 k5 k6]``, or ``k1 k2 k3 k4`` of Kannala and Brandt.
-    covariance : (4 + n, 4 + n) array or None
-        Covariance of ``fx fy cx cy`` and the n distortion coefficients, as the
-        calibration of the camera states it.
-    calibrated_on : date or None
-        Day of the camera's calibration.
-    serial : str
-        Serial number of the camera; empty where its file does not say.
-    temperature_c : float or None
-        Of the camera at its calibration, degrees Celsius.
-    lens_field : LensField or None
-        Residual field beyond the distortion model, from the camera calibration. Not
-        part of the projection: `without_lens_field` removes it from observed pixels.
-    lens : LensModel
-        Model of the distortion.
-    found : FoundCamera or None
-        What was known before the images of a pen that the intrinsics were found from;
-        None if they were calibrated otherwise.
-    """
-
-    width: int
+    width: int  # image size, px
     height: int
-    fx: float
+    fx: float  # focal length, px
     fy: float
-    cx: float
+    cx: float  # principal point, px; (0, 0) is the centre of the top-left pixel
     cy: float
+    # (5,) or (8,) ``k1 k2 p1 p2 k3 [k4 k5 k6]``, or (4,) of Kannala and Brandt
     distortion: FloatArray = field(default_factory=lambda: np.zeros(5))
-    covariance: FloatArray | None = None
+    covariance: FloatArray | None = None  # (4 + n, 4 + n), of the `intrinsics`
     calibrated_on: date | None = None
-    serial: str = ""
-    temperature_c: float | None = None
+    serial: str = ""  # empty where its file does not say
+    temperature_c: float | None = None  # at its calibration, degrees Celsius
+    # Residual field beyond the distortion model, from the camera calibration. Not part
+    # of the projection: `without_lens_field` removes it from observed pixels.
     lens_field: LensField | None = None
     lens: LensModel = LensModel.BROWN
-    found: FoundCamera | None = None
+    found: FoundCamera | None = None  # before the images that it was found from
 
     @property
     def distortion_names(self) -> tuple[str, ...]:

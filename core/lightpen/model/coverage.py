@@ -33,33 +33,19 @@ DIRECTION_NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """Postures of a swing.
+    """Postures of a swing."""
 
-    Attributes
-    ----------
-    tilts : (N,) array
-        Angle between the pen's axis (its y) and upright (-v of the camera), rad.
-    directions : (N,) array
-        Where the pen leans, as the camera sees it: 0 to the right, pi/2 away from
-        the camera, rad.
-    turns : (N,) array
-        Turn about the pen's own axis from the mean posture, rad.
-    counts : (2, 8) array of int
-        Images leaning moderately and far, by direction from the right.
-    n_upright : int
-        Images with hardly any tilt.
-    spread : (3,) array
-        Rms turn of the worst to the best direction of the pen frame, rad.
-    axes : (3, 3) array
-        These directions, unit vectors of the pen frame, one a row.
-    """
-
+    # (N,), angle between the pen's axis (its y) and upright (-v of the camera), rad
     tilts: FloatArray
+    # (N,), where the pen leans, as the camera sees it: 0 to the right, pi/2 away from
+    # the camera, rad
     directions: FloatArray
-    turns: FloatArray
-    counts: IntArray
-    n_upright: int
+    turns: FloatArray  # (N,), turn about the pen's own axis from the mean posture, rad
+    counts: IntArray  # (2, 8), images leaning, and leaning far, by direction
+    n_upright: int  # images with hardly any tilt
+    # (3,), rms turn of the worst to the best direction of the pen frame, rad
     spread: FloatArray
+    # (3, 3), these directions, unit vectors of the pen frame, one a row
     axes: FloatArray
 
     @property

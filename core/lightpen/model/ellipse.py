@@ -27,17 +27,10 @@ IDENTITY = np.eye(2)
 
 
 class Ellipses(NamedTuple):
-    """Filled ellipses in an image.
+    """Filled ellipses in an image: means and covariances of their areas."""
 
-    Attributes
-    ----------
-    centers : (..., 2) array
-    shapes : (..., 2, 2) array
-        Covariance of the area; eigenvalues a^2 / 4 and b^2 / 4 for semi-axes a, b.
-    """
-
-    centers: FloatArray
-    shapes: FloatArray
+    centers: FloatArray  # (..., 2)
+    shapes: FloatArray  # (..., 2, 2), of the areas; eigenvalues a^2 / 4 and b^2 / 4
 
 
 def ellipse_centers(

@@ -11,25 +11,16 @@ class Laboratory:
     """A calibration laboratory, as certificates and reports state it.
 
     A certificate needs name, e-mail address, city and country.
-
-    Attributes
-    ----------
-    country : str
-        ISO 3166-1, two letters.
-    procedure : str
-        Name or number of the working instruction.
-    place : str
-        Where it calibrates, one of `PLACES`.
     """
 
     name: str = ""
     email: str = ""
     city: str = ""
-    country: str = ""
+    country: str = ""  # ISO 3166-1, two letters
     street: str = ""
     post_code: str = ""
-    procedure: str = ""
-    place: str = PLACES[0]
+    procedure: str = ""  # name or number of the working instruction
+    place: str = PLACES[0]  # where it calibrates, one of `PLACES`
 
 
 def is_country(code: str) -> bool:

@@ -26,36 +26,21 @@ ROUNDING = 1e-8  # of a variance, so that covariances can be inverted
 
 @dataclass(frozen=True, eq=False)
 class LensField:
-    """Prior of the residual field of a lens.
+    """Prior of the residual field of a lens."""
 
-    Attributes
-    ----------
-    width, height : int
-        Image size, px.
-    columns, rows : int
-        Nodes along each side; the first and last lie in the corner pixels.
-    amplitude : float
-        Standard deviation of each component before any measurement, px.
-    length : float
-        Correlation length, px.
-    values : (M, 2) array
-        Mean of the field (u, v) at the M nodes, row by row, px; 0 where not measured.
-    covariance : (M, M) array
-        Covariance of each component at the nodes, px^2. The components are independent.
-    intrinsics_covariance : (4 + n, 4 + n) array or None
-        Of the camera's intrinsics without what of their errors goes with the field:
-        ``covariance`` contains that, as the two cancel in the image. None where the
-        errors are independent.
-    """
-
-    width: int
+    width: int  # image size, px
     height: int
-    columns: int
+    columns: int  # nodes along each side; the first and last lie in the corner pixels
     rows: int
-    amplitude: float
-    length: float
+    amplitude: float  # standard deviation of each component before any measurement, px
+    length: float  # correlation length, px
+    # (M, 2), mean of (u, v) at the M nodes, row by row, px; 0 where not measured
     values: FloatArray = field(repr=False)
+    # (M, M), of each component at the nodes, px^2; the two are independent
     covariance: FloatArray = field(repr=False)
+    # (4 + n, 4 + n), of the camera's intrinsics without what of their errors goes with
+    # the field: ``covariance`` contains that, as the two cancel in the image. None
+    # where the errors are independent
     intrinsics_covariance: FloatArray | None = field(default=None, repr=False)
 
     @classmethod

@@ -20,31 +20,16 @@ SMALLEST = 1e-12  # mm, above 0
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit that a supervisor sets.
+    """A limit that a supervisor sets."""
 
-    Attributes
-    ----------
-    part : str
-        Field of `StationLimits`.
-    name : str
-        Field of that part.
-    unit : str
-        Empty of a count, and of a choice.
-    range : (least, greatest)
-    choices : tuple of Message
-        Of a choice, whose value is the index of one of them.
-    options : tuple
-        What each choice stands for.
-    """
-
-    part: str
-    name: str
+    part: str  # field of `StationLimits`
+    name: str  # field of that part
     default: float
     label: Message
-    unit: str
+    unit: str  # empty of a count, and of a choice
     range: tuple[float, float]
-    choices: tuple[Message, ...] = ()
-    options: tuple[Any, ...] = ()
+    choices: tuple[Message, ...] = ()  # the value is the index of one of them
+    options: tuple[Any, ...] = ()  # what each choice stands for
 
     @property
     def key(self) -> str:
@@ -91,28 +76,18 @@ _RULE: Any = _choice(message("limit.rule"), RULES, *map(rule_name, RULES))
 
 @dataclass(frozen=True)
 class SwingLimits:
-    """Limits on the end of a swing and on the tip.
+    """Limits on the end of a swing and on the tip."""
 
-    Attributes
-    ----------
-    max_uncertainty : float
-        U (k = 2) of the tip along its weakest direction, mm. A station with a camera
-        calibrated on 24 views of a board, LEDs measured to 2 um and a pen of carbon
-        fibre reaches it with 60 images. An aluminium pen needs its temperature stated:
-        the 3 K that are assumed otherwise alone make 0.013 mm.
-    min_per_field : int
-        Images in each field of the dial.
-    spacing : float
-        Angle by which a kept posture differs from all others, rad.
-    requires_temperature : bool
-        Whether a tip passes only if the temperature of the pen was measured.
-    """
-
+    # U (k = 2) of the tip along its weakest direction, mm. A station with a camera
+    # calibrated on 24 views of a board, LEDs measured to 2 um and a pen of carbon fibre
+    # reaches it with 60 images. An aluminium pen needs its temperature stated: the 3 K
+    # that are assumed otherwise alone make 0.013 mm.
     max_uncertainty: float = _limit(0.02, message("limit.max-uncertainty"))
     min_images: int = _limit(60, message("limit.min-images"), "", IMAGES)
     max_images: int = _limit(300, message("limit.max-images"), "", IMAGES)
-    min_per_field: int = 2
-    spacing: float = radians(2.5)
+    min_per_field: int = 2  # images in each field of the dial
+    spacing: float = radians(2.5)  # between kept postures
+    # Whether a tip passes only if the temperature of the pen was measured.
     requires_temperature: bool = _choice(
         message("limit.temperature"),
         (False, True),
@@ -128,44 +103,29 @@ class SwingLimits:
 
 @dataclass(frozen=True)
 class VerificationLimits:
-    """Maximum deviations of a verification, mm, and the rule by which they are judged.
+    """Maximum deviations of a verification, mm, and the rule that judges them."""
 
-    Attributes
-    ----------
-    tip : float
-        Error of the tip; a task verifies the tip if it would find one as large.
-    across, along : float
-        Standard deviation of a fixed point perpendicular to the line of sight (u, v)
-        and along it (w), where one camera resolves some ten times less.
-    radius : float
-        Error of the mean radius of a circle.
-    form : float
-        Roundness of a circle and its deviation from a plane; excess of a flatness.
-    length, length_per_m : float
-        Error of a length: a constant, and what each metre adds to it.
-    location : float
-        Diameter of the sphere about one point probed in several postures.
-    repeatability : float
-        Standard deviation of a coordinate of the tip over calibrations.
-    drift : float
-        How far a drift reference may move during a session.
-    rule : DecisionRule
-        How a value with its U is compared with its limit.
-    risk : float
-        Of a wrong decision, where the rule is the risk, percent.
-    """
-
+    # Error of the tip: a task verifies the tip if it would find one as large.
     tip: float = _limit(0.04, message("limit.tip"))
+    # Standard deviation of a fixed point perpendicular to the line of sight (u, v) and
+    # along it (w), where one camera resolves some ten times less.
     across: float = _limit(0.01, message("limit.across"))
     along: float = _limit(0.03, message("limit.along"))
+    # Error of the mean radius of a circle.
     radius: float = _limit(0.02, message("limit.radius"))
+    # Roundness of a circle and its deviation from a plane; excess of a flatness.
     form: float = _limit(0.1, message("limit.form"))
+    # Error of a length: a constant, and what each metre adds to it.
     length: float = _limit(0.03, message("limit.length"))
     length_per_m: float = _limit(0.0, message("limit.length-per-m"), "mm", (0.0, 10.0))
+    # Diameter of the sphere about one point probed in several postures.
     location: float = _limit(0.1, message("limit.location"))
+    # Standard deviation of a coordinate of the tip over calibrations.
     repeatability: float = _limit(0.01, message("limit.repeatability"))
+    # How far a drift reference may move during a session.
     drift: float = _limit(0.02, message("limit.drift"))
-    rule: DecisionRule = _RULE
+    rule: DecisionRule = _RULE  # how a value with its U is compared with its limit
+    # Of a wrong decision, where the rule is the risk, percent.
     risk: float = _limit(5.0, message("limit.risk"), "%", (0.1, 50.0))
 
     def __post_init__(self) -> None:
@@ -193,18 +153,11 @@ class VerificationLimits:
 
 @dataclass(frozen=True)
 class DueRule:
-    """Calibration interval of a tip.
+    """Calibration interval of a tip."""
 
-    Attributes
-    ----------
-    max_days : int
-        Days since it was calibrated.
-    max_swings : int
-        Swings of its pen since, with any tip, as each change of tips wears the seat.
-        0 for no limit.
-    """
-
+    # Days since it was calibrated.
     max_days: int = _limit(30, message("limit.max-days"), "", (1, MOST_DAYS))
+    # Swings of its pen since, with any tip: changing tips wears the seat; 0: no limit.
     max_swings: int = _limit(0, message("limit.max-swings"), "", (0, MOST_SWINGS))
 
     def __post_init__(self) -> None:

@@ -51,57 +51,26 @@ _HANDEDNESS = (
 class Pen:
     """LED geometry of a light pen, in the pen frame.
 
-    LED number j of the files is row ``j - 1`` of every array.
-
-    Attributes
-    ----------
-    leds : (L, 3) array
-        LED centres, mm.
-    normals : (L, 3) array
-        Unit normals of the LED discs, towards the viewer.
-    diameter : float
-        Diameter of the LED discs, mm.
-    nominal_tip : (3,) array or None
-        Where the design puts the centre of the probe tip, mm.
-    name : str
-        Name or serial number, empty if unknown.
-    led_sigma : float or None
-        Standard uncertainty of one LED coordinate, mm; None if not stated.
-    scale_sigma : float or None
-        Standard uncertainty common to all coordinates, relative; None if not stated.
-    diameter_sigma : float or None
-        Standard uncertainty of the diameter, mm; None if not stated.
-    expansion : float or None
-        Thermal, of all coordinates, 1/K; None if not stated.
-    expansion_sigma : float or None
-        Its standard uncertainty, 1/K; None if not stated.
-    temperature_c : float or None
-        Temperature of the LED measurement, degrees Celsius; None if not stated.
-    normal_covariance : (3, 3) array or None
-        Of a rotation vector common to all normals, rad^2; None if not stated: they are
-        taken as exact.
-    led_covariance : (3 L, 3 L) array or None
-        Of all LED coordinates but for the scale that they share, mm^2; None if no more
-        than ``led_sigma`` is known.
-    found : FoundPen or None
-        What was known before the images that the LEDs were found from; None if they
-        were measured.
+    LED number j of the files is row ``j - 1`` of every array. A sigma is a standard
+    uncertainty; None is what is not stated.
     """
 
-    leds: FloatArray
-    normals: FloatArray
-    diameter: float = DISC_DIAMETER
-    nominal_tip: FloatArray | None = None
-    name: str = ""
-    led_sigma: float | None = None
-    scale_sigma: float | None = None
-    diameter_sigma: float | None = None
-    expansion: float | None = None
-    expansion_sigma: float | None = None
-    temperature_c: float | None = None
+    leds: FloatArray  # (L, 3), LED centres, mm
+    normals: FloatArray  # (L, 3), unit normals of the LED discs, towards the viewer
+    diameter: float = DISC_DIAMETER  # of the LED discs, mm
+    nominal_tip: FloatArray | None = None  # (3,), centre of the tip by design, mm
+    name: str = ""  # or serial number
+    led_sigma: float | None = None  # of one coordinate, mm
+    scale_sigma: float | None = None  # common to all coordinates, relative
+    diameter_sigma: float | None = None  # mm
+    expansion: float | None = None  # thermal, of all coordinates, 1/K
+    expansion_sigma: float | None = None  # 1/K
+    temperature_c: float | None = None  # of the LED measurement, degrees Celsius
+    # (3 L, 3 L), of all LED coordinates but for the scale that they share, mm^2
     led_covariance: FloatArray | None = None
+    # (3, 3), of a rotation vector common to all normals, rad^2; None: they are exact
     normal_covariance: FloatArray | None = None
-    found: FoundPen | None = None
+    found: FoundPen | None = None  # before the images that the LEDs were found from
 
     @property
     def n_leds(self) -> int:

@@ -24,22 +24,14 @@ MIN_SIDEWAYS = 0.1  # of the mean normal; LEDs along the axis have no side to fa
 
 @dataclass(frozen=True)
 class Posture:
-    """One posture of the pen.
+    """One posture of the pen."""
 
-    Attributes
-    ----------
-    tilt : float
-        Angle between the pen's axis and upright, rad.
-    direction : float
-        Where it leans to, as the camera sees it: 0 to the right, pi/2 away from the
-        camera, rad.
-    turn : float
-        About its own axis, seen from above against the clock, from where its LEDs face
-        the camera, rad.
-    """
-
-    tilt: float
+    tilt: float  # angle between the pen's axis and upright, rad
+    # Where it leans to, as the camera sees it: 0 to the right, pi/2 away from the
+    # camera, rad.
     direction: float
+    # About its own axis, seen from above against the clock, from where its LEDs face
+    # the camera, rad.
     turn: float
 
 

@@ -17,30 +17,18 @@ from lightpen.model.camera import Camera
 class Rig:
     """Cameras and their poses (cam_from_rig, as in COLMAP [1]_).
 
-    Attributes
-    ----------
-    cameras : tuple of Camera
-        C of them.
-    rotations : (C, 3, 3) array
-        Of cam_from_rig; the first is the identity.
-    translations : (C, 3) array
-        Of cam_from_rig, mm; the first is zero.
-    covariance : (6 (C - 1), 6 (C - 1)) array or None
-        Of the rotation vectors (left, rad) and translations (mm) of all but the first
-        camera, in this order camera by camera.
-    names : tuple of str
-        Display names of the cameras; empty for a single camera.
-
     References
     ----------
     .. [1] J. L. Schonberger, J.-M. Frahm, "Structure-from-motion revisited", CVPR 2016.
     """
 
-    cameras: tuple[Camera, ...]
-    rotations: FloatArray
-    translations: FloatArray
+    cameras: tuple[Camera, ...]  # C of them
+    rotations: FloatArray  # (C, 3, 3), of cam_from_rig; the first is the identity
+    translations: FloatArray  # (C, 3), of cam_from_rig, mm; the first is zero
+    # (6 (C - 1), 6 (C - 1)), of the rotation vectors (left, rad) and translations (mm)
+    # of all but the first camera, in this order camera by camera
     covariance: FloatArray | None = None
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()  # for display; none for a single camera
 
     @property
     def n_cameras(self) -> int:

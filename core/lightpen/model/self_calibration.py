@@ -20,40 +20,21 @@ MARK_DIGITS = 3  # of a mark in a file, px
 
 @dataclass(frozen=True, eq=False)
 class FoundPen:
-    """Prior knowledge of a pen that was found from images.
+    """Prior knowledge of a pen that was found from images."""
 
-    Attributes
-    ----------
-    marks : (M, 2) array
-        An LED centre of each of these images, px.
-    diameter : float
-        Of the LED discs, mm.
-    led_covariance : (3 L, 3 L) array
-        Of all LED coordinates, by the known lengths, mm^2.
-    """
-
-    marks: FloatArray
-    diameter: float
+    marks: FloatArray  # (M, 2), an LED centre of each of these images, px
+    diameter: float  # of the LED discs, mm
+    # (3 L, 3 L), of all LED coordinates, by the known lengths, mm^2
     led_covariance: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class FoundCamera:
-    """Prior knowledge of a camera that was found from images.
+    """Prior knowledge of a camera that was found from images."""
 
-    Attributes
-    ----------
-    marks : (M, 2) array
-        An LED centre of each of these images, px.
-    intrinsics : (k,) array
-        As `Camera.intrinsics`.
-    covariance : (k, k) array or None
-        None if it was not stated.
-    """
-
-    marks: FloatArray
-    intrinsics: FloatArray
-    covariance: FloatArray | None
+    marks: FloatArray  # (M, 2), an LED centre of each of these images, px
+    intrinsics: FloatArray  # (k,), as `Camera.intrinsics`
+    covariance: FloatArray | None  # (k, k), None if it was not stated
 
 
 def marks_of(pixels: FloatArray) -> FloatArray:

@@ -25,16 +25,10 @@ FACING = ("0", "0", "1")
 
 @dataclass(frozen=True)
 class CellError:
-    """A cell that holds no number.
+    """A cell that holds no number."""
 
-    Attributes
-    ----------
-    row, column : int
-        Indices from 0; columns as in `COLUMNS`.
-    """
-
-    row: int
-    column: int
+    row: int  # from 0
+    column: int  # index in `COLUMNS`
     flaw: Message
 
     @property
@@ -47,21 +41,11 @@ class CellError:
 
 @dataclass(frozen=True)
 class PenDraft:
-    """The cells of a pen, as text.
+    """The cells of a pen, as text."""
 
-    Attributes
-    ----------
-    rows : tuple of tuple of six str
-        Coordinates, mm, and normal of each LED.
-    diameter : str
-        Of the LED discs, mm.
-    tip : tuple of three str
-        Nominal tip, pen frame, mm; all empty if it is not known.
-    """
-
-    rows: tuple[tuple[str, ...], ...] = ()
-    diameter: str = ""
-    tip: tuple[str, ...] = ("", "", "")
+    rows: tuple[tuple[str, ...], ...] = ()  # coordinates, mm, and normal of each LED
+    diameter: str = ""  # of the LED discs, mm
+    tip: tuple[str, ...] = ("", "", "")  # nominal, mm; all empty if it is not known
     name: str = ""
 
     @classmethod
@@ -143,24 +127,12 @@ class PenDraft:
 
 @dataclass(frozen=True, eq=False)
 class DraftCheck:
-    """Result of checking a draft.
+    """Result of checking a draft."""
 
-    Attributes
-    ----------
-    flaw : Message or None
-        Why it is no pen: the cell and what is wrong with it.
-    pen : Pen or None
-        The pen as it is typed.
-    frame : FrameCheck or None
-        How that fares with the pen frame.
-    sought : Pen or None
-        The pen to look for in images: in the pen frame if it can be put there.
-    """
-
-    flaw: Message | None = None
-    pen: Pen | None = None
-    frame: FrameCheck | None = None
-    sought: Pen | None = None
+    flaw: Message | None = None  # why it is no pen: the cell and what is wrong with it
+    pen: Pen | None = None  # the pen as it is typed
+    frame: FrameCheck | None = None  # how that fares with the pen frame
+    sought: Pen | None = None  # in images: in the pen frame if it can be put there
 
     @property
     def usable(self) -> Pen | None:
@@ -255,25 +227,13 @@ def _put_in_place(draft: PenDraft, finding: Finding) -> PenDraft:
 
 @dataclass(frozen=True, eq=False)
 class OpenedPen:
-    """Result of opening a pen file.
-
-    Attributes
-    ----------
-    file : PenFile or None
-        The pen, fit for use.
-    draft : PenDraft or None
-        Else its LEDs to be mended, if they can be shown.
-    needs_units : bool
-        Whether the file must be read again with the units that it does not say.
-    problem : Message or None
-        Why it cannot be used.
-    """
+    """Result of opening a pen file."""
 
     path: Path
-    file: PenFile | None = None
-    draft: PenDraft | None = None
-    needs_units: bool = False
-    problem: Message | None = None
+    file: PenFile | None = None  # the pen, fit for use
+    draft: PenDraft | None = None  # else its LEDs to be mended, if they can be shown
+    needs_units: bool = False  # it must be read again with units
+    problem: Message | None = None  # why it cannot be used
 
 
 def open_pen(path: Path, units: str | None = None) -> OpenedPen:

@@ -41,39 +41,21 @@ class RuleStatus(StrEnum):
 
 @dataclass(frozen=True)
 class RuleCheck:
-    """A rule and its result.
-
-    Attributes
-    ----------
-    amount : float
-        Largest deviation, mm; NaN for a rule without one.
-    """
+    """A rule and its result."""
 
     rule: Rule
     outcome: RuleStatus
-    amount: float = float("nan")
+    amount: float = float("nan")  # largest deviation, mm; NaN for a rule without one
 
 
 @dataclass(frozen=True)
 class FrameCheck:
-    """Result of checking a pen against the pen frame.
+    """Result of checking a pen against the pen frame."""
 
-    Attributes
-    ----------
-    checks : tuple of RuleCheck
-        Checks in the order of `Rule`.
-    error : Message or None
-        Why the pen cannot be used, with LED and amount.
-    remark : Message or None
-        Why it is no pen of the paper's layout, though it is not in error.
-    can_be_moved : bool
-        Whether its coordinates can be put into the pen frame.
-    """
-
-    checks: tuple[RuleCheck, ...]
-    error: Message | None = None
-    remark: Message | None = None
-    can_be_moved: bool = False
+    checks: tuple[RuleCheck, ...]  # checks in the order of `Rule`
+    error: Message | None = None  # why the pen cannot be used, with LED and amount
+    remark: Message | None = None  # why it is not of the paper's layout, nor in error
+    can_be_moved: bool = False  # whether its coordinates can be put into the pen frame
 
     @property
     def is_a_pen(self) -> bool:

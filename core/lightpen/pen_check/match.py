@@ -64,28 +64,15 @@ class MatchFinding(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding.
-
-    Attributes
-    ----------
-    leds : tuple of int
-        Numbers from 1.
-    by : tuple of three float
-        Pen frame, mm.
-    is_sure : bool
-        Whether the views differ enough to tell `by`.
-    axes : str
-        Coordinates that two LEDs have of each other: "y", or "x/y" for either.
-    advice : Message or None
-        Likely problem of the files as a whole, and the remedy.
-    """
+    """A finding."""
 
     what: MatchFinding
-    leds: tuple[int, ...] = ()
-    by: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    is_sure: bool = True
+    leds: tuple[int, ...] = ()  # numbers from 1
+    by: tuple[float, float, float] = (0.0, 0.0, 0.0)  # pen frame, mm
+    is_sure: bool = True  # whether the views differ enough to tell `by`
+    # Coordinates that two LEDs have of each other: "y", or "x/y" for either.
     axes: str = ""
-    advice: Message | None = None
+    advice: Message | None = None  # problem of the files as a whole, and the remedy
 
     @property
     def can_be_mended(self) -> bool:
@@ -96,29 +83,14 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class PenMatch:
-    """Agreement of a pen with views of it.
-
-    Attributes
-    ----------
-    n_views, n_labelled : int
-        Views, and those in which the pen was found.
-    n_seen : (L,) array of int
-        Views in which each LED was found.
-    rms : (L,) array
-        Root mean square distance of each LED from where the file puts it, px; NaN if
-        it is not seen.
-    sigma : float
-        Standard deviation of one image coordinate, px; NaN where no pen was found.
-    findings : tuple of Finding
-        Findings, the most serious first.
-    """
+    """Agreement of a pen with views of it."""
 
     n_views: int
-    n_labelled: int
-    n_seen: IntArray
-    rms: FloatArray
-    sigma: float
-    findings: tuple[Finding, ...]
+    n_labelled: int  # views in which the pen was found
+    n_seen: IntArray  # (L,), views in which each LED was found
+    rms: FloatArray  # (L,), distance from where the file puts it, px; NaN if unseen
+    sigma: float  # of one image coordinate, px; NaN where no pen was found
+    findings: tuple[Finding, ...]  # the most serious first
 
     @property
     def fits(self) -> bool:

@@ -37,24 +37,12 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Shift:
-    """An LED that sits off its place in the file.
+    """An LED that sits off its place in the file."""
 
-    Attributes
-    ----------
-    led : int
-        Its number, from 1.
-    by : tuple of three float
-        Where it is minus where the file has it, pen frame, mm.
-    sigma : float
-        Standard deviation of `by` in its weakest direction, mm.
-    rival : int
-        Another LED whose shift would explain the images as well, or 0.
-    """
-
-    led: int
-    by: tuple[float, float, float]
-    sigma: float
-    rival: int = 0
+    led: int  # its number, from 1
+    by: tuple[float, float, float]  # place minus that of the file, pen frame, mm
+    sigma: float  # standard deviation of `by` in its weakest direction, mm
+    rival: int = 0  # another LED whose shift would explain the images as well, or 0
 
     @property
     def length(self) -> float:

@@ -27,18 +27,10 @@ REFINED = 3  # times
 
 @dataclass(frozen=True, eq=False)
 class UnknownLeds:
-    """Points on the pen that the file does not know.
+    """Points on the pen that the file does not know."""
 
-    Attributes
-    ----------
-    points : (P, 3) array
-        Pen frame, mm.
-    pixels : (N, P, 2) array
-        Their spots in each view, px; NaN where there is none.
-    """
-
-    points: FloatArray
-    pixels: FloatArray
+    points: FloatArray  # (P, 3), pen frame, mm
+    pixels: FloatArray  # (N, P, 2), their spots in each view, px; NaN without one
 
 
 def find_unknown_leds(

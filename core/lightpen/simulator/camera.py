@@ -69,11 +69,6 @@ class SimulatedCamera:
         The camera is the second of it, and the scene before the first.
     lamps : tuple of Lamp
         Foreign lights in the picture.
-
-    Attributes
-    ----------
-    is_seen : bool
-        Whether its images are displayed; else half as many are made.
     """
 
     def __init__(
@@ -102,7 +97,7 @@ class SimulatedCamera:
         self._faces = led_faces(self.scene)
         self._settings = self._usual_settings
         self._stats = Stats()
-        self.is_seen = True
+        self.is_seen = True  # displayed; else fewer images are made
         self._next_seq = 0
         self._is_open = self._is_streaming = False
         self._next_end = 0.0  # of the exposure of the next image

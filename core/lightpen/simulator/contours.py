@@ -42,33 +42,18 @@ STEPS_PER_PIXEL = 4096  # of the tables of the blur
 
 @dataclass(frozen=True, eq=False)
 class Contours:
-    """Closed outlines as nodes of the trapezoidal rule.
+    """Closed outlines as nodes of the trapezoidal rule."""
 
-    Attributes
-    ----------
-    nodes : (N, M, 2) array
-        Points on N outlines, px. The S contours of a moving disc follow each other.
-    steps : (N, M, 2) array
-        Tangent times parameter step, px, divided by S.
-    """
-
+    # (N, M, 2), on N outlines, px; the S contours of a moving disc follow each other
     nodes: FloatArray
-    steps: FloatArray
+    steps: FloatArray  # (N, M, 2), tangent times parameter step, px, divided by S
 
 
 class Patch(NamedTuple):
-    """A small image and its place in a large one.
+    """A small image and its place in a large one."""
 
-    Attributes
-    ----------
-    levels : (h, w) float32 array
-        1 inside the outline.
-    top, left : int
-        Row and column of its first pixel.
-    """
-
-    levels: LightArray
-    top: int
+    levels: LightArray  # (h, w), 1 inside the outline
+    top: int  # row and column of its first pixel
     left: int
 
 
@@ -138,18 +123,10 @@ def blurred_insides(contours: Contours, sigma: float, margin: int = 0) -> list[P
 
 @dataclass(frozen=True, eq=False)
 class Outlines:
-    """Areas and centroids of outlines.
+    """Areas and centroids of outlines."""
 
-    Attributes
-    ----------
-    areas : (N,) array
-        px^2.
-    centroids : (N, 2) array
-        px.
-    """
-
-    areas: FloatArray
-    centroids: FloatArray
+    areas: FloatArray  # (N,), px^2
+    centroids: FloatArray  # (N, 2), px
 
 
 def measure_insides(contours: Contours) -> Outlines:

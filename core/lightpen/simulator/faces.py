@@ -29,21 +29,11 @@ def _single(values: npt.ArrayLike) -> LightArray:
 
 @dataclass(frozen=True)
 class HotSpot:
-    """A diffuser with a visible chip behind it.
+    """A diffuser with a visible chip behind it."""
 
-    Attributes
-    ----------
-    place : tuple of float
-        Middle of the spot on the disc, in radii.
-    width : float
-        Standard deviation of its Gaussian, in radii.
-    share : float
-        Fraction of the central brightness that the spot contributes.
-    """
-
-    place: tuple[float, float]
-    width: float
-    share: float
+    place: tuple[float, float]  # middle of the spot on the disc, in radii
+    width: float  # standard deviation of its Gaussian, in radii
+    share: float  # fraction of the central brightness that the spot contributes
 
     def brightness(
         self, u: LightArray, v: LightArray, towards: FloatArray
@@ -64,18 +54,10 @@ class Dome:
 
     It hides nothing and stays within its contour, as a cap does that is seen by less
     than 90 degrees minus the slope at its contour.
-
-    Attributes
-    ----------
-    height : float
-        Over the disc, in radii.
-    darkening : float
-        Share of the brightness that is lost where the line of sight grazes the dome:
-        linear limb darkening.
     """
 
-    height: float
-    darkening: float
+    height: float  # over the disc, in radii
+    darkening: float  # share lost where the line of sight grazes it, linear
 
     def brightness(
         self, u: LightArray, v: LightArray, towards: FloatArray
@@ -96,21 +78,11 @@ class Dome:
 
 @dataclass(frozen=True)
 class Ring:
-    """A disc with a dark middle.
+    """A disc with a dark middle."""
 
-    Attributes
-    ----------
-    inner : float
-        Radius at which the brightness is half way, in radii.
-    softness : float
-        Width of the passage, in radii.
-    middle : float
-        Brightness of the middle.
-    """
-
-    inner: float
-    softness: float
-    middle: float
+    inner: float  # radius at which the brightness is half way, in radii
+    softness: float  # width of the passage, in radii
+    middle: float  # brightness of the middle
 
     def brightness(
         self, u: LightArray, v: LightArray, towards: FloatArray

@@ -64,24 +64,12 @@ class HandActivity(Enum):
 
 @dataclass(frozen=True, eq=False)
 class HandPose:
-    """Poses of the pen at given times.
+    """Poses of the pen at given times."""
 
-    Attributes
-    ----------
-    postures : Postures
-        F of them.
-    offsets : (F, 3) array
-        Of the tip from the bottom of the cone in the camera frame, mm.
-    covered : frozenset of int
-        Numbers of the LEDs behind a hand, from 1.
-    is_away : bool
-        Whether the pen is out of the image.
-    """
-
-    postures: Postures
-    offsets: FloatArray
-    covered: frozenset[int]
-    is_away: bool
+    postures: Postures  # F of them
+    offsets: FloatArray  # (F, 3), tip from the bottom of the cone, camera frame, mm
+    covered: frozenset[int]  # numbers of the LEDs behind a hand, from 1
+    is_away: bool  # whether the pen is out of the image
 
 
 class _HeldPose(NamedTuple):
@@ -120,11 +108,6 @@ class Operator:
         Chooses the swing, the tremor and where slips go.
     seated : bool
         Whether the tip is in the cone at first; else the pen is out of the image.
-
-    Attributes
-    ----------
-    board : Board or None
-        Calibration board that is held in view instead of the pen.
     """
 
     def __init__(
@@ -137,7 +120,7 @@ class Operator:
         self._turn_tremor = Tremor(self._rng)
         self._tip_tremor = Tremor(self._rng)
         self._lock = Lock()
-        self.board: Board | None = None
+        self.board: Board | None = None  # held in view instead of the pen
         self._wishes: list[_Wish] = []
         self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
         self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)

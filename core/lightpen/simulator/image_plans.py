@@ -59,44 +59,24 @@ _SWING, _GEOMETRY, _GAINS, _FRAME, _NOISE, _FACES = range(6)
 
 @dataclass(frozen=True, eq=False)
 class ImagePlan:
-    """One image of a scene before it is rendered.
+    """One image of a scene before it is rendered."""
 
-    Attributes
-    ----------
-    index : int
-        Index of the image, from 0.
-    rotation, translation : (3, 3) and (3,) array
-        cam_from_pen at mid-exposure; mm.
-    flags : tuple of str
-        Names of the `Disturbances` this image suffers.
-    """
-
-    index: int
+    index: int  # from 0
     view: View
     optics: Optics
-    rotation: FloatArray
-    translation: FloatArray
-    flags: tuple[str, ...] = ()
+    rotation: FloatArray  # (3, 3), cam_from_pen at mid-exposure
+    translation: FloatArray  # (3,), mm
+    flags: tuple[str, ...] = ()  # names of the `Disturbances` this image suffers
 
 
 @dataclass(frozen=True, eq=False)
 class ScenePlan:
-    """A scene with everything random drawn, ready to be rendered.
-
-    Attributes
-    ----------
-    swing : Swing
-        True poses and tips of all images.
-    measured_pen : Pen
-        The pen as its geometry was measured.
-    gains : (L,) array
-        Brightness of each LED.
-    """
+    """A scene with everything random drawn, ready to be rendered."""
 
     scene: Scene
-    swing: Swing
-    measured_pen: Pen
-    gains: FloatArray
+    swing: Swing  # the truth
+    measured_pen: Pen  # as its geometry was measured
+    gains: FloatArray  # (L,), brightness of each LED
     image_plans: tuple[ImagePlan, ...]
 
 

@@ -21,21 +21,11 @@ STEPS_PER_PIECE = 100  # of a swing, computed at once
 
 @dataclass(frozen=True)
 class TrackingMotion:
-    """Dynamics of tracking a goal.
+    """Dynamics of tracking a goal."""
 
-    Attributes
-    ----------
-    gain : float
-        1/s.
-    lag : float
-        s.
-    top_speed : float
-        rad/s or mm/s.
-    """
-
-    gain: float
-    lag: float
-    top_speed: float
+    gain: float  # 1/s
+    lag: float  # s
+    top_speed: float  # rad/s or mm/s
 
 
 class Tremor:

@@ -32,21 +32,11 @@ TREMOR_BAND = (7.0, 12.0)  # Hz, of a human hand
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """Postures of a pen, one per frame.
+    """Postures of a pen, one per frame."""
 
-    Attributes
-    ----------
-    tilts : (F,) array
-        Angle of the pen's y axis from the image's up direction, rad.
-    directions : (F,) array
-        Direction it tilts to, rad: 0 to the right, pi/2 away from the camera.
-    rolls : (F,) array
-        Turn about the pen's y axis, rad.
-    """
-
-    tilts: FloatArray
-    directions: FloatArray
-    rolls: FloatArray
+    tilts: FloatArray  # (F,), of the pen's y axis from the image's up direction, rad
+    directions: FloatArray  # (F,), rad: 0 to the right, pi/2 away from the camera
+    rolls: FloatArray  # (F,), turn about the pen's y axis, rad
 
     def __len__(self) -> int:
         return len(self.tilts)

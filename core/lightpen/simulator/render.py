@@ -56,24 +56,12 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """Light on the sensor, before noise.
+    """Light on the sensor, before noise."""
 
-    Attributes
-    ----------
-    levels : (H, W) float32 array
-        Light above the background, fraction of full scale.
-    windows : tuple of Window
-        The parts of ``levels`` that are not zero; they may overlap.
-    background : float
-        Fraction of full scale.
-    gradient : tuple of float
-        Change of the background over the width and over the height of the image.
-    """
-
-    levels: LightArray
-    windows: tuple[Window, ...]
-    background: float = 0.0
-    gradient: tuple[float, float] = (0.0, 0.0)
+    levels: LightArray  # (H, W), light above the background, fraction of full scale
+    windows: tuple[Window, ...]  # where levels are not zero; they may overlap
+    background: float = 0.0  # fraction of full scale
+    gradient: tuple[float, float] = (0.0, 0.0)  # of it, over width and height
 
 
 def render_view(camera: Camera, pen: Pen, view: View, optics: Optics) -> Light:

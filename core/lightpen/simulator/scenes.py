@@ -14,34 +14,18 @@ from lightpen.simulator.view import Optics
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Fractions of the images that are disturbed, each 0 to 1.
+    """Fractions of the images that are disturbed, each 0 to 1."""
 
-    Attributes
-    ----------
-    clutter : float
-        Foreign lamps, reflections, bright windows.
-    fingers : float
-        A finger before an LED.
-    missing : float
-        One to four LEDs off.
-    slipped : float
-        The tip is 0.2 to 2 mm out of the cone.
-    blurred_away : float
-        Moved so fast that nothing can be measured.
-    empty : float
-        All LEDs off.
-    """
-
-    clutter: float = 0.0
-    fingers: float = 0.0
-    missing: float = 0.0
+    clutter: float = 0.0  # foreign lamps, reflections, bright windows
+    fingers: float = 0.0  # a finger before an LED
+    missing: float = 0.0  # one to four LEDs off
     motion_blur: float = 0.0
     defocus: float = 0.0
     saturated: float = 0.0
     dim: float = 0.0
-    slipped: float = 0.0
-    blurred_away: float = 0.0
-    empty: float = 0.0
+    slipped: float = 0.0  # the tip is 0.2 to 2 mm out of the cone
+    blurred_away: float = 0.0  # moved so fast that nothing can be measured
+    empty: float = 0.0  # all LEDs off
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -96,42 +80,21 @@ LEDS = {
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Content of a simulated set of images.
-
-    Attributes
-    ----------
-    swing : str
-        Kind of swing, see `lightpen.simulator.postures.draw_postures`.
-    faces : str
-        Look of the LEDs: evenly lit, an off-centre hot spot, a dome whose bright part
-        moves with the view, or a dark centre.
-    led_noise : float
-        Standard deviation of the measured LED coordinates about the truth, mm.
-    pen : Pen
-        The truth.
-    tip_pen, cone_cam : (3,) array
-        The truth, mm.
-    has_lamp : bool
-        Whether a lamp beside the cone is in view.
-    camera_turn : float
-        By which the image shifts from the first to the last one, as the camera turns,
-        px; live, in a minute.
-    viewpoint : int
-        Index of the camera in the rig, from 0; it selects the noise.
-    """
+    """Content of a simulated set of images."""
 
     n_images: int = 60
     seed: int = 1
-    swing: SwingKind = "field"
+    swing: SwingKind = "field"  # see `lightpen.simulator.postures.draw_postures`
     disturbances: Disturbances = CLEAN
     optics: Optics = field(default_factory=Optics)
     sensor: Sensor = field(default_factory=Sensor)
+    # Even, an off-centre spot, a dome whose bright part moves, or a dark centre.
     faces: FaceKind = "even"
-    led_noise: float = 0.002
-    pen: Pen = field(default_factory=paper_pen)
+    led_noise: float = 0.002  # mm, of the measured LED coordinates about the truth
+    pen: Pen = field(default_factory=paper_pen)  # the truth
     camera: Camera = field(default_factory=paper_camera)
-    tip_pen: FloatArray = field(default_factory=PAPER_TIP.copy)
-    cone_cam: FloatArray = field(default_factory=PAPER_CONE.copy)
-    has_lamp: bool = False
-    camera_turn: float = 0.0
-    viewpoint: int = 0
+    tip_pen: FloatArray = field(default_factory=PAPER_TIP.copy)  # (3,), mm
+    cone_cam: FloatArray = field(default_factory=PAPER_CONE.copy)  # (3,), mm
+    has_lamp: bool = False  # whether a lamp beside the cone is in view
+    camera_turn: float = 0.0  # px, by which images shift in all, or live in a minute
+    viewpoint: int = 0  # index of the camera in the rig, from 0; it selects the noise

@@ -28,24 +28,12 @@ STRIP = 64  # rows
 
 @dataclass(frozen=True)
 class Sensor:
-    """An image sensor.
+    """An image sensor."""
 
-    Attributes
-    ----------
-    bits : int
-        8, or 12 or 16 in a 16-bit image.
-    full_well : float
-        Charge that reads full scale, electrons.
-    read_noise : float
-        Standard deviation, electrons.
-    offset : float
-        Added to the charge, electrons.
-    """
-
-    bits: Literal[8, 12, 16] = 8
-    full_well: float = 10_000.0
-    read_noise: float = 7.0
-    offset: float = 0.1 * 10_000 / 255
+    bits: Literal[8, 12, 16] = 8  # 8, or 12 or 16 in a 16-bit image
+    full_well: float = 10_000.0  # charge that reads full scale, electrons
+    read_noise: float = 7.0  # standard deviation, electrons
+    offset: float = 0.1 * 10_000 / 255  # added to the charge, electrons
 
     def __post_init__(self) -> None:
         if self.bits not in {8, 12, 16}:

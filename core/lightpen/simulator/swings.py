@@ -25,27 +25,14 @@ MAX_DOUBLINGS = 12
 
 @dataclass(frozen=True, eq=False)
 class Swing:
-    """A pen in motion, with the truth about its tip.
-
-    Attributes
-    ----------
-    rotations : (F, 3, 3) array
-        Of cam_from_pen.
-    translations : (F, 3) array
-        Of cam_from_pen, mm.
-    tip_pen : (3,) array
-        Tip in the pen frame, mm.
-    cone_cam : (3,) array
-        Bottom of the cone in the camera frame, mm.
-    tips_cam : (F, 3) array
-        Where the tip is in each frame, mm: in the cone unless it slipped.
-    """
+    """A pen in motion, with the truth about its tip."""
 
     postures: Postures
-    rotations: FloatArray
-    translations: FloatArray
-    tip_pen: FloatArray
-    cone_cam: FloatArray
+    rotations: FloatArray  # (F, 3, 3), of cam_from_pen
+    translations: FloatArray  # (F, 3), of cam_from_pen, mm
+    tip_pen: FloatArray  # (3,), tip in the pen frame, mm
+    cone_cam: FloatArray  # (3,), bottom of the cone in the camera frame, mm
+    # (F, 3), where the tip is in each frame, mm: in the cone unless it slipped
     tips_cam: FloatArray
 
     def __len__(self) -> int:

@@ -18,44 +18,18 @@ CAP_STEPS = 16  # corners of a round finger end
 
 @dataclass(frozen=True)
 class Optics:
-    """Brightness and sharpness of the image.
+    """Brightness and sharpness of the image."""
 
-    Attributes
-    ----------
-    peak : float
-        Level of an LED of gain 1 seen head-on, fraction of full scale; above 1 it
-        saturates.
-    exposure : float
-        Multiplies every light.
-    cos_power : float
-        The level goes with this power of the cosine of the viewing angle.
-    psf_sigma : float
-        Standard deviation of the Gaussian blur, px, at least 0.3.
-    defocus_radius : float
-        Radius of the even disc that defocus spreads each point over, px.
-    background : float
-        Level where nothing shines, fraction of full scale.
-    gradient : tuple of float
-        Change of the background over the width and over the height of the image.
-    halo : float
-        Share of the light of each LED that is scattered round it.
-    ghost : float
-        Share of it that is seen again `GHOST_OFFSET` beside, by reflection in the
-        filter.
-    board : float
-        Share of it that the board reflects, blurred, `BOARD_OFFSET` beside.
-    """
-
-    peak: float = PEAK
-    exposure: float = 1.0
-    cos_power: float = 0.3
-    psf_sigma: float = 0.8
-    defocus_radius: float = 0.0
-    background: float = 0.0
-    gradient: tuple[float, float] = (0.0, 0.0)
-    halo: float = 0.0
-    ghost: float = 0.0
-    board: float = 0.0
+    peak: float = PEAK  # of an LED of gain 1 seen head-on, fraction of full scale
+    exposure: float = 1.0  # multiplies every light
+    cos_power: float = 0.3  # of the level, by the cosine of the viewing angle
+    psf_sigma: float = 0.8  # standard deviation of the Gaussian blur, px, at least 0.3
+    defocus_radius: float = 0.0  # of the disc that a point is spread over, px
+    background: float = 0.0  # level where nothing shines, fraction of full scale
+    gradient: tuple[float, float] = (0.0, 0.0)  # of it, over width and height
+    halo: float = 0.0  # share of the light of each LED that is scattered round it
+    ghost: float = 0.0  # share that the filter reflects to `GHOST_OFFSET` beside
+    board: float = 0.0  # share that the board reflects, blurred, `BOARD_OFFSET` beside
 
     def __post_init__(self) -> None:
         if self.psf_sigma < MIN_SIGMA:
@@ -66,63 +40,31 @@ class Optics:
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """A stray round light: an ellipse in the image.
+    """A stray round light: an ellipse in the image."""
 
-    Attributes
-    ----------
-    center : (2,) array
-        px.
-    semi_axes : tuple of float
-        px.
-    angle : float
-        Of the first semi-axis from the image's x axis, rad.
-    level : float
-        Fraction of full scale.
-    """
-
-    center: FloatArray
-    semi_axes: tuple[float, float]
-    angle: float = 0.0
-    level: float = PEAK
+    center: FloatArray  # (2,), px
+    semi_axes: tuple[float, float]  # px
+    angle: float = 0.0  # of the first semi-axis from the image's x axis, rad
+    level: float = PEAK  # fraction of full scale
 
 
 @dataclass(frozen=True, eq=False)
 class Glare:
-    """A reflection or a bright window: a polygon with soft edges.
+    """A reflection or a bright window: a polygon with soft edges."""
 
-    Attributes
-    ----------
-    outline : (N, 2) array
-        Corners, px.
-    level : float
-        Fraction of full scale.
-    softness : float
-        Standard deviation of its edges, px.
-    """
-
-    outline: FloatArray
-    level: float
-    softness: float = 1.0
+    outline: FloatArray  # (N, 2), corners, px
+    level: float  # fraction of full scale
+    softness: float = 1.0  # standard deviation of its edges, px
 
 
 @dataclass(frozen=True, eq=False)
 class Finger:
-    """A dark capsule in front of the pen.
+    """A dark capsule in front of the pen."""
 
-    Attributes
-    ----------
-    start, end : (2,) array
-        Ends of its axis, px.
-    radius : float
-        px.
-    softness : float
-        Standard deviation of its edges, px.
-    """
-
-    start: FloatArray
-    end: FloatArray
-    radius: float
-    softness: float = 1.5
+    start: FloatArray  # (2,), of its axis, px
+    end: FloatArray  # (2,), px
+    radius: float  # px
+    softness: float = 1.5  # standard deviation of its edges, px
 
     @property
     def outline(self) -> FloatArray:
@@ -136,27 +78,15 @@ class Finger:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """View of the camera during one exposure.
+    """View of the camera during one exposure."""
 
-    Attributes
-    ----------
-    rotations, translations : (S, 3, 3) and (S, 3) array
-        cam_from_pen at S times spread evenly over the exposure; mm.
-    gains : (L,) array
-        Brightness of each LED, 0 if it is off.
-    lamps, glares, fingers : tuple
-        Whatever else is in the picture; fingers hide what is behind them.
-    faces : tuple of Face
-        How each LED looks inside its contour; empty for evenly lit ones.
-    """
-
-    rotations: FloatArray
-    translations: FloatArray
-    gains: FloatArray
+    rotations: FloatArray  # (S, 3, 3), cam_from_pen at S times, even in the exposure
+    translations: FloatArray  # (S, 3), mm
+    gains: FloatArray  # (L,), brightness of each LED, 0 if it is off
     lamps: tuple[Lamp, ...] = ()
     glares: tuple[Glare, ...] = ()
     fingers: tuple[Finger, ...] = ()
-    faces: tuple[Face, ...] = ()
+    faces: tuple[Face, ...] = ()  # of each LED; empty for evenly lit ones
 
 
 def still_view(pen: Pen, rotation: FloatArray, translation: FloatArray) -> View:

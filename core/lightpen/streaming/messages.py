@@ -32,19 +32,11 @@ WITH_METADATA = 2  # version of the header
 
 @dataclass(frozen=True, eq=False)
 class StreamedTip:
-    """The tip of the stream.
-
-    Attributes
-    ----------
-    instrument : Instrument
-        Camera, pen and tip, with their covariance.
-    metadata : mapping of str to str
-        Further metadata of the tip, see `tip_metadata`.
-    """
+    """The tip of the stream."""
 
     names: Names
     instrument: Instrument
-    metadata: Mapping[str, str] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)  # see `tip_metadata`
 
 
 def tip_metadata(file: CalibrationFile) -> dict[str, str]:

@@ -46,18 +46,10 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class StreamPlace:
-    """Address and port of a stream.
+    """Address and port of a stream."""
 
-    Attributes
-    ----------
-    address : str
-        Local network address to listen on; empty for the loopback.
-    port : int
-        0 for any that is free.
-    """
-
-    address: str = LOOPBACK
-    port: int = PORT
+    address: str = LOOPBACK  # to listen on
+    port: int = PORT  # 0 for any that is free
 
     @property
     def is_local(self) -> bool:
@@ -74,19 +66,11 @@ class StreamPlace:
 
 @dataclass(frozen=True)
 class StreamStatus:
-    """State of a stream.
+    """State of a stream."""
 
-    Attributes
-    ----------
-    place : StreamPlace or None
-        None while the stream is closed.
-    n_slow : int
-        Clients that miss at least a tenth of the poses.
-    """
-
-    place: StreamPlace | None = None
+    place: StreamPlace | None = None  # None while the stream is closed
     n_clients: int = 0
-    n_slow: int = 0
+    n_slow: int = 0  # clients that miss at least a tenth of the poses
 
 
 @dataclass(eq=False)

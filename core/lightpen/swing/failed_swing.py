@@ -15,20 +15,11 @@ from lightpen.swing_messages import Code
 
 @dataclass(frozen=True, eq=False)
 class FailedSwing:
-    """Reason of a failed solution, and the fit of the LEDs in each image alone.
+    """Reason of a failed solution, and the fit of the LEDs in each image alone."""
 
-    Attributes
-    ----------
-    causes : tuple of Message
-        The most evident one first.
-    pixels, residuals : (N, C, L, 2) array
-        Centres of the LEDs in the images of each camera, and their residuals from the
-        pose of each moment, px; NaN where an LED was not seen.
-    """
-
-    causes: tuple[Message, ...]
-    pixels: FloatArray
-    residuals: FloatArray
+    causes: tuple[Message, ...]  # the most evident one first
+    pixels: FloatArray  # (N, C, L, 2), LED centres, px; NaN where one was not seen
+    residuals: FloatArray  # (N, C, L, 2), from the pose of each moment, px
 
 
 def failed_swing(setup: SwingSetup, kept: AcceptedImages, why: Message) -> FailedSwing:

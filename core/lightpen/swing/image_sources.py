@@ -25,21 +25,12 @@ class SourceKind(StrEnum):
 
 @dataclass(frozen=True)
 class SourceChoice:
-    """The source of images.
+    """The source of images."""
 
-    Attributes
-    ----------
-    kind : str
-        Key of a source.
-    place : str
-        Folder, pattern or video of a recording; serial number or address of a camera.
-    producer : str
-        File of a GenTL producer; empty for those that the system names.
-    """
-
-    kind: str = SourceKind.SIMULATED
+    kind: str = SourceKind.SIMULATED  # key of a source
+    # Folder, pattern or video of a recording; serial number or address of a camera.
     place: str = ""
-    producer: str = ""
+    producer: str = ""  # file of GenTL; empty for those that the system names
 
     @property
     def source(self) -> Source:
@@ -62,24 +53,13 @@ class CameraInUse:
 
 @dataclass(frozen=True, eq=False)
 class SecondCamera:
-    """A second camera, which sees the pen from elsewhere at the same moments.
-
-    Attributes
-    ----------
-    rig_file : RigFile or None
-        Extrinsics and intrinsics of both cameras.
-    image_size : pair of int or None
-        Width and height of its images, px; None while there are none.
-    in_use : CameraInUse or None
-        None until it is open.
-    mask : (M, 3) array
-        Circles of stray light in its images: centre x, y and radius, px.
-    """
+    """A second camera, which sees the pen from elsewhere at the same moments."""
 
     source: SourceChoice = field(default_factory=SourceChoice)
-    rig_file: RigFile | None = None
-    image_size: tuple[int, int] | None = None
-    in_use: CameraInUse | None = None
+    rig_file: RigFile | None = None  # extrinsics and intrinsics of both cameras
+    image_size: tuple[int, int] | None = None  # px; None while there are no images
+    in_use: CameraInUse | None = None  # None until it is open
+    # (M, 3), circles of stray light: centre x, y and radius, px
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property

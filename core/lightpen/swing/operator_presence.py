@@ -12,29 +12,14 @@ class OperatorPresence:
     """Presence of the operator, and the choices for the next swing.
 
     Until the operator has come or left, a swing begins and pauses by commands.
-
-    Attributes
-    ----------
-    is_here : bool
-        Whether the operator waits for a swing, which begins when nothing is missing.
-    is_away : bool
-        Whether the operator has left: the capture is paused meanwhile.
-    paused_by_leaving : bool
-        Whether it is paused for that reason alone, and resumes automatically.
-    choices : Preparation or None
-        Present choices.
-    begun_with : Preparation or None
-        Choices when the swing began, or confirmed since.
-    refusal : Message or None
-        Why no swing could begin; none is tried until it is None.
     """
 
-    is_here: bool = False
-    is_away: bool = False
-    paused_by_leaving: bool = False
+    is_here: bool = False  # waits for a swing, which begins when nothing is missing
+    is_away: bool = False  # has left: the capture is paused meanwhile
+    paused_by_leaving: bool = False  # for that reason alone: it resumes automatically
     choices: Preparation | None = None
-    begun_with: Preparation | None = None
-    refusal: Message | None = None
+    begun_with: Preparation | None = None  # when the swing began, or confirmed since
+    refusal: Message | None = None  # why no swing could begin; until it is cleared
 
     @property
     def is_due(self) -> bool:

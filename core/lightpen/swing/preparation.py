@@ -54,46 +54,23 @@ class MissingInput(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Preparation:
-    """The choices for a calibration.
-
-    Attributes
-    ----------
-    nominal_tip : (3,) array or None
-        Its centre by design, pen frame, mm; None leaves that of the LED file in force.
-    image_size : pair of int or None
-        Width and height of the live images, px; None while there are none.
-    camera_in_use : CameraInUse or None
-        None until one is open.
-    mask : (M, 3) array
-        Circles of stray light: centre x, y and radius, px.
-    assumptions : Assumptions
-        Default uncertainties where the files state none.
-    has_unsaved_leds : bool
-        Whether LEDs were edited or opened that are not those of the file in use.
-    second : SecondCamera or None
-        None where one camera looks alone.
-    heading : float or None
-        The operator's right as the camera sees it, rad; None until a swing has learnt
-        it.
-    temperature_day : str
-        ISO date for which the temperature in the assumptions was stated, or stated as
-        not measured.
-    """
+    """The choices for a calibration."""
 
     names: Names = field(default_factory=Names)
-    nominal_tip: FloatArray | None = None
+    nominal_tip: FloatArray | None = None  # (3,), mm; None: that of the LED file
     source: SourceChoice = field(default_factory=SourceChoice)
-    image_size: tuple[int, int] | None = None
-    camera_in_use: CameraInUse | None = None
+    image_size: tuple[int, int] | None = None  # px; None while there are no images
+    camera_in_use: CameraInUse | None = None  # None until one is open
     camera_file: CameraFile | None = None
     pen_file: PenFile | None = None
+    # (M, 3), circles of stray light: centre x, y and radius, px
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
-    has_unsaved_leds: bool = False
-    second: SecondCamera | None = None
-    heading: float | None = None
-    temperature_day: str = ""
+    has_unsaved_leds: bool = False  # edited or opened ones, not of the file in use
+    second: SecondCamera | None = None  # None where one camera looks alone
+    heading: float | None = None  # operator's right in the image, rad, once learnt
+    temperature_day: str = ""  # ISO date of the temperature in the assumptions
 
     @property
     def asks_temperature(self) -> bool:

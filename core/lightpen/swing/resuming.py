@@ -32,22 +32,12 @@ ROUNDING = 1e-6  # of a rotation
 
 @dataclass(frozen=True, eq=False)
 class Resumable:
-    """An interrupted swing, ready to be resumed.
-
-    Attributes
-    ----------
-    setup : SwingSetup
-        Of the record's own files.
-    state : SwingState
-        State with all images in the journal.
-    rig_file : RigFile or None
-        The record's own copy; None of a single camera.
-    """
+    """An interrupted swing, ready to be resumed."""
 
     record: Record
-    setup: SwingSetup
-    state: SwingState
-    rig_file: RigFile | None = None
+    setup: SwingSetup  # of the record's own files
+    state: SwingState  # with all images in the journal
+    rig_file: RigFile | None = None  # the record's own copy; None of a single camera
 
     @property
     def source_choices(self) -> tuple[SourceChoice, ...]:

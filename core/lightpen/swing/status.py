@@ -36,56 +36,23 @@ class Activity(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class SwingStatus:
-    """A swing from its first image to the accepted tip.
+    """A swing from its first image to the accepted tip."""
 
-    Attributes
-    ----------
-    setup : SwingSetup or None
-        Setup of the swing; kept when the swing is left.
-    state : SwingState or None
-        None while there is no swing.
-    record_folder : Path or None
-        Folder of the record.
-    names : Names
-        Station, operator, pen, tip and cone.
-    solution : Solution or None
-        The tip by its images; None until it is solved.
-    origin : Origin or None
-        Origin of the images.
-    assessment : SwingAssessment or None
-        Assessment of the solution, compared with the current result.
-    pressed : Solution or None
-        The same tip swung with firm pressure, for the press test.
-    failed : FailedSwing or None
-        The result of the images that gave no tip; None where they gave one.
-    result : Result or None
-        The result that was accepted.
-    revoked : Result or None
-        The result that was revoked last, of this swing or another.
-    refusal : Message or None
-        Why no swing could begin automatically.
-    has_fault : bool
-        Whether it is paused because an image could not be recorded.
-    has_other_choices : bool
-        Whether something else was chosen since it began, and it is neither being
-        solved nor accepted.
-    """
-
-    setup: SwingSetup | None = None
-    state: SwingState | None = None
+    setup: SwingSetup | None = None  # kept when the swing is left
+    state: SwingState | None = None  # None while there is no swing
     record_folder: Path | None = None
     names: Names = field(default_factory=Names)
     origin: Origin | None = None
-    solution: Solution | None = None
+    solution: Solution | None = None  # None until it is solved
     assessment: SwingAssessment | None = None
-    pressed: Solution | None = None
-    failed: FailedSwing | None = None
-    result: Result | None = None
-    revoked: Result | None = None
+    pressed: Solution | None = None  # with firm pressure, for the press test
+    failed: FailedSwing | None = None  # None where the images gave a tip
+    result: Result | None = None  # that was accepted
+    revoked: Result | None = None  # that was revoked last, of this swing or another
     activity: Activity = Activity.NONE
-    refusal: Message | None = None
-    has_fault: bool = False
-    has_other_choices: bool = False
+    refusal: Message | None = None  # why no swing could begin automatically
+    has_fault: bool = False  # paused because an image could not be recorded
+    has_other_choices: bool = False  # since it began, while it is open
 
     @property
     def verdict(self) -> Verdict | None:

@@ -144,18 +144,10 @@ def _flaw(detection: PenDetection) -> Reason:
 
 @dataclass(frozen=True)
 class FrameCounters:
-    """Counts over a swing, also over several sessions and cameras.
+    """Counts over a swing, also over several sessions and cameras."""
 
-    Attributes
-    ----------
-    total : Stats
-        Since the swing began.
-    last : Stats or None
-        Camera counters at the last image; None before the first.
-    """
-
-    total: Stats = field(default_factory=Stats)
-    last: Stats | None = None
+    total: Stats = field(default_factory=Stats)  # since the swing began
+    last: Stats | None = None  # of the camera at the last image
 
     def after(self, stats: Stats) -> Self:
         """Return the counters after an image, with those of the camera at that time."""

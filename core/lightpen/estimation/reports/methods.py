@@ -15,22 +15,12 @@ METHODS: tuple[Method, ...] = ("joint", "two-stage")
 
 @dataclass(frozen=True, eq=False)
 class MethodResult:
-    """Tip and cone by one of the methods.
+    """Tip and cone by one of the methods."""
 
-    Attributes
-    ----------
-    tip_pen, cone_cam : (3,) array
-        mm.
-    covariance : (6, 6) array
-        Of both, mm^2.
-    rms_mm : float
-        Root mean square distance of the tip of single images from the cone point.
-    """
-
-    tip_pen: FloatArray
-    cone_cam: FloatArray
-    covariance: FloatArray
-    rms_mm: float
+    tip_pen: FloatArray  # (3,), mm
+    cone_cam: FloatArray  # (3,), mm
+    covariance: FloatArray  # (6, 6), of both, mm^2
+    rms_mm: float  # distance of the tip of single images from the cone point
 
     @property
     def expanded_uncertainty(self) -> FloatArray:

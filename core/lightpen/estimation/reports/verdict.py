@@ -158,18 +158,10 @@ _NEXT_STEPS = {
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Change of a tip since an earlier calibration.
+    """Change of a tip since an earlier calibration."""
 
-    Attributes
-    ----------
-    difference : (3,) array
-        Now minus then, pen frame, mm.
-    expanded_uncertainty : (3,) array
-        U (k = 2) of the difference, of two independent calibrations, mm.
-    """
-
-    difference: FloatArray
-    expanded_uncertainty: FloatArray
+    difference: FloatArray  # (3,), now minus then, pen frame, mm
+    expanded_uncertainty: FloatArray  # (3,), U (k = 2) of the difference, mm
 
     @property
     def distance(self) -> float:

@@ -35,32 +35,16 @@ MIN_GAP = 4.0  # px between the edges of two LEDs; blur joins closer ones
 
 @dataclass(frozen=True, eq=False)
 class GuidanceInput:
-    """Inputs for the choice of the next posture.
+    """Inputs for the choice of the next posture."""
 
-    Attributes
-    ----------
-    rig : Rig
-        All cameras. One of them must see enough of the pen.
-    tip_pen, cone_cam : (3,) array
-        mm.
-    information : (6, 6) array
-        Of all that is known of (tip, cone), 1/mm^2.
-    sigma : float
-        Noise of one image coordinate, px.
-    rotations : (N, 3, 3) array
-        Postures of the images kept so far; cam_from_pen.
-    spacing : float
-        Angle by which a new posture must differ from all of these, rad.
-    """
-
-    rig: Rig
+    rig: Rig  # of which one camera must see enough of the pen
     pen: Pen
-    tip_pen: FloatArray
-    cone_cam: FloatArray
-    information: FloatArray
-    sigma: float
-    rotations: FloatArray
-    spacing: float
+    tip_pen: FloatArray  # (3,), mm
+    cone_cam: FloatArray  # (3,), mm
+    information: FloatArray  # (6, 6), of all that is known of (tip, cone), 1/mm^2
+    sigma: float  # noise of one image coordinate, px
+    rotations: FloatArray  # (N, 3, 3), postures of the images kept so far; cam_from_pen
+    spacing: float  # angle by which a new posture must differ from all of these, rad
 
 
 def next_posture(

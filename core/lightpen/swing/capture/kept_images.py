@@ -32,45 +32,19 @@ NO_NOISE = 1e-4  # px, less than any camera has
 
 @dataclass(frozen=True, eq=False)
 class AcceptedImages:
-    """N accepted images and the fit to them.
+    """N accepted images and the fit to them."""
 
-    Attributes
-    ----------
-    numbers : (N,) array of int
-        Number of each image in the swing's record.
-    times : (N,) array
-        Seconds.
-    pixels : (N, C, L, 2) array
-        Ellipse centres of the LEDs in each camera, px; NaN where an LED was not seen.
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Pose of each image alone, cam_from_pen of the first camera, mm.
-    cofactors : (N, 6, 6) array
-        Covariances of these poses for a noise of 1 px, rad and mm.
-    sigmas : (N,) array
-        Noise of each image alone, px.
-    seat : Seat or None
-        Tip and cone by the best fit there is.
-    joint : JointFit or None
-        The joint fit, as soon as the postures allow one.
-    assumed : Assumptions
-        Default uncertainties where the files state none.
-    prediction : UncertaintyPrediction or None
-        Normal equations for the prediction of U, with the joint fit.
-    predicted : PredictedUncertainty
-        U of the tip by the whole budget, and its limit for infinitely many images.
-    """
-
-    numbers: IntArray
-    times: FloatArray
-    pixels: FloatArray
-    rotations: FloatArray
-    translations: FloatArray
-    cofactors: FloatArray
-    sigmas: FloatArray
+    numbers: IntArray  # (N,), in the swing's record
+    times: FloatArray  # (N,), seconds
+    pixels: FloatArray  # (N, C, L, 2), ellipse centres, px; NaN where one was not seen
+    rotations: FloatArray  # (N, 3, 3), of each image alone, first cam_from_pen
+    translations: FloatArray  # (N, 3), mm
+    cofactors: FloatArray  # (N, 6, 6), covariances for a noise of 1 px, rad and mm
+    sigmas: FloatArray  # (N,), noise of each image alone, px
     assumed: Assumptions = USUAL
-    seat: Seat | None = None
-    joint: JointFit | None = None
-    prediction: UncertaintyPrediction | None = None
+    seat: Seat | None = None  # tip and cone by the best fit there is
+    joint: JointFit | None = None  # as soon as the postures allow one
+    prediction: UncertaintyPrediction | None = None  # with the joint fit
     predicted: PredictedUncertainty = UNKNOWN_UNCERTAINTY
 
     def __len__(self) -> int:

@@ -16,22 +16,12 @@ from lightpen.model.rig import Rig
 
 
 class SimultaneousPoses(NamedTuple):
-    """Poses rig_from_pen at N moments.
+    """Poses rig_from_pen at N moments."""
 
-    Attributes
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        mm.
-    cofactors : (N, 6, 6) array
-        Covariances of (theta, dt) for a noise of 1 px, rad and mm.
-    sigmas : (N,) array
-        Standard deviation of one image coordinate, px.
-    """
-
-    rotations: FloatArray
-    translations: FloatArray
-    cofactors: FloatArray
-    sigmas: FloatArray
+    rotations: FloatArray  # (N, 3, 3)
+    translations: FloatArray  # (N, 3), mm
+    cofactors: FloatArray  # (N, 6, 6), covariances for a noise of 1 px, rad and mm
+    sigmas: FloatArray  # (N,), standard deviation of one image coordinate, px
 
 
 def seen_by_rig(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:

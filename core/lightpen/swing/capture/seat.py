@@ -26,21 +26,11 @@ SEATING = 0.01  # mm, by which the tip may move in a good cone
 
 @dataclass(frozen=True, eq=False)
 class Seat:
-    """Tip and cone with their covariance.
+    """Tip and cone with their covariance."""
 
-    Attributes
-    ----------
-    tip_pen : (3,) array
-        mm.
-    cone_cam : (3,) array
-        mm.
-    covariance : (6, 6) array
-        Of (tip_pen, cone_cam), mm^2.
-    """
-
-    tip_pen: FloatArray
-    cone_cam: FloatArray
-    covariance: FloatArray
+    tip_pen: FloatArray  # (3,), mm
+    cone_cam: FloatArray  # (3,), mm
+    covariance: FloatArray  # (6, 6), of (tip_pen, cone_cam), mm^2
 
 
 def tip_prior(pen: Pen) -> tuple[FloatArray, float]:

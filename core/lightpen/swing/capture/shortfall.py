@@ -34,28 +34,15 @@ ENOUGH_FILLED = 0.5  # of the fields, before it is said what no image can lower
 
 @dataclass(frozen=True, eq=False)
 class Shortfall:
-    """Images that a swing still needs.
+    """Images that a swing still needs."""
 
-    Attributes
-    ----------
-    wanted : (3, 8) array of int
-        Images requested in each field of the dial.
-    fields : (3, 8) array of int
-        Images missing in each of them.
-    n_images : int
-        Images missing in all, at the least.
-    n_for_uncertainty : int
-        Images that the uncertainty still needs, estimated; 0 if it suffices, or if
-        what the files leave open is too much for any number of images.
-    n_more : int
-        Images that will still be taken, estimated: as many for each that a field lacks
-        as it took until now, and no more than the limit allows.
-    """
-
-    wanted: IntArray
-    fields: IntArray
-    n_images: int
+    wanted: IntArray  # (3, 8), in each field of the dial
+    fields: IntArray  # (3, 8), of these missing
+    n_images: int  # missing in all, at the least
+    # That the uncertainty still needs, estimated; 0 if it suffices or no number does.
     n_for_uncertainty: int
+    # That will still be taken, estimated: as many for each that a field lacks as it
+    # took until now, and no more than the limit allows.
     n_more: int
 
     @property

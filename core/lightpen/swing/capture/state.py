@@ -78,49 +78,29 @@ class SwingEventKind(StrEnum):
 
 @dataclass(frozen=True)
 class SwingEvent:
-    """Something that happened.
-
-    Attributes
-    ----------
-    numbers : tuple of int
-        Numbers of the accepted image or of the images that are no longer accepted; for
-        a full field, its row and column on the dial.
-    """
+    """Something that happened."""
 
     what: SwingEventKind
+    # Of images accepted, or no longer accepted; row and column of a full field.
     numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class SwingSetup:
-    """Setup of a swing.
-
-    Attributes
-    ----------
-    mask : (M, 3) array or None
-        Circles of stray light: centre x, y and radius, px.
-    assumptions : Assumptions
-        Default uncertainties where the files state none.
-    beside : Rig or None
-        The camera with others beside it, where there are any.
-    other_masks : tuple of (M, 3) array
-        Stray light in the images of the others.
-    is_recording : bool
-        Whether its images were recorded before: all are read, once and in their order,
-        and nobody is asked to lean the pen.
-    is_press_test : bool
-        Whether it is swung with firm pressure, to be compared with another swing.
-    """
+    """Setup of a swing."""
 
     camera: Camera
     pen: Pen
     limits: SwingLimits = field(default_factory=SwingLimits)
+    # (M, 3), circles of stray light: centre x, y and radius, px
     mask: FloatArray | None = None
     assumptions: Assumptions = USUAL
+    # Whether its images were recorded before: all are read, once and in their order,
+    # and nobody is asked to lean the pen.
     is_recording: bool = False
-    beside: Rig | None = None
-    other_masks: tuple[FloatArray, ...] = ()
-    is_press_test: bool = False
+    beside: Rig | None = None  # the camera with those beside it, where there are any
+    other_masks: tuple[FloatArray, ...] = ()  # of the other cameras
+    is_press_test: bool = False  # with firm pressure, compared with another swing
 
     @property
     def rig(self) -> Rig:
@@ -147,23 +127,12 @@ class RecentDetection:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """History of the estimate.
+    """History of the estimate."""
 
-    Attributes
-    ----------
-    n_images : (K,) array of int
-        Number of kept images at each estimate.
-    tips : (K, 3) array
-        Tip in the pen frame, mm.
-    uncertainties, floors : (K,) array
-        U (k = 2) along the weakest direction and what more images cannot bring it
-        below, mm.
-    """
-
-    n_images: IntArray
-    tips: FloatArray
-    uncertainties: FloatArray
-    floors: FloatArray
+    n_images: IntArray  # (K,), kept at each estimate
+    tips: FloatArray  # (K, 3), tip in the pen frame, mm
+    uncertainties: FloatArray  # (K,), U (k = 2) along the weakest direction, mm
+    floors: FloatArray  # (K,), below which more images do not bring it, mm
 
     def with_estimate(self, kept: AcceptedImages) -> "Trace":
         """Return the trace with the estimate by these images, if there is one."""
@@ -201,67 +170,28 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class SwingState:
-    """A swing at one moment.
-
-    Attributes
-    ----------
-    since : float
-        When the phase began, s.
-    time : float
-        Of the last image, s.
-    message : Message
-        Instruction or information for the operator.
-    kept : AcceptedImages
-        The images and the running fit.
-    next_number : int
-        Of the image that is kept next, in the swing's record.
-    n_dropped : mapping of Reason to int
-        Postures that were new but of no use.
-    seat : Seat or None
-        Position of the seated tip.
-    last_seen : float
-        When the pen was seen last, s.
-    strayed_since : float or None
-        When the tip left the cone, s; None while it is in it.
-    stray_rotations : (M, 3, 3) array
-        Postures held since then.
-    flawed_rotations : (M, 3, 3) array
-        New postures without a good image since the last that was kept.
-    heading : float or None
-        The operator's right as the camera sees it, rad; None until it is learnt.
-    was_upright : bool
-        Whether the pen was held upright since the capture began: a tilt after that
-        teaches the heading.
-    target : Posture or None
-        Next posture to guide to.
-    target_since : float
-        When the target was chosen, s.
-    slipped_at : float or None
-        When kept images were last dropped or the tip last slipped, s.
-    still_since : float or None
-        Since when the pen is upright and still, s.
-    """
+    """A swing at one moment."""
 
     phase: Phase
-    since: float
-    time: float
-    message: Message
+    since: float  # when the phase began, s
+    time: float  # of the last image, s
+    message: Message  # for the operator
     kept: AcceptedImages
-    next_number: int
-    n_dropped: Mapping[Reason, int]
+    next_number: int  # of the next image in the swing's record
+    n_dropped: Mapping[Reason, int]  # postures that were new but of no use
     seat: Seat | None
     recent: tuple[RecentDetection, ...]
-    last_seen: float
+    last_seen: float  # when the pen was seen last, s
     pause: Pause
-    strayed_since: float | None
-    stray_rotations: FloatArray
-    flawed_rotations: FloatArray
-    heading: float | None
-    was_upright: bool
-    target: Posture | None
-    target_since: float
-    slipped_at: float | None
-    still_since: float | None
+    strayed_since: float | None  # when the tip left the cone, s; None while it is in it
+    stray_rotations: FloatArray  # (M, 3, 3), postures held since then
+    flawed_rotations: FloatArray  # (M, 3, 3), new postures without a good image yet
+    heading: float | None  # operator's right in the image, rad; None until learnt
+    was_upright: bool  # since the capture began: a tilt then teaches the heading
+    target: Posture | None  # to guide to
+    target_since: float  # when the target was chosen, s
+    slipped_at: float | None  # when the tip slipped or images were dropped last, s
+    still_since: float | None  # upright and still, s
     trace: Trace
     progress: Progress = Progress()
 
