@@ -63,24 +63,9 @@ _logger = logging.getLogger(__name__)
 
 
 class Wizard(QObject):
-    """The window with its workbench and services.
+    """The window with its workbench and services."""
 
-    Parameters
-    ----------
-    make_pages : callable
-        Returns the pages in the order of the steps.
-    folder : Path
-        Data folder.
-    around : SourceEnvironment, optional
-        Environment of simulated and recorded sources.
-
-    Signals
-    -------
-    started()
-        The pages are made, and the workbench has started.
-    """
-
-    started = Signal()
+    started = Signal()  # the pages are made, and the workbench has started
 
     def __init__(
         self,

@@ -34,20 +34,10 @@ _logger = logging.getLogger(__name__)
 
 
 class CrashHook(QObject):
-    """Writes a report of every uncaught exception, of each kind once.
+    """Writes a report of every uncaught exception, of each kind once."""
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the reports, created when needed.
-
-    Signals
-    -------
-    reported(str)
-        Path of the report, or "" if the disk took none. Emitted on any thread;
-        connected objects of the GUI get it on theirs.
-    """
-
+    # Path of the report, or "" if the disk took none. Emitted on any thread; connected
+    # objects of the GUI get it on theirs.
     reported = Signal(str)
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:

@@ -25,23 +25,11 @@ LONGEST_S = 200.0  # on a page, s; a slow machine takes a minute for the swing
 class Demo(QObject):
     """Leaves each page when its step is complete, swings the pen, measures a part.
 
-    Parameters
-    ----------
-    workbench : Workbench
-        Workbench with a simulated source.
-    is_watched : bool
-        Whether it is watched, so that there is time to read.
-
-    Signals
-    -------
-    message_sent(str)
-        A sentence on what is going on.
-    ended()
-        The tip is accepted, or the swing gave none.
+    A demo that is watched leaves time to read.
     """
 
-    message_sent = Signal(str)
-    ended = Signal()
+    message_sent = Signal(str)  # a sentence on what is going on
+    ended = Signal()  # the tip is accepted, or the swing gave none
 
     def __init__(
         self, window: MainWindow, workbench: Workbench, *, is_watched: bool = True

@@ -15,24 +15,15 @@ class EndSignals(QObject):
 
     Python runs the handler of a signal between its own instructions, of which there are
     none while Qt waits: a timer sees to some.
-
-    Attributes
-    ----------
-    number : int
-        Number of the first signal; 0 before.
-
-    Signals
-    -------
-    came(int)
-        The number of the first signal, emitted from the event loop, so that nothing is
-        cut off in its midst.
     """
 
+    # The number of the first signal, emitted from the event loop, so that nothing is
+    # cut off in its midst.
     came = Signal(int)
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.number = 0
+        self.number = 0  # of the first signal; 0 before
         self._timer = QTimer(self)
         self._timer.setInterval(TICK_MS)
 

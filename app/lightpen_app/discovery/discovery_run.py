@@ -41,33 +41,18 @@ N_USUAL, N_MOST = 300, 600  # images
 
 @dataclass(frozen=True, eq=False)
 class DiscoveryState:
-    """State of a swing without files.
-
-    Attributes
-    ----------
-    n_images : int
-        Recorded so far.
-    found : Discovery or None
-        Solution of the images up to the last trial; relative during the capture.
-    guide : Guide or None
-        Postures so far, and the next one; None before the first solution.
-    posture : Posture or None
-        Of the pen in the last image.
-    progress : float or None
-        Of the final computation; None while there is none.
-    fault : str
-        Why the last trial found nothing.
-    is_saved : bool
-        Whether its files are in use, and the images are being opened.
-    """
+    """State of a swing without files."""
 
     is_capturing: bool = False
-    n_images: int = 0
+    n_images: int = 0  # recorded so far
+    # Solution of the images up to the last trial; relative during the capture.
     found: Discovery | None = None
+    # Postures so far, and the next one; None before the first solution.
     guide: Guide | None = None
-    posture: Posture | None = None
-    progress: float | None = None
-    fault: str = ""
+    posture: Posture | None = None  # of the pen in the last image
+    progress: float | None = None  # of the final computation; None while there is none
+    fault: str = ""  # why the last trial found nothing
+    # Whether its files are in use, and the images are being opened.
     is_saved: bool = False
 
     @property
@@ -87,32 +72,18 @@ class _Recording:
 
 
 class DiscoveryRun(QObject):
-    """Records and solves a swing of a pen of which nothing is known.
+    """Records and solves a swing of a pen of which nothing is known."""
 
-    Attributes
-    ----------
-    keeps_camera : bool
-        Whether the camera file that is selected is taken as known.
-
-    Signals
-    -------
-    changed()
-        `state` is different.
-    found_changed()
-        So is what is found.
-    saved()
-        Both files and the images are in use, and the first of these was read.
-    """
-
-    changed = Signal()
-    found_changed = Signal()
+    changed = Signal()  # `state` is different
+    found_changed = Signal()  # so is what is found
+    # Both files and the images are in use, and the first of these was read.
     saved = Signal()
     _unwritten = Signal(object)
 
     def __init__(self, workbench: Workbench, parent: QObject) -> None:
         super().__init__(parent)
         self._workbench, self._live = workbench, workbench.live
-        self.keeps_camera = False
+        self.keeps_camera = False  # the selected camera file is taken as known
         self._state = DiscoveryState()
         self._recording: _Recording | None = None
         self._job: Job | None = None

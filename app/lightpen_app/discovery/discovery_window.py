@@ -45,15 +45,9 @@ UM = 1000.0
 
 
 class DiscoveryWindow(FittedWindow, Translated, QWidget):
-    """Guides a swing without files, asks for one length, and shows what is found.
+    """Guides a swing without files, asks for one length, and shows what is found."""
 
-    Signals
-    -------
-    continued()
-        Both files and the images of the swing are in use.
-    """
-
-    continued = Signal()
+    continued = Signal()  # both files and the images of the swing are in use
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent, Qt.WindowType.Window)

@@ -26,18 +26,10 @@ WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be mentioned
 
 @dataclass(frozen=True)
 class Instruction:
-    """Instruction to an operator.
+    """Instruction to an operator."""
 
-    Attributes
-    ----------
-    short : str
-        A few words, to be read from a distance.
-    hint : str
-        A sentence or two: likely why, and what to do.
-    """
-
-    short: str
-    hint: str = ""
+    short: str  # a few words, to be read from a distance
+    hint: str = ""  # a sentence or two: likely why, and what to do
 
 
 # lupdate finds the texts by this macro.

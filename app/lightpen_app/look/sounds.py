@@ -60,10 +60,7 @@ class Sounds(Protocol):
 class SilentSounds:
     """Plays nothing.
 
-    Parameters
-    ----------
-    missing : sequence of str
-        Programs of which one could play sounds, if it were installed.
+    ``missing`` are programs of which one could play sounds, if it were installed.
     """
 
     def __init__(self, missing: Sequence[str] = ()) -> None:
@@ -83,12 +80,7 @@ class SilentSounds:
 class FileSounds:
     """Plays sounds from WAV files.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder for the sound files, which are written when first needed.
-    play_file : callable
-        Begins to play a file and returns at once.
+    The files are written to the folder when first needed.
     """
 
     def __init__(self, folder: Path, play_file: Callable[[Path], None]) -> None:

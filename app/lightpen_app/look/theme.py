@@ -57,36 +57,18 @@ class Tone(Enum):
 
 @dataclass(frozen=True)
 class Colors:
-    """Named colours of a palette, each as "#rrggbb".
+    """Named colours of a palette, each as "#rrggbb"."""
 
-    Attributes
-    ----------
-    window, panel, raised : str
-        Grounds: behind all, of areas, of controls.
-    line, edge : str
-        Quiet divisions; borders that must be seen to use a control.
-    text, muted : str
-        Words; both are read on every ground.
-    accent, on_accent : str
-        Colour of active elements, and of text on it.
-    good, warn, bad : str
-        States, as words and signs on every ground.
-    on_good, on_warn, on_bad : str
-        Words on areas of these colours.
-    partial : str
-        Filling of what is begun; `text` is read on it.
-    pointer : str
-        Arrow and frame that show where to go; a shape, never words.
-    """
-
-    window: str
-    panel: str
-    raised: str
-    line: str
-    edge: str
+    window: str  # grounds: behind all,
+    panel: str  # of areas,
+    raised: str  # of controls
+    line: str  # quiet divisions
+    edge: str  # borders that must be seen to use a control
+    # Words, and states as words and signs: all are read on every ground. What begins
+    # with `on_` is for words on areas of that colour.
     text: str
     muted: str
-    accent: str
+    accent: str  # of active elements
     on_accent: str
     good: str
     on_good: str
@@ -94,8 +76,8 @@ class Colors:
     on_warn: str
     bad: str
     on_bad: str
-    partial: str
-    pointer: str
+    partial: str  # filling of what is begun; `text` is read on it
+    pointer: str  # arrow and frame that show where to go; a shape, never words
 
     def tone(self, tone: Tone) -> QColor:
         """Return the tone of the state."""

@@ -49,41 +49,22 @@ class PrintSize(IntEnum):
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a report that is not split across pages.
+    """A part of a report that is not split across pages."""
 
-    Attributes
-    ----------
-    paint : callable
-        Draws it with its upper left corner at the origin.
-    height : float
-        dots.
-    space : float
-        Above it, but for the first of a page, dots.
-    keeps : bool
-        Whether what follows stands on the same page.
-    head : Block or None
-        Block that is repeated at the top of each page.
-    """
-
+    # Draws it with its upper left corner at the origin.
     paint: Callable[[QPainter], None]
-    height: float
-    space: float = 0.0
-    keeps: bool = False
-    head: "Block | None" = None
+    height: float  # dots
+    space: float = 0.0  # above it, but for the first of a page, dots
+    keeps: bool = False  # whether what follows stands on the same page
+    head: "Block | None" = None  # block that is repeated at the top of each page
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
-
-    Attributes
-    ----------
-    share : float
-        Relative width of the column.
-    """
+    """A column of a table."""
 
     title: str
-    share: float = 1.0
+    share: float = 1.0  # relative width of the column
     align: Qt.AlignmentFlag = LEFT
 
 

@@ -86,33 +86,21 @@ class Mark(Enum):
 
 @dataclass(frozen=True)
 class Chart:
-    """A plot: its title, its names of series, and what draws it into an area.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the series in their order, shown beside the title.
-    mark : Mark
-        Symbol before the names.
-    """
+    """A plot: its title, its names of series, and what draws it into an area."""
 
     title: str
     paint: Callable[[QPainter, QRectF], None]
+    # Names of the series in their order, shown beside the title.
     names: tuple[str, ...] = ()
-    mark: Mark = Mark.LINE
+    mark: Mark = Mark.LINE  # symbol before the names
 
 
 @dataclass(frozen=True)
 class AxisWords:
-    """Labels of the axes.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Labels below the axis at 0, 1, 2 ... instead of numbers.
-    """
+    """Labels of the axes."""
 
     x: str = ""
+    # Labels below the axis at 0, 1, 2 ... instead of numbers.
     labels: tuple[str, ...] = ()
 
 

@@ -41,19 +41,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ReportContent:
-    """Content of the report of a calibration.
-
-    Attributes
-    ----------
-    reestimated : ReestimatedPoses or None
-        Its images, where the file holds enough for that.
-    entered : ArchivePlace or None
-        Archive entry of the calibration.
-    """
+    """Content of the report of a calibration."""
 
     calibration_file: CalibrationFile
+    # Its images, where the file holds enough for that.
     reestimated: ReestimatedPoses | None
-    entered: ArchivePlace | None
+    entered: ArchivePlace | None  # archive entry of the calibration
 
 
 def read_calibration_file(file: Path) -> ReportContent:
@@ -95,25 +88,10 @@ def read_kept_verification(path: Path) -> KeptVerification:
 
 
 class PrintReportControl(QObject):
-    """Reads a file in the background and opens a window with its report.
+    """Reads a file in the background and opens a window with its report."""
 
-    Parameters
-    ----------
-    place : SavePlace
-        Folder for saved PDFs.
-    page : QWidget
-        Parent of windows.
-
-    Signals
-    -------
-    saved(Path)
-        The PDF that was written.
-    failed(str)
-        The sentence why something is not shown, or was not saved.
-    """
-
-    saved = Signal(object)
-    failed = Signal(str)
+    saved = Signal(object)  # Path: the PDF that was written
+    failed = Signal(str)  # the sentence why something is not shown, or was not saved
 
     def __init__(self, place: SavePlace, page: QWidget) -> None:
         super().__init__(page)

@@ -38,36 +38,20 @@ class PlacedBlock:
 
 @dataclass(frozen=True)
 class Margins:
-    """Header and footer of every page.
+    """Header and footer of every page."""
 
-    Attributes
-    ----------
-    title, subject : str
-        Title and subject of the report.
-    number : str
-        Number of the report.
-    badges : tuple of str
-        Prominent labels in capitals, such as SIMULATED.
-    """
-
-    title: str
+    title: str  # of the report
     subject: str
-    number: str
-    badges: tuple[str, ...]
+    number: str  # number of the report
+    badges: tuple[str, ...]  # prominent labels in capitals, such as SIMULATED
     foot: str
 
 
 @dataclass(frozen=True)
 class PrintReport:
-    """All pages, ready to be drawn.
+    """All pages, ready to be drawn."""
 
-    Attributes
-    ----------
-    author : str
-        Author in the properties of the file; may be empty.
-    """
-
-    author: str
+    author: str  # author in the properties of the file; may be empty
     margins: Margins
     pages: tuple[tuple[PlacedBlock, ...], ...]
 

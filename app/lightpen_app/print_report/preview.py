@@ -25,23 +25,11 @@ from lightpen_app.work.save_place import SavePlace
 class PrintReportWindow(FittedWindow, Translated, QWidget):
     """Shows the pages by the strokes by which they are saved and printed.
 
-    Parameters
-    ----------
-    place : SavePlace
-        Folder for saved PDFs.
-    stem : str
-        Beginning of the default file name.
-
-    Signals
-    -------
-    saved(Path)
-        The PDF that was written.
-    failed(str)
-        A sentence on why it was not.
+    ``stem`` begins the default name of a saved file.
     """
 
-    saved = Signal(object)
-    failed = Signal(str)
+    saved = Signal(object)  # Path: the PDF that was written
+    failed = Signal(str)  # a sentence on why it was not
 
     CLOSING_KEYS = (Qt.Key.Key_Escape,)
 

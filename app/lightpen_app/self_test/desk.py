@@ -50,20 +50,9 @@ CLASSES_WITH_FONTS = (
 
 
 class Walk(QObject):
-    """Opens an interrupted swing, ends it, reviews it and accepts its tip.
+    """Opens an interrupted swing, ends it, reviews it and accepts its tip."""
 
-    Signals
-    -------
-    ended()
-        The tip is accepted.
-
-    Attributes
-    ----------
-    doing : str
-        What it waits for, and what the window says: page, status, what is missing.
-    """
-
-    ended = Signal()
+    ended = Signal()  # the tip is accepted
 
     def __init__(self, wizard: Wizard, swing: Path) -> None:
         super().__init__(wizard)
@@ -71,7 +60,7 @@ class Walk(QObject):
         self._workbench = wizard.workbench
         self._swing = swing
         self._next: Callable[[], bool] = self._open
-        self.doing = ""
+        self.doing = ""  # what it waits for, and what the window says
         self._timer = QTimer(self)
         self._timer.setInterval(TICK_MS)
         self._timer.timeout.connect(self._on_tick)
@@ -170,10 +159,7 @@ LETTERS = "Aaµ°±光笔校准"
 class Desk:
     """An application with its own data folder.
 
-    Parameters
-    ----------
-    folder : Path
-        For records, results and settings; nothing of the user's is touched.
+    Records, results and settings are in a folder; nothing of the user's is touched.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -18,29 +18,17 @@ class SelfTestError(Exception):
 
 @dataclass(frozen=True)
 class Check:
-    """Result of one check.
-
-    Attributes
-    ----------
-    found : str
-        Result or fault.
-    """
+    """Result of one check."""
 
     name: str
     ok: bool
-    found: str
+    found: str  # result or fault
     seconds: float
 
 
 @dataclass(frozen=True)
 class Tip:
-    """The tip that the wizard found, and the true one, pen frame, mm.
-
-    Attributes
-    ----------
-    found_mm, true_mm, expanded_uncertainty_mm : list of float
-        x, y, z.
-    """
+    """The tip that the wizard found, and the true one: x, y, z, pen frame, mm."""
 
     found_mm: list[float]
     true_mm: list[float]
@@ -49,15 +37,7 @@ class Tip:
 
 @dataclass
 class Report:
-    """Grows with each check, and can be written at any time, from any thread.
-
-    Attributes
-    ----------
-    last_lines, doing : callable
-        Return the last lines of the log, and what is done just now.
-    threads : mapping of str to sequence of str
-        Where each thread was when the test was given up, by its name.
-    """
+    """Grows with each check, and can be written at any time, from any thread."""
 
     file: Path
     checks: list[Check] = field(default_factory=list)
@@ -65,8 +45,9 @@ class Report:
     screenshot: str = ""
     versions: dict[str, str] = field(default_factory=dict)
     is_complete: bool = False
-    last_lines: Callable[[], Sequence[str]] = tuple
-    doing: Callable[[], str] = str
+    last_lines: Callable[[], Sequence[str]] = tuple  # of the log
+    doing: Callable[[], str] = str  # what is done just now
+    # Where each thread was when the test was given up, by its name.
     threads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
 

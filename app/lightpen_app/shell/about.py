@@ -11,13 +11,7 @@ from lightpen_app.widgets.fitted_window import FittedWindow
 
 
 class About(FittedWindow, QDialog):
-    """Names, versions and licences; the text can be copied into a report.
-
-    Parameters
-    ----------
-    versions : mapping of str to str
-        Version by name.
-    """
+    """Names, versions and licences; the text can be copied into a report."""
 
     def __init__(
         self, versions: Mapping[str, str], parent: QWidget | None = None

@@ -24,11 +24,6 @@ class ActionBar(Translated, QFrame):
 
     Its first moments with another meaning, or on another page, are for what is still
     being pressed: a second Enter does nothing.
-
-    Signals
-    -------
-    main_pressed(), back_pressed()
-        The buttons.
     """
 
     main_pressed = Signal()

@@ -74,28 +74,17 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         Notifications; those of a page, by its key, are removed with the page.
     later : iterator of Page, optional
         More pages, made one by one once the window is painted.
-
-    Signals
-    -------
-    completed()
-        The window was painted, and all pages are made.
-    discovery_requested()
-        As of `Page`.
-    preferences_changed(Preferences)
-        The user chose otherwise.
-    attention_changed(bool)
-        Whether anybody may be looking at live images now.
-    closing()
-        The pages are shut down; what they share must be, too, and whoever does so
-        waits for what is still under way.
     """
 
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
-    completed = Signal()
-    discovery_requested = Signal()
-    preferences_changed = Signal(object)
+    completed = Signal()  # the window was painted, and all pages are made
+    discovery_requested = Signal()  # as of `Page`
+    preferences_changed = Signal(object)  # Preferences: the user chose otherwise
+    # Whether anybody may be looking at live images now.
     attention_changed = Signal(bool)
+    # The pages are shut down; what they share must be, too, and whoever does so waits
+    # for what is still under way.
     closing = Signal()
 
     def __init__(

@@ -17,34 +17,13 @@ from lightpen_resources import languages
 
 
 class OptionsMenu(Translated, QMenu):
-    """Shows and changes the preferences.
+    """Shows and changes the preferences."""
 
-    Parameters
-    ----------
-    preferences : Preferences
-        Current preferences.
-
-    Attributes
-    ----------
-    mute_action : QAction
-        Its key, B, works in every window that it is added to.
-
-    Signals
-    -------
-    value_changed(Preferences)
-        The user chose otherwise.
-    data_folder_chosen()
-        The user wants to keep swings and results elsewhere.
-    stream_chosen()
-        The user wants others to follow the pen, or to see who does.
-    about_chosen()
-        The user wants to know what the program is.
-    """
-
-    value_changed = Signal(object)
-    data_folder_chosen = Signal()
+    value_changed = Signal(object)  # Preferences: the user chose otherwise
+    data_folder_chosen = Signal()  # the user wants to keep swings and results elsewhere
+    # The user wants others to follow the pen, or to see who does.
     stream_chosen = Signal()
-    about_chosen = Signal()
+    about_chosen = Signal()  # the user wants to know what the program is
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,7 +40,7 @@ class OptionsMenu(Translated, QMenu):
         self._distances = self._choice_menu(
             "distance_m", tuple(map(float, DISTANCES_M)), preferences.distance_m
         )
-        self.mute_action = QAction(self)
+        self.mute_action = QAction(self)  # its key works in all windows it is added to
         self.mute_action.setCheckable(True)
         self.mute_action.setChecked(preferences.muted)
         self.mute_action.setShortcut(Qt.Key.Key_B)

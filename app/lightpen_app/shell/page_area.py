@@ -16,14 +16,9 @@ class NoticeBar(Translated, QFrame):
 
     While nothing can be kept in the data folder, whatever is reported of it says where
     another one is chosen, and is reported once.
-
-    Signals
-    -------
-    value_changed(str)
-        What it says; empty once it says nothing any more.
     """
 
-    value_changed = Signal(str)
+    value_changed = Signal(str)  # what it says; empty once it says nothing any more
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -102,11 +97,6 @@ class PageArea(QFrame):
     """Shows one page of several.
 
     A notice stands above it and covers nothing; it takes no focus.
-
-    Parameters
-    ----------
-    page : QWidget
-        Its first page, which is shown.
     """
 
     def __init__(self, page: QWidget, parent: QWidget | None = None) -> None:

@@ -30,21 +30,11 @@ WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
 
 @dataclass(frozen=True)
 class Subject:
-    """Item under calibration, as shown beside the steps.
+    """Item under calibration, as shown beside the steps."""
 
-    Attributes
-    ----------
-    names : Names
-        Names of the swing, or the selected ones without a swing.
-    origin : Origin or None
-        Origin of the images; None if the swing does not state it.
-    statuses : StationStatus
-        How all tips stand.
-    """
-
-    names: Names
-    origin: Origin | None
-    statuses: StationStatus = field(default_factory=StationStatus)
+    names: Names  # names of the swing, or the selected ones without a swing
+    origin: Origin | None  # origin of the images; None if the swing does not state it
+    statuses: StationStatus = field(default_factory=StationStatus)  # how all tips stand
 
 
 def subject_of(
@@ -59,23 +49,15 @@ def subject_of(
 
 
 class Sidebar(Translated, QFrame):
-    """The steps, with buttons for the functions of the function keys.
+    """The steps, with buttons for the functions of the function keys."""
 
-    Signals
-    -------
-    step_chosen(int)
-        Index of the step, which may be closed.
-    operator_view_chosen(), help_chosen(), options_chosen()
-        The buttons.
-    subject_changed(str, bool)
-        The item under calibration and the origin of its images, in one line; whether
-        some of it must not be used for measuring.
-    """
-
-    step_chosen = Signal(int)
+    step_chosen = Signal(int)  # index of the step, which may be closed
+    # The buttons.
     operator_view_chosen = Signal()
     help_chosen = Signal()
     options_chosen = Signal()
+    # The item under calibration and the origin of its images, in one line; whether some
+    # of it must not be used for measuring.
     subject_changed = Signal(str, bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:

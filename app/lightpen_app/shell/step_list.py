@@ -27,39 +27,22 @@ class StepState(Enum):
 
 @dataclass(frozen=True)
 class Status:
-    """Status of a page.
-
-    Attributes
-    ----------
-    complete : bool
-        All that the step asks for is there.
-    why_closed : str
-        Why the step cannot be entered; empty when it can.
-    doubtful : bool
-        Whether what is complete was taken with doubts.
-    """
+    """Status of a page."""
 
     title: str
-    complete: bool
-    why_closed: str
-    doubtful: bool = False
+    complete: bool  # all that the step asks for is there
+    why_closed: str  # why the step cannot be entered; empty when it can
+    doubtful: bool = False  # whether what is complete was taken with doubts
 
 
 @dataclass(frozen=True)
 class Step:
-    """A step as the list shows it.
-
-    Attributes
-    ----------
-    why_closed : str
-        A sentence for a closed step, else empty.
-    shows_reason : bool
-        Whether the sentence is shown; only the first closed step does.
-    """
+    """A step as the list shows it."""
 
     title: str
     state: StepState
-    why_closed: str = ""
+    why_closed: str = ""  # a sentence for a closed step, else empty
+    # Whether the sentence is shown; only the first closed step does.
     shows_reason: bool = False
 
 
@@ -210,15 +193,9 @@ class StepButton(Translated, QAbstractButton):
 
 
 class StepList(Translated, QWidget):
-    """List of the steps; a click, Space or Enter requests one.
+    """List of the steps; a click, Space or Enter requests one."""
 
-    Signals
-    -------
-    step_chosen(int)
-        Index of the step, which may be closed.
-    """
-
-    step_chosen = Signal(int)
+    step_chosen = Signal(int)  # index of the step, which may be closed
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -22,30 +22,18 @@ FIRST_PORT = 1024  # of those that take no administrator
 
 @dataclass(frozen=True)
 class StreamState:
-    """State of the stream.
-
-    Attributes
-    ----------
-    has_tip : bool
-        Whether the place of a tip is streamed, and not the pose alone.
-    fault : str
-        Why nobody can listen, though somebody should.
-    """
+    """State of the stream."""
 
     status: StreamStatus = field(default_factory=StreamStatus)
+    # Whether the place of a tip is streamed, and not the pose alone.
     has_tip: bool = False
-    fault: str = ""
+    fault: str = ""  # why nobody can listen, though somebody should
 
 
 class StreamDialog(FittedWindow, Translated, QDialog):
-    """Shows and changes where the stream can be listened to.
+    """Shows and changes where the stream can be listened to."""
 
-    Signals
-    -------
-    value_changed(bool, StreamPlace)
-        The user chose otherwise: whether it is on, and where.
-    """
-
+    # bool, StreamPlace: the user chose otherwise: whether it is on, and where
     value_changed = Signal(bool, object)
 
     def __init__(self, parent: QWidget | None = None) -> None:

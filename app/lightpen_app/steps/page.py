@@ -12,24 +12,15 @@ from lightpen_app.widgets.translated import Translated
 
 @dataclass(frozen=True)
 class MainAction:
-    """The main button of a page.
+    """The main button of a page."""
 
-    Attributes
-    ----------
-    text : str
-        Label, a verb first.
-    why_not : str
-        Why it cannot be pressed now; empty when it can. The reason is shown.
-    at_screen : bool
-        Whether it takes someone at the screen: a presenter's remote and the operator
-        view do not press it.
-    is_early : bool
-        Whether the step is not complete yet; the button then stands back.
-    """
-
-    text: str
+    text: str  # label, a verb first
+    # Why it cannot be pressed now; empty when it can. The reason is shown.
     why_not: str = ""
+    # Whether it takes someone at the screen: a presenter's remote and the operator view
+    # do not press it.
     at_screen: bool = False
+    # Whether the step is not complete yet; the button then stands back.
     is_early: bool = False
 
 
@@ -59,38 +50,20 @@ class Page(Translated, QWidget):
 
     The rules behind `is_complete` and `why_closed` live in the core, where they are
     tested without Qt. A page touches no other page and no window: it emits.
-
-    Attributes
-    ----------
-    key : str
-        Names the step in the settings and its help file: "start", "camera" and so on.
-    shows_images : bool
-        Whether live images are shown on it.
-
-    Signals
-    -------
-    changed()
-        Something that the page says of itself, such as its main action, is different.
-    advance_requested()
-        The step is done; show the next.
-    step_requested(str)
-        The step of this key must be shown, such as that of a swing to continue with.
-    operator_value_changed(OperatorValue)
-        What the operator view shows.
-    data_folder_requested()
-        Another data folder is to be chosen.
-    discovery_requested()
-        Pen and camera are to be found without files.
     """
 
+    # Names the step in the settings and its help file: "start", "camera" and so on.
     key = ""
-    shows_images = False
+    shows_images = False  # whether live images are shown on it
+    # Something that the page says of itself, such as its main action, is different.
     changed = Signal()
-    advance_requested = Signal()
+    advance_requested = Signal()  # the step is done; show the next
+    # The step of this key must be shown, such as that of a swing to continue with.
     step_requested = Signal(str)
+    # OperatorValue: what the operator view shows
     operator_value_changed = Signal(object)
-    data_folder_requested = Signal()
-    discovery_requested = Signal()
+    data_folder_requested = Signal()  # another data folder is to be chosen
+    discovery_requested = Signal()  # pen and camera are to be found without files
 
     def title(self) -> str:
         """Return the name of the step."""

@@ -13,11 +13,6 @@ class SimulatorControls(Translated, QFrame):
     """Base of the controls of the simulated operator; hidden with a real pen.
 
     A subclass calls `_follow_connection` once it has its buttons.
-
-    Parameters
-    ----------
-    live : LiveView
-        Live view with the simulated operator.
     """
 
     def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:

@@ -22,23 +22,14 @@ _BEST, _WORST = np.array([16, 60, 96, 230]), np.array([214, 104, 24, 230])
 
 @dataclass(frozen=True, eq=False)
 class BoardOverlay:
-    """Overlay of the image.
+    """Overlay of the image."""
 
-    Attributes
-    ----------
-    points : (N, 2) array or None
-        Of the board, px; NaN where not seen.
-    outline : (4, 2) array or None
-        Where the board is wanted, px, from its first corner on.
-    cells : (R, C) array or None
-        Points seen in each part of the image; empty ones are filled.
-    arrows : (M, 4) array or None
-        Residuals: place and value, px; drawn enlarged.
-    """
-
-    points: FloatArray | None = None
+    points: FloatArray | None = None  # (N, 2), of the board, px; NaN where not seen
+    # (4, 2), where the board is wanted, px, from its first corner on
     outline: FloatArray | None = None
+    # (R, C), points seen in each part of the image; empty ones are filled
     cells: IntArray | None = None
+    # (M, 4), residuals: place and value, px; drawn enlarged
     arrows: FloatArray | None = None
     uncertainty: UncertaintyMap | None = None
 

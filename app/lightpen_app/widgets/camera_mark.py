@@ -15,20 +15,11 @@ DISTANCE = 1.085  # from the middle of the dial to that of the mark; radius = 1
 
 @dataclass(frozen=True, eq=False)
 class CameraPosition:
-    """Position of a camera.
+    """Position of a camera."""
 
-    Attributes
-    ----------
-    middle : QPointF
-        Of the dial, px.
-    radius : float
-        Radius of the dial, px.
-    angle : float
-        In which direction from the middle, counter-clockwise from the right, rad.
-    """
-
-    middle: QPointF
-    radius: float
+    middle: QPointF  # of the dial, px
+    radius: float  # radius of the dial, px
+    # In which direction from the middle, counter-clockwise from the right, rad.
     angle: float
 
     @property

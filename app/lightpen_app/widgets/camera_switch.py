@@ -11,15 +11,9 @@ N_CAMERAS = 2
 
 
 class CameraSwitch(Translated, QWidget):
-    """A button for each camera, of which one is pressed.
+    """A button for each camera, of which one is pressed."""
 
-    Signals
-    -------
-    value_changed(int)
-        Another camera is to be shown, by its number from 0.
-    """
-
-    value_changed = Signal(int)
+    value_changed = Signal(int)  # another camera is to be shown, by its number from 0
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

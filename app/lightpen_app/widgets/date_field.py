@@ -15,18 +15,10 @@ EXAMPLE = date(2025, 8, 14)  # of a day that is over
 class DateField(Translated, EnterEdit):
     """A date such as 2026-08-14; an invalid one is marked and ignored.
 
-    Parameters
-    ----------
-    example : date
-        Shown while it is empty.
-
-    Signals
-    -------
-    value_changed()
-        Another day is typed, or none.
+    The example is shown while it is empty.
     """
 
-    value_changed = Signal()
+    value_changed = Signal()  # another day is typed, or none
 
     def __init__(self, example: date = EXAMPLE, parent: QWidget | None = None) -> None:
         super().__init__(parent)

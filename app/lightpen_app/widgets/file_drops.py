@@ -9,18 +9,10 @@ from typing_extensions import override
 class FileDrops(QObject):
     """Accepts one local file or folder dropped on a widget.
 
-    Parameters
-    ----------
-    place : QWidget
-        Widget that accepts drops, with its children; it becomes the parent.
-
-    Signals
-    -------
-    dropped(str)
-        The path.
+    It becomes the parent, and its children accept drops, too.
     """
 
-    dropped = Signal(str)
+    dropped = Signal(str)  # the path
 
     def __init__(self, place: QWidget) -> None:
         super().__init__(place)

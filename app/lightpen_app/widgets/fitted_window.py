@@ -38,14 +38,9 @@ def fit_screen(window: QWidget) -> None:
 
 
 class FittedWindow(_Base):
-    """Put before the base of a window, it keeps that within the screen when shown.
+    """Put before the base of a window, it keeps that within the screen when shown."""
 
-    Attributes
-    ----------
-    CLOSING_KEYS : tuple of Qt.Key
-        That close the window; a dialog is also closed as Qt does it.
-    """
-
+    # That close the window; a dialog is also closed as Qt does it.
     CLOSING_KEYS: tuple[Qt.Key, ...] = ()
 
     @override

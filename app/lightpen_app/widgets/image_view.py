@@ -37,31 +37,16 @@ LABEL_TURNS = tuple(math.radians(15 * k) for k in sorted(range(-11, 13), key=abs
 
 @dataclass(frozen=True)
 class Marker:
-    """A ring on the image.
+    """A ring on the image."""
 
-    Attributes
-    ----------
-    x, y : float
-        Centre, image px.
-    radius : float
-        Image px; it is drawn no smaller than can be seen.
-    label : str
-        Beside the ring.
-    label_angle : float
-        Where beside it: clockwise from the right as one sees it, rad.
-    tone : Tone
-        Its colour; `WARN` and `BAD` are also drawn dashed.
-    crossed : bool
-        Whether two strokes cross in it, as over what is left out.
-    """
-
-    x: float
+    x: float  # centre, image px
     y: float
-    radius: float = 8.0
-    label: str = ""
-    tone: Tone = Tone.GOOD
+    radius: float = 8.0  # image px; it is drawn no smaller than can be seen
+    label: str = ""  # beside the ring
+    tone: Tone = Tone.GOOD  # its colour; `WARN` and `BAD` are also drawn dashed
+    # Where beside it: clockwise from the right as one sees it, rad.
     label_angle: float = -math.pi / 4
-    crossed: bool = False
+    crossed: bool = False  # whether two strokes cross in it, as over what is left out
 
 
 class ImageView(Translated, QWidget):
@@ -69,16 +54,10 @@ class ImageView(Translated, QWidget):
 
     The wheel, or + and -, enlarge; the mouse, or the arrow keys, move; 0 shows all.
     Instead of moving the image, the mouse may draw circles on it.
-
-    Signals
-    -------
-    pixel_clicked(float, float)
-        Where on the image, px.
-    circle_drawn(float, float, float)
-        Its centre x, y and its radius, image px.
     """
 
-    pixel_clicked = Signal(float, float)
+    pixel_clicked = Signal(float, float)  # where on the image, px
+    # Its centre x, y and its radius, image px.
     circle_drawn = Signal(float, float, float)
 
     def __init__(self, parent: QWidget | None = None) -> None:

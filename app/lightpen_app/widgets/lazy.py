@@ -14,19 +14,9 @@ W = TypeVar("W", bound=QWidget)
 
 
 class LazyWidget(QWidget, Generic[W]):
-    """Holds the place of a widget that may never be seen.
+    """Holds the place of a widget that may never be seen."""
 
-    Parameters
-    ----------
-    make : callable
-        Returns the widget.
-
-    Signals
-    -------
-    made(QWidget)
-    """
-
-    made = Signal(object)
+    made = Signal(object)  # QWidget
 
     def __init__(self, make: Callable[[], W], parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -21,12 +21,6 @@ class NumberField(LeavesPageKeys, QDoubleSpinBox):
     A decimal comma that is typed becomes a point; it would be passed over otherwise,
     and "3,5" be taken for 35. A number beyond the limits becomes the nearest limit once
     it is typed; else its last digit would be passed over, and "400" be taken for 40.
-
-    Parameters
-    ----------
-    unit : str
-        Shown after the number.
-    limits : (least, greatest)
     """
 
     def __init__(

@@ -21,19 +21,11 @@ ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; that of the head likewi
 
 @dataclass(frozen=True)
 class Figures:
-    """Content of a table.
+    """Content of a table."""
 
-    Attributes
-    ----------
-    columns, rows : tuple of str
-        Names.
-    cells : tuple of tuple of str
-        Row by row.
-    """
-
-    columns: tuple[str, ...] = ()
-    rows: tuple[str, ...] = ()
-    cells: tuple[tuple[str, ...], ...] = ()
+    columns: tuple[str, ...] = ()  # names
+    rows: tuple[str, ...] = ()  # names
+    cells: tuple[tuple[str, ...], ...] = ()  # row by row
 
 
 class NumberTable(QTableWidget):

@@ -27,31 +27,15 @@ CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not show its size
 
 @dataclass(frozen=True, eq=False)
 class OperatorValue:
-    """Present content of the operator view.
+    """Present content of the operator view."""
 
-    Attributes
-    ----------
-    instruction : str
-        Instruction in a few words.
-    hint : str
-        A sentence more.
-    count : str
-        Such as "60 kept, 40 to go".
-    time_left : str
-        Such as "about 20 s left"; empty where nothing is waited for.
-    fraction : float or None
-        How much is done, 0 to 1.
-    keys : str
-        Keys of this view besides closing it.
-    """
-
-    instruction: str = ""
-    hint: str = ""
+    instruction: str = ""  # instruction in a few words
+    hint: str = ""  # a sentence more
     state: State = field(default_factory=State)
-    count: str = ""
-    time_left: str = ""
-    fraction: float | None = None
-    keys: str = ""
+    count: str = ""  # such as "60 kept, 40 to go"
+    time_left: str = ""  # such as "about 20 s left"; empty where nothing is waited for
+    fraction: float | None = None  # how much is done, 0 to 1
+    keys: str = ""  # keys of this view besides closing it
     dial: DialValue | None = None
 
 
@@ -60,18 +44,11 @@ class OperatorView(Translated, QWidget):
 
     The letters are as large as the viewing distance asks for, where they fit; on a
     large window they are larger.
-
-    Signals
-    -------
-    closed()
-        The view was left; nothing else has ended by that.
-    advance_requested(), pause_requested()
-        Enter or PageDown, Space.
     """
 
-    closed = Signal()
-    advance_requested = Signal()
-    pause_requested = Signal()
+    closed = Signal()  # the view was left; nothing else has ended by that
+    advance_requested = Signal()  # Enter or PageDown
+    pause_requested = Signal()  # Space
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent, Qt.WindowType.Window)
@@ -148,10 +125,7 @@ class OperatorView(Translated, QWidget):
     def set_subject(self, text: str, is_marked: bool = False) -> None:
         """Show the item under calibration.
 
-        Parameters
-        ----------
-        is_marked : bool
-            Whether it must not be used for measuring, as the text states.
+        What is marked must not be used for measuring, as the text states.
         """
         tone = Tone.WARN if is_marked else Tone.QUIET
         self._subject.set_text(text, tone, bold=is_marked)

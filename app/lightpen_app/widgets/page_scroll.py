@@ -12,14 +12,9 @@ class PageScroll(QScrollArea):
     """Scrolls to the control that has the focus, and takes no key for itself.
 
     The page keys, which a presenter's remote sends, are left to the window.
-
-    Signals
-    -------
-    height_changed(int)
-        Of what is seen at once, px.
     """
 
-    height_changed = Signal(int)
+    height_changed = Signal(int)  # of what is seen at once, px
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -88,12 +83,8 @@ class ShrinkingScrollContent(QWidget):
     """Content that scrolls only once it cannot be made smaller.
 
     Other content with words that wrap, and this where it is not to be squeezed, scrolls
-    as soon as it has less than the height for which it asks.
-
-    Parameters
-    ----------
-    content : QWidget, optional
-        Fills it; without one, the caller lays it out.
+    as soon as it has less than the height for which it asks. Without ``content``, the
+    caller lays it out.
     """
 
     def __init__(self, content: QWidget | None = None) -> None:

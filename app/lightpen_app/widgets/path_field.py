@@ -55,18 +55,11 @@ class EnterEdit(QLineEdit):
 
 
 class PathField(QWidget):
-    """A path that is taken over when Enter is pressed or the field is left.
+    """A path that is taken over when Enter is pressed or the field is left."""
 
-    Signals
-    -------
-    value_changed(str)
-        Another path was given, or a faulty one again by Enter.
-    path_chosen(str)
-        So it was, and it is not empty.
-    """
-
+    # Another path was given, or a faulty one again by Enter.
     value_changed = Signal(str)
-    path_chosen = Signal(str)
+    path_chosen = Signal(str)  # so it was, and it is not empty
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

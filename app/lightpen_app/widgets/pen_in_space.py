@@ -27,24 +27,13 @@ SHARE_BELOW = 0.16  # of the height, below the cone
 
 @dataclass(frozen=True, eq=False)
 class DisplayedPosture:
-    """Posture of a pen in its cone.
+    """Posture of a pen in its cone."""
 
-    Attributes
-    ----------
-    pen : Pen
-        Its LEDs are drawn.
-    tip_pen : (3,) array
-        Where its tip is, mm.
-    posture, target : Posture or None
-        Current and target posture.
-    heading : float
-        Rotation from the camera's view to the operator's, as in `DialValue`.
-    """
-
-    pen: Pen
-    tip_pen: FloatArray
-    posture: Posture | None = None
-    target: Posture | None = None
+    pen: Pen  # its LEDs are drawn
+    tip_pen: FloatArray  # (3,), where its tip is, mm
+    posture: Posture | None = None  # at present
+    target: Posture | None = None  # of the next image
+    # Rotation from the camera's view to the operator's, as in `DialValue`.
     heading: float = 0.0
 
 

@@ -40,18 +40,11 @@ ROUND = np.linspace(0, 2 * np.pi, N_CORNERS, endpoint=False)
 
 @dataclass(frozen=True, eq=False)
 class PenPicture:
-    """Displayed content of a pen.
-
-    Attributes
-    ----------
-    tip : (3,) array or None
-        Centre of the probe tip, pen frame, mm.
-    marked : frozenset of int
-        Numbers of the LEDs that something is wrong with.
-    """
+    """Displayed content of a pen."""
 
     pen: Pen | None = None
-    tip: FloatArray | None = None
+    tip: FloatArray | None = None  # (3,), centre of the probe tip, pen frame, mm
+    # Numbers of the LEDs that something is wrong with.
     marked: frozenset[int] = field(default_factory=frozenset)
 
 
@@ -82,15 +75,9 @@ class _Projection:
 
 
 class PenView(Translated, QWidget):
-    """Draws a pen; the mouse or the arrow keys turn it, 0 puts it back.
+    """Draws a pen; the mouse or the arrow keys turn it, 0 puts it back."""
 
-    Signals
-    -------
-    led_chosen(int)
-        The LED of this number was clicked.
-    """
-
-    led_chosen = Signal(int)
+    led_chosen = Signal(int)  # the LED of this number was clicked
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

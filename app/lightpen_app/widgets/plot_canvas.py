@@ -60,14 +60,9 @@ def _with_equal_decimals(words: list[TextSpec]) -> list[TextSpec]:
 
 
 class LabelAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """A bottom axis whose labels can be written upwards, where they lack width.
+    """A bottom axis whose labels can be written upwards, where they lack width."""
 
-    Attributes
-    ----------
-    upright : sequence of str
-        Labels written upwards at 0, 1, 2, ... instead of the usual ones.
-    """
-
+    # Labels written upwards at 0, 1, 2, ... instead of the usual ones.
     upright: Sequence[str] = ()
 
     @override

@@ -56,33 +56,20 @@ Column: TypeAlias = FloatArray | tuple[str, ...]
 
 @dataclass(frozen=True)
 class Axes:
-    """Words of a plot.
+    """Words of a plot."""
 
-    Attributes
-    ----------
-    title : str
-        Quantity with its unit.
-    x, y : str
-        Names of the axes; empty to leave one out.
-    """
-
-    title: str
-    x: str = ""
-    y: str = ""
+    title: str  # quantity with its unit
+    x: str = ""  # name of the axis; empty to leave it out
+    y: str = ""  # likewise
 
 
 class Plot(QWidget):
     """Base of the plots: its frame, its colours, and how it is saved.
 
     The mouse moves nothing: a plot always shows all of its data.
-
-    Signals
-    -------
-    titled()
-        Title or labels changed.
     """
 
-    titled = Signal()
+    titled = Signal()  # title or labels changed
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         super().__init__(parent)

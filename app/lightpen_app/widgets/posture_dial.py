@@ -48,33 +48,19 @@ def _zeros() -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class DialValue:
-    """Content of a dial.
+    """Content of a dial."""
 
-    Attributes
-    ----------
-    counts, needed : (2, 8) array of int
-        Images kept and wanted, leaning and leaning far, by direction.
-    n_upright, n_upright_needed : int
-        The same for the upright pen.
-    posture, target : Posture or None
-        Current and target posture of the pen.
-    turns : tuple of two floats or None
-        Least and greatest turn kept, rad.
-    turns_needed : tuple of two floats or None
-        What they should reach, rad.
-    heading : float
-        By how much the drawing is turned, counter-clockwise, so that the operator
-        finds left and right as his own: 0 behind the camera, pi facing it; rad.
-    """
-
+    # (2, 8), images kept and wanted, leaning and leaning far, by direction
     counts: IntArray = field(default_factory=_zeros)
     needed: IntArray = field(default_factory=_zeros)
-    n_upright: int = 0
+    n_upright: int = 0  # the same for the upright pen
     n_upright_needed: int = 0
-    posture: Posture | None = None
-    target: Posture | None = None
-    turns: tuple[float, float] | None = None
-    turns_needed: tuple[float, float] | None = None
+    posture: Posture | None = None  # of the pen at present
+    target: Posture | None = None  # of the next image
+    turns: tuple[float, float] | None = None  # least and greatest turn kept, rad
+    turns_needed: tuple[float, float] | None = None  # what they should reach, rad
+    # By how much the drawing is turned, counter-clockwise, so that the operator finds
+    # left and right as his own: 0 behind the camera, pi facing it; rad.
     heading: float = 0.0
 
     @property

@@ -12,14 +12,9 @@ class AskingBar(QFrame):
     """A bar for a question, hidden without one; it returns the focus.
 
     Else it would go to whatever comes next, such as a button that Enter then presses.
-
-    Signals
-    -------
-    asking_changed()
-        It asks, or no longer.
     """
 
-    asking_changed = Signal()
+    asking_changed = Signal()  # it asks, or no longer
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -13,12 +13,8 @@ class PushButton(QPushButton):
     """A push button.
 
     A style sheet cannot say how narrow it may be: its min-width replaces the width that
-    the words need, and a layout short of room would clip them.
-
-    Parameters
-    ----------
-    least_width : int
-        For which it asks with short words, px.
+    the words need, and a layout short of room would clip them. With short words it asks
+    for ``least_width``, px.
     """
 
     def __init__(

@@ -23,13 +23,7 @@ class Question(NamedTuple):
 
 
 class QuestionBar(Translated, AskingBar):
-    """Hidden until it asks; either answer hides it again.
-
-    Signals
-    -------
-    agreed()
-    declined()
-    """
+    """Hidden until it asks; either answer hides it again."""
 
     agreed = Signal()
     declined = Signal()

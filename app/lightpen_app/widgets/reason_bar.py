@@ -40,16 +40,10 @@ def usual_reasons() -> tuple[str, ...]:
 
 
 class ReasonBar(AskingBar):
-    """Hidden until it asks; either answer hides it again.
+    """Hidden until it asks; either answer hides it again."""
 
-    Signals
-    -------
-    given(str, Signature)
-        The reason, which is not empty, and who signs as a supervisor; None if nobody
-        is asked to.
-    declined()
-    """
-
+    # str, Signature: the reason, which is not empty, and who signs as a supervisor;
+    # None if nobody is asked to
     given = Signal(str, object)
     declined = Signal()
 

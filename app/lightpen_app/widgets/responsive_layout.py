@@ -18,17 +18,12 @@ else:  # a class of Qt's cannot be a base twice
 
 @dataclass(frozen=True)
 class SizeClass:
-    """Whether a widget is short of room, in width and in height, or has plenty.
-
-    Attributes
-    ----------
-    is_vast : bool
-        Whether it has so much that it may show more than what is needed.
-    """
+    """Whether a widget is short of room, in width and in height, or has plenty."""
 
     is_narrow: bool = False
     is_low: bool = False
     is_large: bool = False
+    # Whether it has so much that it may show more than what is needed.
     is_vast: bool = False
 
     @property
@@ -44,18 +39,13 @@ class ResponsiveLayout(_Base):
     """Mixin before the base of a widget: rearranges it when its size changes.
 
     The constructor of the widget arranges it once.
-
-    Attributes
-    ----------
-    narrow_below, low_below : int
-        px; with less width or height it is short of room.
-    large_from, vast_from : QSize or None
-        Sizes from which the layout is large or very large; None if that makes no
-        difference.
     """
 
+    # px; with less width or height it is short of room.
     narrow_below = 0
     low_below = 0
+    # Sizes from which the layout is large or very large; None if that makes no
+    # difference.
     large_from: QSize | None = None
     vast_from: QSize | None = None
     _room = SizeClass()

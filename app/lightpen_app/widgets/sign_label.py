@@ -24,15 +24,9 @@ SIDE = 2 * GRID
 
 @dataclass(frozen=True)
 class StatusMessage:
-    """Message with its sign and tone.
+    """Message with its sign and tone."""
 
-    Attributes
-    ----------
-    text : str
-        Empty for nothing to remark.
-    """
-
-    text: str = ""
+    text: str = ""  # empty for nothing to remark
     sign: Sign = Sign.NONE
     tone: Tone = Tone.PLAIN
 

@@ -24,24 +24,13 @@ from lightpen_app.widgets.fitted_text import WRAPPED, fitted_size
 
 @dataclass(frozen=True)
 class State:
-    """State of the program.
+    """State of the program."""
 
-    Attributes
-    ----------
-    word : str
-        One or two words.
-    detail : str
-        A sentence.
-    sign, tone
-        Its shape and colour.
-    fraction : float or None
-        How far a wait has come, 0 to 1; drawn as a ring about the sign.
-    """
-
-    word: str = ""
-    detail: str = ""
+    word: str = ""  # one or two words
+    detail: str = ""  # a sentence
     sign: Sign = Sign.NONE
     tone: Tone = Tone.PLAIN
+    # How far a wait has come, 0 to 1; drawn as a ring about the sign.
     fraction: float | None = None
 
 
@@ -58,14 +47,9 @@ class StateBanner(QWidget):
         no smaller than `TextSize.SMALL` however long it is: the banner grows.
     speaks : bool
         Whether a screen reader announces it; not where another banner says the same.
-
-    Signals
-    -------
-    announced(str)
-        Text for screen readers.
     """
 
-    announced = Signal(str)
+    announced = Signal(str)  # text for screen readers
 
     def __init__(
         self,

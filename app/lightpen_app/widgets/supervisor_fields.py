@@ -14,18 +14,10 @@ LONGEST = 100  # characters
 
 
 class SupervisorFields(Translated, QWidget):
-    """Name and password.
+    """Name and password."""
 
-    Signals
-    -------
-    value_edited()
-        Something is being typed.
-    entered()
-        The Enter key was pressed in the password.
-    """
-
-    value_edited = Signal()
-    entered = Signal()
+    value_edited = Signal()  # something is being typed
+    entered = Signal()  # the Enter key was pressed in the password
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -30,10 +30,7 @@ class UndoableStep(QUndoCommand):
 class UndoButtons(Translated, QWidget):
     """Undoes and redoes the last step of a stack.
 
-    Parameters
-    ----------
-    scope : QWidget
-        While it is visible its keys do the same, wherever the focus is.
+    While ``scope`` is visible its keys do the same, wherever the focus is.
     """
 
     def __init__(self, stack: QUndoStack, scope: QWidget) -> None:

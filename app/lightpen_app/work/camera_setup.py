@@ -25,23 +25,10 @@ class CameraSetup(QObject):
 
     A camera that is open is closed while others are looked for: some libraries end the
     stream of one then.
-
-    Parameters
-    ----------
-    settings : Settings
-        Settings that store the camera set-up.
-    around : SourceEnvironment
-        Environment of simulated and recorded sources.
-
-    Signals
-    -------
-    cameras_found(tuple of FoundDevice)
-    search_failed(str)
-        The sentence why no cameras can be looked for.
     """
 
-    cameras_found = Signal(object)
-    search_failed = Signal(str)
+    cameras_found = Signal(object)  # tuple of FoundDevice
+    search_failed = Signal(str)  # the sentence why no cameras can be looked for
 
     def __init__(
         self,

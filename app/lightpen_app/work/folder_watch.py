@@ -11,17 +11,11 @@ LOOKING_MS = 5000  # from one look to the next
 
 
 class FolderWatch(QObject):
-    """Checks the data folder periodically and announces this window.
+    """Checks the data folder periodically and announces this window."""
 
-    Signals
-    -------
-    counted(int)
-        Number of other windows of the program that use it, when it changes.
-    fault_changed(str)
-        Why nothing can be stored in it; empty when it can again.
-    """
-
+    # Number of other windows of the program that use it, when it changes.
     counted = Signal(int)
+    # Why nothing can be stored in it; empty when it can again.
     fault_changed = Signal(str)
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:

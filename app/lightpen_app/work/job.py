@@ -24,25 +24,13 @@ class Job(QObject):
     fraction done; that call is also where a cancelled job stops. An exception
     that is no `LightpenError` is a bug and goes to `sys.excepthook`. A job is done
     with after `ended`: it deletes itself.
-
-    Signals
-    -------
-    progressed(float)
-        Fraction done, 0 to 1.
-    succeeded(object)
-        What the function returned.
-    failed(str)
-        Text for the user, in the language that is chosen.
-    crashed()
-        It ended by a bug, without an outcome.
-    ended()
-        The last of all, whether it succeeded, failed, was cancelled or crashed.
     """
 
-    progressed = Signal(float)
-    succeeded = Signal(object)
-    failed = Signal(str)
-    crashed = Signal()
+    progressed = Signal(float)  # fraction done, 0 to 1
+    succeeded = Signal(object)  # what the function returned
+    failed = Signal(str)  # text for the user, in the language that is chosen
+    crashed = Signal()  # it ended by a bug, without an outcome
+    # The last of all, whether it succeeded, failed, was cancelled or crashed.
     ended = Signal()
     _moved = Signal(float)
     _returned = Signal(object)

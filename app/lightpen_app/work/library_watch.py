@@ -31,27 +31,12 @@ Change = Callable[[], Library]
 class LibraryWatch(QObject):
     """Watches the library of a data folder and signals changes.
 
-    Parameters
-    ----------
-    folder : Path
-        The data folder.
-    rule : DueRule
-        How long a tip may be in force that has no rule of its own.
-    now : callable
-        Returns the date and time by which tips are due.
-
-    Signals
-    -------
-    changed()
-        `statuses` are different.
-    change_kept(object)
-        What was requested.
-    change_failed(object, str)
-        What was requested, and the sentence why it was not kept.
+    ``rule`` is for tips without a rule of their own.
     """
 
-    changed = Signal()
-    change_kept = Signal(object)
+    changed = Signal()  # `statuses` are different
+    change_kept = Signal(object)  # what was requested
+    # What was requested, and the sentence why it was not kept.
     change_failed = Signal(object, str)
 
     def __init__(

@@ -48,14 +48,9 @@ class Mailbox(QObject):
 
     A queued signal with every image would fill the memory whenever the GUI is busy;
     here only the newest waits, with one pending `ready`.
-
-    Signals
-    -------
-    ready()
-        A value waits; emitted once until it is taken.
     """
 
-    ready = Signal()
+    ready = Signal()  # a value waits; emitted once until it is taken
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -83,18 +78,12 @@ CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
 
 @dataclass(frozen=True, eq=False)
 class DisplayedImage:
-    """A live image, ready to be shown.
+    """A live image, ready to be shown."""
 
-    Attributes
-    ----------
-    half : (H // 2, W // 2) array of uint8
-        The image at half its size, see `lightpen_app.look.pooling.pooled`.
-    size : QSize
-        Of the whole image, px.
-    """
-
+    # (H // 2, W // 2), the image at half its size, see
+    # `lightpen_app.look.pooling.pooled`
     half: Image
-    size: QSize
+    size: QSize  # of the whole image, px
     seen: LiveImage
 
 
@@ -114,28 +103,17 @@ class LiveView(QObject):
         Tells other programs what the first camera shows.
     notifications : Notifications
         Receives messages about camera faults.
-
-    Signals
-    -------
-    image_shown(Shown)
-        The newest image; those that the GUI had no time for are skipped.
-    connection_changed(Connection)
-    other_changed(Connection)
-        The camera that is not chosen is in this state now.
-    settings_applied(CameraSettings)
-        The camera has these in force.
-    configured(int, CameraSettings)
-        A camera, by its number from 0, has these in force.
-    failed()
-        No more images come until another `open`; `why_no_images` shows.
     """
 
+    # Shown: the newest image; those that the GUI had no time for are skipped
     image_shown = Signal(object)
-    connection_changed = Signal(object)
+    connection_changed = Signal(object)  # Connection
+    # Connection: the camera that is not chosen is in this state now
     other_changed = Signal(object)
-    settings_applied = Signal(object)
+    settings_applied = Signal(object)  # CameraSettings: the camera has these in force
+    # int, CameraSettings: a camera, by its number from 0, has these in force
     configured = Signal(int, object)
-    failed = Signal()
+    failed = Signal()  # no more images come until another `open`; `why_no_images` shows
     _closing_failed = Signal(str)
 
     def __init__(

@@ -8,21 +8,12 @@ from lightpen_app.look.theme import Tone
 
 
 class Notifications(QObject):
-    """The active notifications, each until its cause has ended.
+    """The active notifications, each until its cause has ended."""
 
-    Signals
-    -------
-    raised(str, Tone)
-        A sentence to be read.
-    withdrawn(str)
-        A sentence of `raised` whose cause is gone, in the language it was raised in.
-    status_changed(str)
-        A sentence for the status line.
-    """
-
-    raised = Signal(str, object)
+    raised = Signal(str, object)  # str, Tone: a sentence to be read
+    # A sentence of `raised` whose cause is gone, in the language it was raised in.
     withdrawn = Signal(str)
-    status_changed = Signal(str)
+    status_changed = Signal(str)  # a sentence for the status line
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -24,14 +24,9 @@ class PenFiles(QObject):
     """Opens the file of the pen that is chosen, and stores which file a pen has.
 
     A simulated pen has its own files, whatever its name.
-
-    Signals
-    -------
-    changed()
-        `doubt` may be another one.
     """
 
-    changed = Signal()
+    changed = Signal()  # `doubt` may be another one
 
     def __init__(
         self,

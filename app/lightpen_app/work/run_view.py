@@ -14,31 +14,12 @@ E = TypeVar("E")
 
 
 class RunView(QObject, Generic[S, E]):
-    """Forwards the status of a runner to the GUI; commands go to the runner.
+    """Forwards the status of a runner to the GUI; commands go to the runner."""
 
-    Parameters
-    ----------
-    status : S
-        Initial status.
-    notifications : Notifications
-        Receives messages about failures.
-
-    Signals
-    -------
-    changed()
-        `status` is different.
-    happened(E)
-        Each event, in order and before `changed`.
-    progressed(float)
-        Completed fraction of a long operation.
-    refused()
-        Something could not be done; nothing is lost.
-    """
-
-    changed = Signal()
-    happened = Signal(object)
-    progressed = Signal(float)
-    refused = Signal()
+    changed = Signal()  # `status` is different
+    happened = Signal(object)  # E: each event, in order and before `changed`
+    progressed = Signal(float)  # completed fraction of a long operation
+    refused = Signal()  # something could not be done; nothing is lost
     _status_posted = Signal()
     _progress_posted = Signal(float)
     _fault_posted = Signal(object)

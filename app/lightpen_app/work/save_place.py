@@ -16,18 +16,12 @@ from lightpen_app.work.swing_run import SwingRun
 
 @dataclass(frozen=True)
 class SavePlace:
-    """The folder that was chosen last, and names by pen, tip and date.
+    """The folder that was chosen last, and names by pen, tip and date."""
 
-    Attributes
-    ----------
-    settings : Settings
-        Remembers the folder, and the laboratory that a certificate names.
-    now : callable
-        Returns the date and time of a result that is not accepted yet.
-    """
-
+    # Remembers the folder, and the laboratory that a certificate names.
     settings: Settings
     run: SwingRun
+    # Returns the date and time of a result that is not accepted yet.
     now: Callable[[], datetime]
 
     def folder(self) -> Path:

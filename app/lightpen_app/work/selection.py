@@ -39,18 +39,12 @@ def is_trial_ready(preparation: Preparation) -> bool:
 
 
 class Selection(QObject):
-    """The choices for a calibration and for verifications.
+    """The choices for a calibration and for verifications."""
 
-    Signals
-    -------
-    changed(Preparation)
-        Something else is chosen; with what was chosen before.
-    station_changed(FilePaths)
-        Another station is chosen, which had these files in use. What is still being
-        read is not for it.
-    """
-
+    # Preparation: something else is chosen; with what was chosen before
     changed = Signal(object)
+    # FilePaths: another station is chosen, which had these files in use. What is still
+    # being read is not for it.
     station_changed = Signal(object)
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:

@@ -42,25 +42,14 @@ AGAIN_MS = 5000  # after which what could not be written is tried again
 
 @dataclass(frozen=True)
 class Preferences:
-    """Preferences for all stations.
-
-    Attributes
-    ----------
-    distance_m : float
-        From the operator's eyes to the screen, m.
-    data_folder : str
-        Data folder from the next start on; empty for the default.
-    streams : bool
-        Whether other programs may follow the pen,
-    stream_address, stream_port : str and int
-        and where; see `lightpen.streaming.server.StreamPlace`.
-    """
+    """Preferences for all stations."""
 
     language: str = SOURCE_LANGUAGE
     appearance: Appearance = Appearance.SYSTEM
     muted: bool = False
-    distance_m: float = 3.0
-    data_folder: str = ""
+    distance_m: float = 3.0  # from the operator's eyes to the screen, m
+    data_folder: str = ""  # data folder from the next start on; empty for the default
+    # Whether other programs may follow the pen, and where; see `StreamPlace`.
     streams: bool = False
     stream_address: str = StreamPlace.address
     stream_port: int = StreamPlace.port
@@ -70,17 +59,11 @@ Group = TypeVar("Group", Preferences, Station, CameraSettings, DueRule, CameraFi
 
 
 class Settings(QObject):
-    """The settings; missing and invalid values give the default.
+    """The settings; missing and invalid values give the default."""
 
-    Signals
-    -------
-    troubled(object)
-        The `Message` why something is not, or not surely, remembered.
-    relieved(object)
-        The `Message` of `troubled` whose cause is gone: they could be written again.
-    """
-
+    # The `Message` why something is not, or not surely, remembered.
     troubled = Signal(object)
+    # The `Message` of `troubled` whose cause is gone: they could be written again.
     relieved = Signal(object)
     _written = Signal(object, bool)
 

@@ -19,33 +19,19 @@ Triple: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class StoredCamera:
-    """Stored source of a camera's images, and its mask.
-
-    Attributes
-    ----------
-    mask : tuple of triples
-        Circles of stray light: centre x, y and radius, px.
-    """
+    """Stored source of a camera's images, and its mask."""
 
     source: SourceChoice = field(default_factory=SourceChoice)
-    mask: tuple[Triple, ...] = ()
+    mask: tuple[Triple, ...] = ()  # circles of stray light: centre x, y and radius, px
 
 
 @dataclass(frozen=True)
 class CameraFiles:
-    """Settings of a camera, independent of the station.
+    """Settings of a camera, independent of the station."""
 
-    Attributes
-    ----------
-    file, sha256 : str
-        Path and hash of the intrinsics file; path of the rig file for a pair.
-    mask : tuple of triples
-        Circles of stray light: centre x, y and radius, px.
-    """
-
-    file: str = ""
-    sha256: str = ""
-    mask: tuple[Triple, ...] = ()
+    file: str = ""  # path of the intrinsics file; for a pair, of the rig file
+    sha256: str = ""  # hash of the intrinsics file
+    mask: tuple[Triple, ...] = ()  # circles of stray light: centre x, y and radius, px
 
 
 @dataclass(frozen=True)
@@ -60,30 +46,19 @@ class FilePaths:
 
 @dataclass(frozen=True)
 class Station:
-    """Last choices at a station.
-
-    Attributes
-    ----------
-    nominal_tip : triple or None
-        Its centre by design, mm, pen frame; None for that of the LED file.
-    second : StoredCamera or None
-        None where one camera is used.
-    heading : float or None
-        The operator's right as the camera sees it, rad.
-    temperature_day : str
-        See `Preparation`.
-    """
+    """Last choices at a station."""
 
     names: Names = field(default_factory=Names)
+    # Its centre by design, mm, pen frame; None for that of the LED file.
     nominal_tip: Triple | None = None
     camera: StoredCamera = field(default_factory=StoredCamera)
-    second: StoredCamera | None = None
+    second: StoredCamera | None = None  # None where one camera is used
     files: FilePaths = field(default_factory=FilePaths)
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
     verification: VerificationChoices = field(default_factory=VerificationChoices)
-    heading: float | None = None
-    temperature_day: str = ""
+    heading: float | None = None  # the operator's right as the camera sees it, rad
+    temperature_day: str = ""  # see `Preparation`
 
 
 def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:

@@ -19,23 +19,10 @@ from lightpen_app.work.job import Job, Report
 class Streaming(QObject):
     """Opens and closes the stream and updates its tip.
 
-    Parameters
-    ----------
-    clock : Clock
-        The one that the cameras use.
-
-    Attributes
-    ----------
-    stream : PoseStream
-        Takes every image, on the thread that looks at them.
-
-    Signals
-    -------
-    changed()
-        `status`, `has_tip` or `fault` is different.
+    The clock is that of the cameras.
     """
 
-    changed = Signal()
+    changed = Signal()  # `status`, `has_tip` or `fault` is different
     _status_changed = Signal()
 
     def __init__(
@@ -50,6 +37,7 @@ class Streaming(QObject):
         self._reading: Job | None = None
         self._has_tip = False
         self._fault = ""
+        # It takes every image, on the thread that looks at them.
         self.stream = PoseStream(clock, lambda status: self._status_changed.emit())
 
         # Connections

@@ -23,28 +23,11 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     """Status and events of a swing as Qt signals; commands go to its `runner`.
 
     `progressed` reports solving; the verdict is an event, too.
-
-    Signals
-    -------
-    result_changed()
-        A result was accepted or revoked: another tip may be in force.
-    open_requested(Path)
-        What leads to a recorded swing is to be opened.
-
-    Parameters
-    ----------
-    folder : Path
-        Records and results are kept in it.
-
-    Attributes
-    ----------
-    follower : GuidedOperator or None
-        Leads the hand of a simulated operator, if one is to do what is requested.
-    logbook : LazyLogbook
-        All that becomes of swings is entered in it; any thread may use it.
     """
 
+    # A result was accepted or revoked: another tip may be in force.
     result_changed = Signal()
+    # Path: what leads to a recorded swing is to be opened
     open_requested = Signal(object)
 
     def __init__(
@@ -59,9 +42,9 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         address = ""
         with suppress(FileError):  # which `Settings.fault` reports
             address = server_address()
-        self.logbook = LazyLogbook(folder, address)
+        self.logbook = LazyLogbook(folder, address)  # any thread may use it
         self._archive = FolderArchive(folder, self.logbook.confirm)
-        self.follower: GuidedOperator | None = None
+        self.follower: GuidedOperator | None = None  # leads a simulated hand
         self.runner = SwingRunner(
             self.records_folder, self.archive, self, now, self.logbook
         )

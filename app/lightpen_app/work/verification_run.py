@@ -19,26 +19,9 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
     """Status and events of a verification as Qt signals; commands go to its `runner`.
 
     `progressed` reports recorded images that are read.
-
-    Signals
-    -------
-    files_changed()
-        A verification was kept in files.
-
-    Parameters
-    ----------
-    folder : Path
-        Data folder.
-    now : callable
-        Returns date and time with the time zone.
-
-    Attributes
-    ----------
-    probing_operator : ProbingOperator or None
-        Leads the hand of a simulated operator, if one is to do what is requested.
     """
 
-    files_changed = Signal()
+    files_changed = Signal()  # a verification was kept in files
 
     def __init__(
         self,
@@ -49,7 +32,7 @@ class VerificationRun(RunView[VerificationStatus, SessionEventKind]):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(VerificationStatus(), notifications, parent)
-        self.probing_operator: ProbingOperator | None = None
+        self.probing_operator: ProbingOperator | None = None  # leads a simulated hand
         self.runner = VerificationRunner(archive, folder, self, now)
 
     def on_verification(

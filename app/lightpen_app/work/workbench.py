@@ -40,44 +40,7 @@ SETTINGS, UPDATE = "settings", "update"  # causes of notifications
 
 
 class Workbench(QObject):
-    """Creates and connects the models; each page receives those it needs.
-
-    Parameters
-    ----------
-    folder : Path
-        Data folder.
-    around : SourceEnvironment, optional
-        Environment of simulated and recorded sources.
-
-    Attributes
-    ----------
-    selection : Selection
-        Selection at the station.
-    run : SwingRun
-        Running swing.
-    verification, measuring : VerificationRun
-        Of the tip by reference artefacts, and of parts by the tip.
-    live : LiveView
-        The images of the cameras.
-    camera : CameraSetup
-        Opens them.
-    files : ChosenFiles
-        Reads the files that are chosen.
-    library : LibraryWatch
-        The tips, and how they stand.
-    pens : PenFiles
-        The LED file of each pen.
-    camera_files : FilesOfCameras
-        Intrinsics, mask and rig file of each camera.
-    streaming : Streaming
-        Lets other programs follow the pen.
-    folder_watch : FolderWatch
-        Whether the folder can be written.
-    archive_writer : ArchiveWriter
-        Enters what was kept in files.
-    save_place : SavePlace
-        Folder for saving results.
-    """
+    """Creates and connects the models; each page receives those it needs."""
 
     def __init__(
         self,
@@ -93,10 +56,10 @@ class Workbench(QObject):
         self.notifications = notices = Notifications(self)
         self.selection = Selection(settings, self)
         self.run = SwingRun(folder, around.now, notices, self)
-        self.verification = VerificationRun(
+        self.verification = VerificationRun(  # of the tip by reference artefacts
             self.run.archive, folder, around.now, notices, self
         )
-        self.measuring = VerificationRun(
+        self.measuring = VerificationRun(  # of parts by the tip
             self.run.archive, folder, around.now, notices, self
         )
         self.streaming = Streaming(self.run.archive, around.clock, self)

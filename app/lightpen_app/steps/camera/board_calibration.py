@@ -41,24 +41,12 @@ class ComputedCamera:
 
 
 class BoardCalibration(QObject):
-    """Computes intrinsics, saves them, and reports the outcome.
+    """Computes intrinsics, saves them, and reports the outcome."""
 
-    Signals
-    -------
-    found_changed()
-        `found` is different.
-    remark_changed()
-        `remark` is different.
-    saved(str)
-        A camera file was written.
-    concluded(CameraTrial)
-        What became of an attempt.
-    """
-
-    found_changed = Signal()
-    remark_changed = Signal()
-    saved = Signal(str)
-    concluded = Signal(object)
+    found_changed = Signal()  # `found` is different
+    remark_changed = Signal()  # `remark` is different
+    saved = Signal(str)  # a camera file was written
+    concluded = Signal(object)  # CameraTrial: what became of an attempt
 
     def __init__(self, capture: BoardCapture, live: LiveView, parent: QObject) -> None:
         super().__init__(parent)

@@ -42,29 +42,15 @@ class SuggestedOutline:
 
 @dataclass(frozen=True, eq=False)
 class CaptureState:
-    """State of the capture.
+    """State of the capture."""
 
-    Attributes
-    ----------
-    sought : Board or None
-        Board to detect; None while no views are captured.
-    capture : Capture or None
-        The views so far; None before the first image.
-    outline : (4, 2) array or None
-        Where the board should be held next, px.
-    why_unseen : Message or None
-        Why it has not been seen for a while.
-    seen_s : float
-        When it was seen, or last asked why it is not, s on the clock of the images.
-    hashes : mapping of str to str
-        SHA-256 of the views that were kept, by name.
-    """
-
-    sought: Board | None = None
-    capture: Capture | None = None
-    outline: FloatArray | None = None
-    why_unseen: Message | None = None
+    sought: Board | None = None  # board to detect; None while no views are captured
+    capture: Capture | None = None  # the views so far; None before the first image
+    outline: FloatArray | None = None  # (4, 2), where the board should be held next, px
+    why_unseen: Message | None = None  # why it has not been seen for a while
+    # When it was seen, or last asked why it is not, s on the clock of the images.
     seen_s: float = 0.0
+    # SHA-256 of the views that were kept, by name.
     hashes: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -74,15 +60,9 @@ class CaptureState:
 
 
 class BoardCapture(QObject):
-    """Detects a board in one image after another, off the GUI thread.
+    """Detects a board in one image after another, off the GUI thread."""
 
-    Signals
-    -------
-    changed()
-        `state` is different.
-    """
-
-    changed = Signal()
+    changed = Signal()  # `state` is different
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)

@@ -111,15 +111,9 @@ PLACES = (0, 0), (2, 1), (1, 0), (1, 1), (0, 1), (2, 0)
 
 
 class BoardForm(Translated, QWidget):
-    """Kind, columns, rows and lengths of a board.
+    """Kind, columns, rows and lengths of a board."""
 
-    Signals
-    -------
-    changed()
-        The board in the fields has changed.
-    """
-
-    changed = Signal()
+    changed = Signal()  # the board in the fields has changed
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

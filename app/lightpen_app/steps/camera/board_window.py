@@ -41,18 +41,10 @@ LEAST_LIST = 28 * GRID  # px, of the views
 
 
 class BoardWindow(FittedWindow, Translated, QWidget):
-    """Leads the board through the image, calibrates, and saves the camera file.
+    """Leads the board through the image, calibrates, and saves the camera file."""
 
-    Signals
-    -------
-    saved(str)
-        A camera file was written.
-    concluded(CameraTrial)
-        The outcome of an attempt.
-    """
-
-    saved = Signal(str)
-    concluded = Signal(object)
+    saved = Signal(str)  # a camera file was written
+    concluded = Signal(object)  # CameraTrial: the outcome of an attempt
 
     CLOSING_KEYS = (Qt.Key.Key_Escape,)
 

@@ -10,14 +10,9 @@ from lightpen_app.widgets.path_field import EnterEdit
 
 
 class DeviceField(ChoiceField):
-    """A camera, taken over when it is chosen, or typed and Enter pressed.
+    """A camera, taken over when it is chosen, or typed and Enter pressed."""
 
-    Signals
-    -------
-    value_changed(str)
-        Another camera was given, or the same one again by Enter.
-    """
-
+    # Another camera was given, or the same one again by Enter.
     value_changed = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:

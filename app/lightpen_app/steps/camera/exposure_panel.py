@@ -23,20 +23,11 @@ EXPOSURE_WIDTH, GAIN_WIDTH = 100, 88  # px, at least: of "30.00 ms" and "24.0 dB
 
 
 class ExposurePanel(Translated, QFrame):
-    """The brightness of the LEDs, the settings that change it, and the advice.
+    """The brightness of the LEDs, the settings that change it, and the advice."""
 
-    Signals
-    -------
-    exposure_changed(float)
-        Asked for, us.
-    gain_changed(float)
-        Asked for, dB.
-    adjustment_requested(bool)
-        The program is to set both by the LEDs, or to stop doing so.
-    """
-
-    exposure_changed = Signal(float)
-    gain_changed = Signal(float)
+    exposure_changed = Signal(float)  # asked for, us
+    gain_changed = Signal(float)  # asked for, dB
+    # The program is to set both by the LEDs, or to stop doing so.
     adjustment_requested = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:

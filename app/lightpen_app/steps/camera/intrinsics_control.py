@@ -18,13 +18,7 @@ if TYPE_CHECKING:
 
 
 class IntrinsicsControl(QObject):
-    """Carries out requests of the intrinsics panel.
-
-    Parameters
-    ----------
-    page : QWidget
-        Parent of the calibration window.
-    """
+    """Carries out requests of the intrinsics panel."""
 
     def __init__(
         self, workbench: Workbench, panel: IntrinsicsPanel, page: QWidget

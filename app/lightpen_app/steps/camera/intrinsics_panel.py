@@ -25,20 +25,11 @@ N_FACTS = 5
 
 
 class IntrinsicsPanel(Translated, QGroupBox):
-    """Shows the file in use and the size of the live image.
+    """Shows the file in use and the size of the live image."""
 
-    Signals
-    -------
-    path_chosen(str)
-        A file is to be read.
-    calibration_requested()
-        The camera is to be calibrated by a board.
-    discovery_requested()
-        There is no such file: the camera is to be found by a swing.
-    """
-
-    path_chosen = Signal(str)
-    calibration_requested = Signal()
+    path_chosen = Signal(str)  # a file is to be read
+    calibration_requested = Signal()  # the camera is to be calibrated by a board
+    # There is no such file: the camera is to be found by a swing.
     discovery_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:

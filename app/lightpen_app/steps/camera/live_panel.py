@@ -34,14 +34,9 @@ WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 
 
 class LivePanel(Translated, QWidget):
-    """Shows images and how they come.
+    """Shows images and how they come."""
 
-    Signals
-    -------
-    camera_chosen(int)
-        The other of two cameras is to be shown, by its number from 0.
-    """
-
+    # The other of two cameras is to be shown, by its number from 0.
     camera_chosen = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:

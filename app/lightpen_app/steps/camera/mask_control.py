@@ -14,13 +14,7 @@ from lightpen_app.work.selection import Selection
 
 
 class MaskControl(QObject):
-    """Carries out requests of the stray-light panel and of the image.
-
-    Parameters
-    ----------
-    images : LivePanel
-        Live images on which the mask is drawn.
-    """
+    """Carries out requests of the stray-light panel and of the image."""
 
     def __init__(
         self,

@@ -21,18 +21,10 @@ FILES = "*.json *.yaml *.yml"
 
 
 class RigPanel(Translated, QGroupBox):
-    """Asks for a second camera, and for the rig file that belongs to it.
+    """Asks for a second camera, and for the rig file that belongs to it."""
 
-    Signals
-    -------
-    wanted(bool)
-        Whether two cameras are to look at once.
-    path_chosen(str)
-        A rig file is to be read.
-    """
-
-    wanted = Signal(bool)
-    path_chosen = Signal(str)
+    wanted = Signal(bool)  # whether two cameras are to look at once
+    path_chosen = Signal(str)  # a rig file is to be read
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -26,14 +26,9 @@ LARGEST = 100_000  # px or bytes, of a field before the range of the camera is k
 
 
 class SettingsPanel(Translated, QGroupBox):
-    """The settings of a camera, with the ranges that it offers.
+    """The settings of a camera, with the ranges that it offers."""
 
-    Signals
-    -------
-    settings_changed(CameraSettings)
-        What is requested; all else is None.
-    """
-
+    # CameraSettings: what is requested; all else is None
     settings_changed = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -51,13 +51,7 @@ class SourceSearch(QObject):
 
 
 class BesideControl(QObject):
-    """Offers files beside recorded images unless they are in use.
-
-    Parameters
-    ----------
-    panel : SourcePanel
-        Panel that offers the sources.
-    """
+    """Offers files beside recorded images unless they are in use."""
 
     def __init__(
         self, selection: Selection, files: ChosenFiles, panel: SourcePanel

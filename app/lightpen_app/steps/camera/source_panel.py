@@ -29,28 +29,14 @@ from lightpen_app.widgets.translated import Translated
 class SourcePanel(Translated, QGroupBox):
     """The choice of a source.
 
-    Parameters
-    ----------
-    is_second : bool
-        Whether it is of a second camera, whose files are those of the rig.
-
-    Signals
-    -------
-    value_changed(SourceChoice)
-    search_requested()
-        The cameras of the chosen source are to be looked for.
-    samples_requested()
-        The files of the simulated pen are to be used.
-    retry_requested()
-        Open the same source once more.
-    files_requested(FilesBeside)
-        The files beside the recorded images are to be used.
+    Of a second camera, the files are those of the rig.
     """
 
-    value_changed = Signal(object)
-    search_requested = Signal()
-    samples_requested = Signal()
-    retry_requested = Signal()
+    value_changed = Signal(object)  # SourceChoice
+    search_requested = Signal()  # the cameras of the chosen source are to be looked for
+    samples_requested = Signal()  # the files of the simulated pen are to be used
+    retry_requested = Signal()  # open the same source once more
+    # FilesBeside: the files beside the recorded images are to be used
     files_requested = Signal(object)
 
     def __init__(

@@ -16,27 +16,15 @@ from lightpen_app.widgets.translated import Translated
 
 
 class StrayLightPanel(Translated, QGroupBox):
-    """Searches the live images, and asks for a mask.
+    """Searches the live images, and asks for a mask."""
 
-    Signals
-    -------
-    found_changed()
-        `found` is different.
-    mask_requested(array)
-        Circles (M, 3) to leave out besides those that are: x, y and radius, px.
-    clear_requested()
-        Leave nothing out any more.
-    cover_requested(bool)
-        The simulated operator is to cover the LEDs, or to uncover them.
-    drawing_toggled(bool)
-        The mask is to be drawn on the image, or no longer.
-    """
-
-    found_changed = Signal()
+    found_changed = Signal()  # `found` is different
+    # array: circles (M, 3) to leave out besides those that are: x, y and radius, px
     mask_requested = Signal(object)
-    clear_requested = Signal()
+    clear_requested = Signal()  # leave nothing out any more
+    # The simulated operator is to cover the LEDs, or to uncover them.
     cover_requested = Signal(bool)
-    drawing_toggled = Signal(bool)
+    drawing_toggled = Signal(bool)  # the mask is to be drawn on the image, or no longer
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -27,21 +27,11 @@ NOTICE = "history"  # cause of what is to be read
 class ArchiveControl(QObject):
     """Carries out requests of the archive panel, one at a time.
 
-    Parameters
-    ----------
-    filter_bar : FilterBar
-        Tells which entries are saved.
-
-    Signals
-    -------
-    checked()
-        A check has ended; the panel shows what it found.
-    imported()
-        There may be other entries.
+    The filter tells which entries are saved.
     """
 
-    checked = Signal()
-    imported = Signal()
+    checked = Signal()  # a check has ended; the panel shows what it found
+    imported = Signal()  # there may be other entries
 
     def __init__(
         self, workbench: Workbench, panel: ArchivePanel, filter_bar: FilterBar

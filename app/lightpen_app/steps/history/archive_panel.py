@@ -38,19 +38,12 @@ class SaveFormat(Enum):
 
 
 class ArchivePanel(Translated, QWidget):
-    """Buttons of the archive, the last check, and the replication.
-
-    Signals
-    -------
-    check_requested(), cancel_requested()
-    import_requested()
-    save_requested(Saving)
-    """
+    """Buttons of the archive, the last check, and the replication."""
 
     check_requested = Signal()
     cancel_requested = Signal()
     import_requested = Signal()
-    save_requested = Signal(object)
+    save_requested = Signal(object)  # Saving
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

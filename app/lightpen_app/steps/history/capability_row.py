@@ -19,15 +19,9 @@ WIDEST, REACH = 10.0, 1000.0  # mm
 
 
 class CapabilityRow(Translated, QWidget):
-    """Takes a tolerance and the tip by a better instrument; shows Cg and Cgk.
+    """Takes a tolerance and the tip by a better instrument; shows Cg and Cgk."""
 
-    Signals
-    -------
-    value_changed()
-        The user chose otherwise.
-    """
-
-    value_changed = Signal()
+    value_changed = Signal()  # the user chose otherwise
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

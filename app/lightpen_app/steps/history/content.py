@@ -47,15 +47,9 @@ LEAST_TABS = 16 * GRID  # px
 
 
 class HistoryContent(Translated, QWidget):
-    """Shows the entries found, and statistics of their tips.
+    """Shows the entries found, and statistics of their tips."""
 
-    Signals
-    -------
-    checked()
-        The archive was checked.
-    """
-
-    checked = Signal()
+    checked = Signal()  # the archive was checked
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)

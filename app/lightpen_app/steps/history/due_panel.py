@@ -23,19 +23,9 @@ class DuePanel(Translated, QWidget):
     """Shows the current tips with their due dates, by a rule that can be changed.
 
     Where a password guards the limits, it is changed with them, at Start.
-
-    Parameters
-    ----------
-    now : callable
-        Returns the date and time that they are due by.
-
-    Signals
-    -------
-    rule_changed(DueRule)
-        The user chose another rule.
     """
 
-    rule_changed = Signal(object)
+    rule_changed = Signal(object)  # DueRule: the user chose another rule
 
     def __init__(
         self, now: Callable[[], datetime], parent: QWidget | None = None

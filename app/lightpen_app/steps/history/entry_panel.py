@@ -36,20 +36,13 @@ SHORT = 12  # characters of a hash
 
 
 class EntryPanel(Translated, QWidget):
-    """Shows an entry with the notes on it; takes a note, or puts its tip in force.
+    """Shows an entry with the notes on it; takes a note, or puts its tip in force."""
 
-    Signals
-    -------
-    note_given(Written, str)
-        A note on an entry.
-    restore_requested(Written, str, Signature or None)
-        The tip of an entry shall be in force again, for a reason.
-    paper_requested(Written)
-        The record on paper of an entry's tip shall be shown.
-    """
-
-    note_given = Signal(object, str)
+    note_given = Signal(object, str)  # Written, str: a note on an entry
+    # Written, str, Signature or None: the tip of an entry shall be in force again, for
+    # a reason
     restore_requested = Signal(object, str, object)
+    # Written: the record on paper of an entry's tip shall be shown
     paper_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -24,15 +24,9 @@ LEAST_CHOICE = 12 * GRID
 
 
 class FilterBar(Translated, QWidget):
-    """Four lists and two days.
+    """Four lists and two days."""
 
-    Signals
-    -------
-    value_changed()
-        Other entries are to be shown.
-    """
-
-    value_changed = Signal()
+    value_changed = Signal()  # other entries are to be shown
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -45,15 +45,10 @@ UNREAD = "\u2026"
 
 
 class HistoryModel(TitledModel):
-    """One row for each entry; visible rows are read.
-
-    Signals
-    -------
-    block_wanted(int)
-        Number of the first line of a block that is to be shown.
-    """
+    """One row for each entry; visible rows are read."""
 
     n_columns = WORDS + 1
+    # Number of the first line of a block that is to be shown.
     block_wanted = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -146,17 +141,11 @@ class HistoryModel(TitledModel):
 
 
 class HistoryTable(Translated, RowTable):
-    """Shows the entries; the current one is reported once read.
+    """Shows the entries; the current one is reported once read."""
 
-    Signals
-    -------
-    block_wanted(int)
-        Number of the first line of a block that is to be shown.
-    selection_changed()
-        Other lines are current or selected, or were read by now.
-    """
-
+    # Number of the first line of a block that is to be shown.
     block_wanted = Signal(int)
+    # Other lines are current or selected, or were read by now.
     selection_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -31,52 +31,27 @@ MOST_WAITING = 3  # blocks; of those that were scrolled past, none is read
 
 @dataclass(frozen=True)
 class FirstEntries:
-    """The first data read for a filter.
-
-    Attributes
-    ----------
-    home : str
-        Own chain.
-    first : tuple of Line
-        The newest.
-    delivery : ReplicationState or None
-        How far the server has what was entered here; None if there is no server.
-    """
+    """The first data read for a filter."""
 
     wanted: EntryFilter
-    home: str
+    home: str  # own chain
     n_lines: int
-    first: tuple[Line, ...]
+    first: tuple[Line, ...]  # the newest
     names: KnownNames
+    # How far the server has what was entered here; None if there is no server.
     delivery: ReplicationState | None = None
 
 
 class HistoryReader(QObject):
-    """Reads entries by filter; results for an earlier filter are discarded.
+    """Reads entries by filter; results for an earlier filter are discarded."""
 
-    Signals
-    -------
-    opened(Opening)
-    block_read(int, object)
-        Number of the first line of the block, and its lines.
-    block_passed(int)
-        A block that is not read any more: others are wanted more.
-    trend_read(Trend)
-    remarks_read(object)
-        Entries that concern the one asked about.
-    due_read(object)
-        The current tips, each a `DueTip`.
-    failed(str)
-        A sentence to be read.
-    """
-
-    opened = Signal(object)
-    block_read = Signal(int, object)
-    block_passed = Signal(int)
-    trend_read = Signal(object)
-    messages_read = Signal(object)
-    due_read = Signal(object)
-    failed = Signal(str)
+    opened = Signal(object)  # Opening
+    block_read = Signal(int, object)  # number of the first line, and the lines
+    block_passed = Signal(int)  # a block that is not read: others are wanted more
+    trend_read = Signal(object)  # Trend
+    messages_read = Signal(object)  # entries that concern the one asked about
+    due_read = Signal(object)  # the current tips, each a `DueTip`
+    failed = Signal(str)  # a sentence to be read
 
     def __init__(self, logbook: LazyLogbook, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -37,17 +37,11 @@ class SelectionPanel(Translated, QWidget):
     """Compares two entries, and shows the scatter of all selected ones.
 
     With fewer than two selected, the scatter is that of the whole trend.
-
-    Signals
-    -------
-    adjust_requested()
-        Improved LED and camera files from the selected swings are requested.
-    report_requested()
-        The report of the repeatability is requested.
     """
 
+    # Improved LED and camera files from the selected swings are requested.
     adjust_requested = Signal()
-    report_requested = Signal()
+    report_requested = Signal()  # the report of the repeatability is requested
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -22,12 +22,8 @@ NO_MERGING, DIAMETER, TIP = -1, 1, 2
 class DraftEdit(QUndoCommand):
     """Puts a draft in place of another.
 
-    What is typed into the same field, letter by letter, is one change.
-
-    Parameters
-    ----------
-    put : callable
-        Shows a draft.
+    What is typed into the same field, letter by letter, is one change. ``put`` shows a
+    draft.
     """
 
     def __init__(
@@ -62,18 +58,11 @@ class DraftEdit(QUndoCommand):
 
 @dataclass(frozen=True)
 class LedState:
-    """Content of the table and the file in use.
-
-    Attributes
-    ----------
-    opened : PenDraft
-        The table without changes.
-    invalid_file : Path or None
-        The file that it was opened from, where that cannot be used.
-    """
+    """Content of the table and the file in use."""
 
     draft: PenDraft = field(default_factory=PenDraft)
-    opened: PenDraft = field(default_factory=PenDraft)
+    opened: PenDraft = field(default_factory=PenDraft)  # the table without changes
+    # The file that it was opened from, where that cannot be used.
     invalid_file: Path | None = None
     in_use: PenFile | None = None
 
@@ -109,15 +98,9 @@ class LedState:
 
 
 class LedDraft(QObject):
-    """Holds the state of the LED table; changes of it can be undone.
+    """Holds the state of the LED table; changes of it can be undone."""
 
-    Signals
-    -------
-    changed()
-        `state` is different.
-    """
-
-    changed = Signal()
+    changed = Signal()  # `state` is different
 
     def __init__(self, selection: Selection, parent: QObject) -> None:
         super().__init__(parent)

@@ -32,15 +32,9 @@ T = TypeVar("T")
 
 
 class LedFileControl(QObject):
-    """Carries out requests of the file panel; asks before edits are lost.
+    """Carries out requests of the file panel; asks before edits are lost."""
 
-    Signals
-    -------
-    status_changed(str)
-        What was done, for the status line.
-    """
-
-    status_changed = Signal(str)
+    status_changed = Signal(str)  # what was done, for the status line
 
     def __init__(
         self,

@@ -23,29 +23,17 @@ from lightpen_app.work.job import Job
 
 
 class LedFilePanel(Translated, QWidget):
-    """Path and buttons, with messages and questions about the file.
+    """Path and buttons, with messages and questions about the file."""
 
-    Signals
-    -------
-    path_chosen(str)
-        A file is to be opened.
-    units_chosen(str, str)
-        The path of a file that does not say its units, and the units.
-    save_chosen(Path)
-        The LEDs are to be saved there; a file that exists may be replaced.
-    samples_requested()
-        The file of the simulated pen is to be used.
-    exchange_requested(pair of int)
-        Two LEDs, by number, are to be exchanged.
-    discovery_requested()
-        There is no such file: the LEDs are to be found by a swing.
-    """
-
-    path_chosen = Signal(str)
+    path_chosen = Signal(str)  # a file is to be opened
+    # The path of a file that does not say its units, and the units.
     units_chosen = Signal(str, str)
+    # Path: the LEDs are to be saved there; a file that exists may be replaced
     save_chosen = Signal(object)
-    samples_requested = Signal()
+    samples_requested = Signal()  # the file of the simulated pen is to be used
+    # pair of int: two LEDs, by number, are to be exchanged
     exchange_requested = Signal(object)
+    # There is no such file: the LEDs are to be found by a swing.
     discovery_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -140,10 +128,7 @@ class LedFilePanel(Translated, QWidget):
     ) -> None:
         """Ask before a loss; ``agreed`` is called on consent.
 
-        Parameters
-        ----------
-        words : callable
-            Returns the question, and what agrees to it.
+        ``words`` returns the question, and what agrees to it.
         """
         self._agreed = agreed
         self._question.set_words(lambda: Question(*words(), self.tr("Cancel")))

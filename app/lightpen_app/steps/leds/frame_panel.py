@@ -23,18 +23,10 @@ LONG = (Rule.LINE, Rule.ORIGIN, Rule.AXIS, Rule.PLANE)  # that have a deviation
 
 
 class FramePanel(Translated, QGroupBox):
-    """Draws a pen and lists the rules of its frame.
+    """Draws a pen and lists the rules of its frame."""
 
-    Signals
-    -------
-    led_chosen(int)
-        The LED of this number was clicked.
-    move_requested()
-        The coordinates are to be put into the pen frame.
-    """
-
-    led_chosen = Signal(int)
-    move_requested = Signal()
+    led_chosen = Signal(int)  # the LED of this number was clicked
+    move_requested = Signal()  # the coordinates are to be put into the pen frame
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

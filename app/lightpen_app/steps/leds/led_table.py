@@ -35,17 +35,10 @@ ANYWHERE = QModelIndex()
 
 
 class LedTable(Translated, QTableView):
-    """Shows a draft; cells without a number, and LEDs that do not fit, are marked.
+    """Shows a draft; cells without a number, and LEDs that do not fit, are marked."""
 
-    Signals
-    -------
-    value_changed(PenDraft)
-        The user typed into a cell.
-    led_chosen(int)
-        The number of the LED whose row is now current; 0 for none.
-    """
-
-    value_changed = Signal(object)
+    value_changed = Signal(object)  # PenDraft: the user typed into a cell
+    # The number of the LED whose row is now current; 0 for none.
     led_chosen = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:

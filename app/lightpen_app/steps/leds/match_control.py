@@ -21,14 +21,10 @@ PERIOD_MS = 1000
 
 
 class PenWatch(QObject):
-    """Compares a pen with the detections, at most once a second.
+    """Compares a pen with the detections, at most once a second."""
 
-    Signals
-    -------
-    value_changed(PenMatch)
-        How the pen fits the views so far; None when that must be found out again.
-    """
-
+    # PenMatch: how the pen fits the views so far; None when that must be found out
+    # again
     value_changed = Signal(object)
 
     def __init__(self, parent: QObject | None = None) -> None:
@@ -109,13 +105,7 @@ class PenWatch(QObject):
 
 
 class MatchControl(QObject):
-    """Shows live images in its panel, with how the pen of the table fits them.
-
-    Attributes
-    ----------
-    watch : PenWatch
-        Tells how it fits.
-    """
+    """Shows live images in its panel, with how the pen of the table fits them."""
 
     def __init__(
         self,

@@ -31,15 +31,9 @@ from lightpen_app.work.live_view import DisplayedImage
 
 
 class FixableMessage(Translated, QWidget):
-    """Shows a remark; hidden while there is none.
+    """Shows a remark; hidden while there is none."""
 
-    Signals
-    -------
-    mend_requested(Finding)
-        The button was pressed.
-    """
-
-    mend_requested = Signal(object)
+    mend_requested = Signal(object)  # Finding: the button was pressed
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -92,19 +86,9 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 
 
 class MatchPanel(Translated, QGroupBox):
-    """Shows images with numbered LEDs and the match of each.
+    """Shows images with numbered LEDs and the match of each."""
 
-    Parameters
-    ----------
-    foot : QWidget
-        Stands below all of it.
-
-    Signals
-    -------
-    mend_requested(Finding)
-        The table is to be mended as this finding says.
-    """
-
+    # Finding: the table is to be mended as this finding says
     mend_requested = Signal(object)
 
     def __init__(self, foot: QWidget, parent: QWidget | None = None) -> None:

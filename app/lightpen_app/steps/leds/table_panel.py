@@ -29,26 +29,11 @@ class Changes(Enum):
 
 
 class LedTablePanel(Translated, QGroupBox):
-    """Shows a draft and lets it be edited.
+    """Shows a draft and lets it be edited."""
 
-    Parameters
-    ----------
-    undo : QWidget
-        Put below its buttons.
-
-    Signals
-    -------
-    value_changed(PenDraft)
-        The user changed it.
-    discard_requested()
-        The changes are to be given up.
-    led_chosen(int)
-        The number of the LED that is now current, 0 for none.
-    """
-
-    value_changed = Signal(object)
-    discard_requested = Signal()
-    led_chosen = Signal(int)
+    value_changed = Signal(object)  # PenDraft: the user changed it
+    discard_requested = Signal()  # the changes are to be given up
+    led_chosen = Signal(int)  # the number of the LED that is now current, 0 for none
 
     def __init__(self, undo: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -18,22 +18,11 @@ if TYPE_CHECKING:
 
 
 class DetailTabs(QTabWidget):
-    """Shows the solution of a swing in the visible tab; hidden tabs are filled lazily.
+    """Shows the solution of a swing; hidden tabs are filled when they are shown."""
 
-    Parameters
-    ----------
-    place : SavePlace
-        Folder for saved plots.
-
-    Signals
-    -------
-    images_made(ImagesPanel)
-        The tab of the images is seen for the first time.
-    saved(str), failed(str)
-        Message on a saved plot, or on a failure to save it.
-    """
-
+    # ImagesPanel: the tab of the images is seen for the first time
     images_made = Signal(object)
+    # Message on a saved plot, or on a failure to save it.
     saved = Signal(str)
     failed = Signal(str)
 

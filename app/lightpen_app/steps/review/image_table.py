@@ -87,17 +87,10 @@ class ImageModel(TitledModel):
 
 
 class ImageTable(Translated, RowTable):
-    """Shows the images; current item and selection survive changes.
+    """Shows the images; current item and selection survive changes."""
 
-    Signals
-    -------
-    number_changed(int)
-        Of the current image.
-    selection_changed()
-        Other images are selected, or what they are has changed.
-    """
-
-    number_changed = Signal(int)
+    number_changed = Signal(int)  # of the current image
+    # Other images are selected, or what they are has changed.
     selection_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -52,17 +52,12 @@ class ImagesPanel(Translated, QWidget):
     """Shows the images of a solution; requests to exclude or include some.
 
     Delete excludes the selected images, Insert includes them.
-
-    Signals
-    -------
-    take_out_requested(list of int), put_back_requested(list of int)
-        Numbers of images.
-    saved(str), failed(str)
-        Message on a saved plot, or on a failure to save it.
     """
 
+    # list of int: numbers of images
     take_out_requested = Signal(list)
     put_back_requested = Signal(list)
+    # Message on a saved plot, or on a failure to save it.
     saved = Signal(str)
     failed = Signal(str)
 

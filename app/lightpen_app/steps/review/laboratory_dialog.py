@@ -18,14 +18,9 @@ N_NEEDED, N_FIELDS = 4, 7  # the others may be empty
 
 
 class LaboratoryDialog(FittedWindow, Translated, QDialog):
-    """Dialog for the laboratory; name, e-mail address, city and country are required.
+    """Dialog for the laboratory; name, e-mail, city and country are required."""
 
-    Signals
-    -------
-    given(Laboratory)
-    """
-
-    given = Signal(object)
+    given = Signal(object)  # Laboratory
 
     def __init__(self, known: Laboratory | None, parent: QWidget | None = None) -> None:
         super().__init__(parent)

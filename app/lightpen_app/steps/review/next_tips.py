@@ -26,15 +26,9 @@ LONGEST = 12  # characters of a tip on its button
 
 
 class NextTipsRow(Translated, QWidget):
-    """Shows other tips with their status; hidden without any.
+    """Shows other tips with their status; hidden without any."""
 
-    Signals
-    -------
-    chosen(NextTip)
-        It is to be calibrated.
-    """
-
-    chosen = Signal(object)
+    chosen = Signal(object)  # NextTip: it is to be calibrated
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -102,19 +96,9 @@ class NextTipsRow(Translated, QWidget):
 
 
 class NextTipsControl(QObject):
-    """Finds the other tips of a pen and selects the requested one.
+    """Finds the other tips of a pen and selects the requested one."""
 
-    Parameters
-    ----------
-    row : NextTipsRow
-        Shows them.
-
-    Signals
-    -------
-    chosen()
-        The station is prepared for another tip; the swing before is left.
-    """
-
+    # The station is prepared for another tip; the swing before is left.
     chosen = Signal()
 
     def __init__(

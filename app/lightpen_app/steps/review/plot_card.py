@@ -29,24 +29,13 @@ class NamedPicture(NamedTuple):
 class PlotCard(Translated, QFrame):
     """A framed plot with a menu: enlarge, copy, save.
 
-    Parameters
-    ----------
-    file_stem : str
-        Name that a saved file is given at first.
-
-    Signals
-    -------
-    enlarge_toggled(bool)
-        The plot shall fill the place of its neighbours, too, or no longer.
-    saved(str)
-        A sentence that says where.
-    failed(str)
-        A sentence to be read: nothing was saved.
+    ``file_stem`` is offered as the name of a saved file.
     """
 
+    # The plot shall fill the place of its neighbours, too, or no longer.
     enlarge_toggled = Signal(bool)
-    saved = Signal(str)
-    failed = Signal(str)
+    saved = Signal(str)  # a sentence that says where
+    failed = Signal(str)  # a sentence to be read: nothing was saved
 
     def __init__(
         self, plot: Plot, file_stem: str, parent: QWidget | None = None
@@ -153,15 +142,9 @@ class PlotCard(Translated, QFrame):
 
 
 class PlotGrid(QWidget):
-    """Plots side by side, of which one can be enlarged to fill the place of all.
+    """Plots side by side, of which one can be enlarged to fill the place of all."""
 
-    Signals
-    -------
-    saved(str), failed(str)
-        Of any of the cards.
-    """
-
-    saved = Signal(str)
+    saved = Signal(str)  # as of any of the cards
     failed = Signal(str)
 
     def __init__(

@@ -32,14 +32,9 @@ SETTLED = 1e-5  # mm; later steps of the iteration cannot be distinguished on a 
 
 
 class PlotsPanel(Translated, QWidget):
-    """Base of the panels: shows plots of a solution.
+    """Base of the panels: shows plots of a solution."""
 
-    Signals
-    -------
-    saved(str), failed(str)
-        Message on a saved plot, or on a failure to save it.
-    """
-
+    # Message on a saved plot, or on a failure to save it.
     saved = Signal(str)
     failed = Signal(str)
 

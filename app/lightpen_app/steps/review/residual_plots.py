@@ -26,16 +26,10 @@ class MisfitPlot(Plot):
     Images that do not take part are crosses. Where they are far off, they are drawn at
     the upper edge, so that the others can still be distinguished. A line above those
     that take part can be drawn down to the worse half of them, to take them out.
-
-    Signals
-    -------
-    number_chosen(int)
-        Of the image that was clicked.
-    limit_set(list of int)
-        Numbers of the images above which the line was left.
     """
 
-    number_chosen = Signal(int)
+    number_chosen = Signal(int)  # of the image that was clicked
+    # list of int: numbers of the images above which the line was left
     limit_set = Signal(list)
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
@@ -222,10 +216,7 @@ class SquarePlot(Plot):
 class DotPlot(SquarePlot):
     """Dots of (x, y), such as residuals along the axes of the image.
 
-    Parameters
-    ----------
-    names : pair of str
-        Columns of the CSV file.
+    ``names`` are the columns of the CSV file.
     """
 
     def __init__(
@@ -319,10 +310,7 @@ class ArrowPlot(SquarePlot):
 class Histogram(Plot):
     """Histogram of the residuals with the fitted normal curve.
 
-    Parameters
-    ----------
-    name : str
-        Column of the CSV file that holds the middles of the bins.
+    ``name`` is the column of the CSV file that holds the middles of the bins.
     """
 
     def __init__(self, axes: Axes, name: str, parent: QWidget | None = None) -> None:

@@ -18,19 +18,12 @@ ROOM = 1.5  # times the extent of the pen, that is shown at first
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Residuals of an image.
+    """Residuals of an image."""
 
-    Attributes
-    ----------
-    points, residuals : (N, 2) array
-        px.
-    scale : float
-        Magnification of the residuals.
-    """
-
+    # (N, 2), px
     points: FloatArray
     residuals: FloatArray
-    scale: float = 1.0
+    scale: float = 1.0  # magnification of the residuals
 
 
 NO_ARROWS = Arrows(np.zeros((0, 2)), np.zeros((0, 2)))

@@ -30,23 +30,11 @@ DrawPlots: TypeAlias = "Callable[[], Sequence[NamedPicture]]"
 class ResultExport(QObject):
     """Carries out requests of the result tools.
 
-    Parameters
-    ----------
-    draw_plots : callable
-        Returns all plots as pictures; only the page can draw them.
-    page : QWidget
-        Parent of dialogs.
-
-    Signals
-    -------
-    message_sent(str)
-        What was done.
-    failed(str)
-        The sentence why something was not.
+    ``draw_plots`` returns all plots as pictures; only the page can draw them.
     """
 
-    message_sent = Signal(str)
-    failed = Signal(str)
+    message_sent = Signal(str)  # what was done
+    failed = Signal(str)  # the sentence why something was not
 
     def __init__(
         self, run: SwingRun, place: SavePlace, draw_plots: DrawPlots, page: QWidget

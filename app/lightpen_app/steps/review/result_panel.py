@@ -33,16 +33,10 @@ DIAL_HEIGHT = 18 * GRID  # px
 
 @dataclass(frozen=True, eq=False)
 class ReviewedResult:
-    """A solved swing with the result that was current before.
-
-    Attributes
-    ----------
-    names : Names
-        Names of the swing.
-    """
+    """A solved swing with the result that was current before."""
 
     solution: Solution
-    names: Names
+    names: Names  # names of the swing
     assessment: SwingAssessment
 
     @property

@@ -26,26 +26,13 @@ EXPORTS = (ALL, *(Export((each,)) for each in FORMATS), PLOTS)
 
 
 class ResultTools(Translated, QWidget):
-    """Three buttons; that to save has a menu.
+    """Three buttons; that to save has a menu."""
 
-    Signals
-    -------
-    folder_requested()
-        The folder of the swing is to be opened.
-    copy_requested()
-        The tip is to be put on the clipboard.
-    save_requested(Export)
-    paper_requested()
-        The record on paper is to be shown.
-    press_requested()
-        The tip is to be swung with firm pressure.
-    """
-
-    folder_requested = Signal()
-    copy_requested = Signal()
-    save_requested = Signal(object)
-    paper_requested = Signal()
-    press_requested = Signal()
+    folder_requested = Signal()  # the folder of the swing is to be opened
+    copy_requested = Signal()  # the tip is to be put on the clipboard
+    save_requested = Signal(object)  # Export
+    paper_requested = Signal()  # the record on paper is to be shown
+    press_requested = Signal()  # the tip is to be swung with firm pressure
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

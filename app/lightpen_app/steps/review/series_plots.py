@@ -53,10 +53,7 @@ class NamedPlot(Plot):
 class BarPlot(NamedPlot):
     """A group of bars for each label, one bar a series, in their order.
 
-    Parameters
-    ----------
-    label_column : str
-        Name of the column of labels in the CSV file.
+    ``label_column`` is the column of labels in the CSV file.
     """
 
     def __init__(
@@ -134,12 +131,7 @@ class BarPlot(NamedPlot):
 class LinePlot(NamedPlot):
     """Values with marks, joined by lines, over steps.
 
-    Parameters
-    ----------
-    curves : sequence of Curve
-        Curves, at most three.
-    x_column : str
-        Name of the column of x in the CSV file.
+    At most three; ``x_column`` is the column of x in the CSV file.
     """
 
     def __init__(

@@ -17,29 +17,15 @@ BLANK = ("", "", "")
 
 @dataclass(frozen=True)
 class TipValue:
-    """A point with uncertainty, and its reference value.
+    """A point with uncertainty, and its reference value."""
 
-    Attributes
-    ----------
-    tip : tuple of three floats
-        mm.
-    uncertainty : tuple of three floats
-        U (k = 2) along x, y and z, mm.
-    previous, nominal : tuple of str
-        Previous result and centre by design, mm; empty without one.
-    change, deviation : tuple of str
-        The tip less these: the change with its U (k = 2) in um, the deviation in mm.
-    since : str
-        Date of the previous result.
-    """
-
-    tip: tuple[float, float, float]
-    uncertainty: tuple[float, float, float]
-    previous: tuple[str, ...] = ()
-    change: tuple[str, ...] = ()
-    nominal: tuple[str, ...] = ()
-    deviation: tuple[str, ...] = ()
-    since: str = ""
+    tip: tuple[float, float, float]  # mm
+    uncertainty: tuple[float, float, float]  # U (k = 2) along x, y and z, mm
+    previous: tuple[str, ...] = ()  # result, mm; empty without one
+    change: tuple[str, ...] = ()  # of the tip since then, with its U (k = 2), um
+    nominal: tuple[str, ...] = ()  # centre by design, mm; empty without one
+    deviation: tuple[str, ...] = ()  # of the tip from it, mm
+    since: str = ""  # date of the previous result
 
     def comparisons(self) -> tuple[tuple[str, ...], ...]:
         """Return the columns beside tip and U."""

@@ -35,22 +35,15 @@ OF_FILES = (
 
 @dataclass(frozen=True)
 class ReviewPageState:
-    """View state of the page without the solution.
-
-    Attributes
-    ----------
-    takes_reason : bool
-        Whether the tip can be accepted with a reason only.
-    why_locked : str
-        Why images cannot be taken out or put back; what follows says likewise why a
-        button cannot be pressed.
-    """
+    """View state of the page without the solution."""
 
     banner: State
     remarks: tuple[StatusMessage, ...]
     main: MainAction
     is_accepted: bool
-    takes_reason: bool
+    takes_reason: bool  # whether the tip can be accepted with a reason only
+    # Why images cannot be taken out or put back; what follows says likewise why a
+    # button cannot be pressed.
     why_locked: str
     why_not_more: str
     why_not_repeated: str

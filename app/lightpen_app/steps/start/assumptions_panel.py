@@ -54,15 +54,9 @@ KINDS = (
 
 
 class AssumptionsDialog(FittedWindow, Translated, QDialog):
-    """Default uncertainties for what camera and LED files do not state.
+    """Default uncertainties for what camera and LED files do not state."""
 
-    Signals
-    -------
-    value_changed()
-        The user chose others; they are in force at once.
-    """
-
-    value_changed = Signal()
+    value_changed = Signal()  # the user chose others; they are in force at once
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -188,15 +182,9 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
 
 
 class AssumptionsPanel(Translated, QGroupBox):
-    """Opens the default uncertainties of a station.
+    """Opens the default uncertainties of a station."""
 
-    Signals
-    -------
-    value_changed()
-        The user chose other assumptions.
-    """
-
-    value_changed = Signal()
+    value_changed = Signal()  # the user chose other assumptions
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -19,14 +19,9 @@ class BarcodeListener(QObject):
     Keys are held back for an imperceptible moment and forwarded unless they are a
     barcode. Their time is that of the windowing system, so keys that waited for a busy
     program are not mistaken for a scanner's.
-
-    Signals
-    -------
-    scanned(str)
-        The characters of a barcode.
     """
 
-    scanned = Signal(str)
+    scanned = Signal(str)  # the characters of a barcode
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -17,15 +17,9 @@ from lightpen_app.work.notifications import Notifications
 
 
 class DataFolderPanel(Translated, QGroupBox):
-    """Shows and opens the data folder, and other windows that use it.
+    """Shows and opens the data folder, and other windows that use it."""
 
-    Signals
-    -------
-    change_requested()
-        Another one is to be chosen.
-    """
-
-    change_requested = Signal()
+    change_requested = Signal()  # another one is to be chosen
 
     def __init__(
         self, folder: Path, notifications: Notifications, parent: QWidget | None = None

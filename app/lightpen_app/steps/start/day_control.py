@@ -26,18 +26,10 @@ N_MISFITS = 10  # images by which the LEDs are judged
 
 
 class DayControl(QObject):
-    """Shows tips and readiness in the view; chooses tips.
+    """Shows tips and readiness in the view; chooses tips."""
 
-    Signals
-    -------
-    changed()
-        `main_action` may be different.
-    step_requested(str)
-        The step of this key is to be shown.
-    """
-
-    changed = Signal()
-    step_requested = Signal(str)
+    changed = Signal()  # `main_action` may be different
+    step_requested = Signal(str)  # the step of this key is to be shown
 
     def __init__(
         self, workbench: Workbench, library: LibraryControl, view: DayView

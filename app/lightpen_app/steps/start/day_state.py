@@ -46,15 +46,9 @@ class TipRow:
 
 @dataclass(frozen=True)
 class ReadinessItem:
-    """One precondition of a swing.
+    """One precondition of a swing."""
 
-    Attributes
-    ----------
-    step : str
-        Key of the step where it is put right.
-    """
-
-    step: str
+    step: str  # key of the step where it is put right
     message: StatusMessage
 
     @property
@@ -65,18 +59,11 @@ class ReadinessItem:
 
 @dataclass(frozen=True)
 class CameraState:
-    """State of the live images.
-
-    Attributes
-    ----------
-    rate : float or None
-        Images received per second.
-    misfit : float or None
-        RMS residual of the LEDs in the last images, px; None where no pen is seen.
-    """
+    """State of the live images."""
 
     connection: Connection
-    rate: float | None = None
+    rate: float | None = None  # images received per second
+    # RMS residual of the LEDs in the last images, px; None where no pen is seen.
     misfit: float | None = None
 
 

@@ -31,12 +31,7 @@ LEAST_HEIGHT = 22 * GRID  # px, of the table
 
 
 class SearchEdit(QLineEdit):
-    """A field of which Enter takes what is typed; empty, it leaves Enter to the page.
-
-    Signals
-    -------
-    entered(str)
-    """
+    """A field whose Enter takes what is typed; empty, it leaves Enter to the page."""
 
     entered = Signal(str)
 
@@ -51,12 +46,7 @@ class SearchEdit(QLineEdit):
 
 
 class TemperatureField(NumberField):
-    """A temperature of the pen, or the lowest value for none; Enter enters it.
-
-    Signals
-    -------
-    entered()
-    """
+    """A temperature of the pen, or the lowest value for none; Enter enters it."""
 
     entered = Signal()
 
@@ -77,32 +67,14 @@ class TemperatureField(NumberField):
 
 
 class DayView(Translated, QWidget):
-    """Daily settings; the station setup is a view of its own.
+    """Daily settings; the station setup is a view of its own."""
 
-    Signals
-    -------
-    tip_chosen(str, str)
-        Pen and tip of the row that was chosen.
-    tip_entered(str)
-        What was typed and entered.
-    temperature_entered(object)
-        Temperature of the pen, degrees Celsius, or None if not measured.
-    step_requested(str)
-        Where something is put right.
-    swing_requested(), setup_requested()
-        The plain buttons.
-
-    Attributes
-    ----------
-    side : QBoxLayout
-        Beside the table: the last result.
-    """
-
-    tip_chosen = Signal(str, str)
-    tip_entered = Signal(str)
+    tip_chosen = Signal(str, str)  # pen and tip of the row that was chosen
+    tip_entered = Signal(str)  # what was typed and entered
+    # Temperature of the pen, degrees Celsius, or None if not measured.
     temperature_entered = Signal(object)
-    step_requested = Signal(str)
-    swing_requested = Signal()
+    step_requested = Signal(str)  # where something is put right
+    swing_requested = Signal()  # the plain buttons
     setup_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -141,6 +113,7 @@ class DayView(Translated, QWidget):
         left = vertical_layout(self._columns, stretch=3)
         horizontal_layout(left, (self._search, 1), self._which)
         fill(left, (self._table, 1), self._details)
+        # The last result, beside the table.
         self.side = vertical_layout(self._columns, spacing=2 * GRID, stretch=2)
         horizontal_layout(layout, self._setup, 1, self._swing)
 

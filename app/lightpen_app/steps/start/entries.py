@@ -17,18 +17,10 @@ TYPING_PAUSE_MS = 400  # after which what was typed is taken over
 
 
 class EntryPresenter(QObject):
-    """Fills the fields from the selection and applies entries.
+    """Fills the fields from the selection and applies entries."""
 
-    Signals
-    -------
-    edited()
-        Something is being typed; it may be unfinished.
-    tip_named()
-        Another tip was named.
-    """
-
-    edited = Signal()
-    tip_named = Signal()
+    edited = Signal()  # something is being typed; it may be unfinished
+    tip_named = Signal()  # another tip was named
 
     def __init__(
         self,

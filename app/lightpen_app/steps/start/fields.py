@@ -33,16 +33,9 @@ class ItemChoice:
 
 
 class ItemButton(Translated, PushButton):
-    """Opens the list; it ends with the way to the library.
+    """Opens the list; it ends with the way to the library."""
 
-    Signals
-    -------
-    chosen(str)
-        The id of an item.
-    library_requested()
-    """
-
-    chosen = Signal(str)
+    chosen = Signal(str)  # the id of an item
     library_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -93,21 +86,11 @@ ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
 
 class StationField(ChoiceField):
-    """A list of the known stations in which another name can be typed.
+    """A list of the known stations in which another name can be typed."""
 
-    Signals
-    -------
-    value_edited(str)
-        The name that is being typed; it may be unfinished.
-    value_changed(str)
-        The name is finished, or chosen from the list.
-    entered()
-        It was finished by the Enter key.
-    """
-
-    value_edited = Signal(str)
-    value_changed = Signal(str)
-    entered = Signal()
+    value_edited = Signal(str)  # the name that is being typed; it may be unfinished
+    value_changed = Signal(str)  # the name is finished, or chosen from the list
+    entered = Signal()  # it was finished by the Enter key
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -179,15 +162,9 @@ AXES = ("x", "y", "z")
 
 
 class PointField(Translated, QWidget):
-    """A box to check for the point of the LED file, else three coordinates in mm.
+    """A box to check for the point of the LED file, else three coordinates in mm."""
 
-    Signals
-    -------
-    value_changed()
-        The user chose another point.
-    """
-
-    value_changed = Signal()
+    value_changed = Signal()  # the user chose another point
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -44,33 +44,17 @@ LARGEST_BALL = 100.0  # mm
 
 
 class NamesForm(Translated, QWidget):
-    """Station, operator and items under calibration.
+    """Station, operator and items under calibration."""
 
-    Signals
-    -------
-    value_edited()
-        Something is being typed; it may be unfinished.
-    value_changed()
-        A field other than the station is finished.
-    station_changed(str)
-        The name of the station is finished, or chosen from the list.
-    station_entered()
-        It was finished by the Enter key.
-    nominal_tip_changed()
-        The nominal centre of the tip is another one.
-    item_chosen(ItemKind, str)
-        A pen, tip or cone was chosen from its list.
-    library_requested(ItemKind)
-        The tip library shall be shown.
-    """
-
-    value_edited = Signal()
-    value_changed = Signal()
+    value_edited = Signal()  # something is being typed; it may be unfinished
+    value_changed = Signal()  # a field other than the station is finished
+    # The name of the station is finished, or chosen from the list.
     station_changed = Signal(str)
-    station_entered = Signal()
-    nominal_tip_changed = Signal()
+    station_entered = Signal()  # it was finished by the Enter key
+    nominal_tip_changed = Signal()  # the nominal centre of the tip is another one
+    # ItemKind, str: a pen, tip or cone was chosen from its list
     item_chosen = Signal(object, str)
-    library_requested = Signal(object)
+    library_requested = Signal(object)  # ItemKind: the tip library shall be shown
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -233,18 +217,10 @@ class NamesForm(Translated, QWidget):
 
 
 class LimitsForm(Translated, QGroupBox):
-    """Limits that end a swing.
+    """Limits that end a swing."""
 
-    Signals
-    -------
-    value_changed()
-        The user chose other limits.
-    all_requested()
-        All limits of the station shall be shown.
-    """
-
-    value_changed = Signal()
-    all_requested = Signal()
+    value_changed = Signal()  # the user chose other limits
+    all_requested = Signal()  # all limits of the station shall be shown
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -41,20 +41,10 @@ NOTICE = "start"  # cause of what is to be read
 class InterruptedControl(QObject):
     """Finds interrupted work and resumes, shows, closes or discards it.
 
-    Parameters
-    ----------
-    panel : InterruptedPanel
-        List of the interrupted swings.
-    settle : callable
-        Takes over what is being typed on the page.
-
-    Signals
-    -------
-    step_requested(str)
-        Key of the step that what is gone on with shows at.
+    ``settle`` takes over what is being typed on the page.
     """
 
-    step_requested = Signal(str)
+    step_requested = Signal(str)  # key of the step that what is gone on with shows at
 
     def __init__(
         self,

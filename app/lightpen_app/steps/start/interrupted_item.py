@@ -26,31 +26,21 @@ class RowKind(StrEnum):
 
 @dataclass(frozen=True)
 class RowWords:
-    """Texts of a row.
-
-    Attributes
-    ----------
-    resume, discard, keep : pair of str
-        Label of each button, and its accessible name.
-    """
+    """Texts of a row."""
 
     heading: str
     description: str
     question: str
+    # Label of each button, and its accessible name.
     resume: tuple[str, str]
     discard: tuple[str, str]
     keep: tuple[str, str]
 
 
 class InterruptedItem(Translated, QFrame):
-    """Interrupted work; subclasses provide the texts.
+    """Interrupted work; subclasses provide the texts."""
 
-    Signals
-    -------
-    resume_requested(), discard_requested()
-        The buttons; discarding was confirmed.
-    """
-
+    # The buttons; discarding was confirmed.
     resume_requested = Signal()
     discard_requested = Signal()
 

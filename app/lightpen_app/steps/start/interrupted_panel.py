@@ -27,13 +27,7 @@ NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 
 
 class InterruptedRow(InterruptedItem):
-    """One swing without a verdict.
-
-    Parameters
-    ----------
-    is_under_way : bool
-        Whether another program captures it.
-    """
+    """One swing without a verdict."""
 
     def __init__(
         self,
@@ -116,23 +110,14 @@ class VerificationRow(InterruptedItem):
 
 
 class InterruptedPanel(Translated, QGroupBox):
-    """Lists swings and verifications that have no end; hidden while there are none.
+    """Lists swings and verifications that have no end; hidden while there are none."""
 
-    Signals
-    -------
-    resume_requested(Path), discard_requested(Path)
-        The folder of the record.
-    continue_requested(InterruptedVerification)
-    close_requested(InterruptedVerification)
-    search_requested()
-        They are to be looked for again.
-    """
-
+    # Path: the folder of the record
     resume_requested = Signal(object)
     discard_requested = Signal(object)
-    continue_requested = Signal(object)
-    close_requested = Signal(object)
-    search_requested = Signal()
+    continue_requested = Signal(object)  # InterruptedVerification
+    close_requested = Signal(object)  # InterruptedVerification
+    search_requested = Signal()  # they are to be looked for again
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

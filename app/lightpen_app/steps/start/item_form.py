@@ -46,20 +46,11 @@ PICTURE_SIZE = QSize(22 * GRID, 17 * GRID)  # px
 class ItemForm(Translated, QWidget):
     """Shows an item; the id of one that is known cannot be changed.
 
-    Parameters
-    ----------
-    folder : Path
-        The data folder, in which pictures are kept.
-
-    Signals
-    -------
-    value_edited()
-        Something is typed.
-    spin_toggled(bool)
-        The axis is to be found by spinning the pen, or this has ended.
+    Pictures are kept in the data folder.
     """
 
-    value_edited = Signal()
+    value_edited = Signal()  # something is typed
+    # The axis is to be found by spinning the pen, or this has ended.
     spin_toggled = Signal(bool)
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:

@@ -18,13 +18,7 @@ LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
 
 
 class LargeScreenPanel(QWidget):
-    """Shows the trend of a tip, or an introduction without one.
-
-    Parameters
-    ----------
-    logbook : LazyLogbook
-        Archive with the status of tips.
-    """
+    """Shows the trend of a tip, or an introduction without one."""
 
     def __init__(self, logbook: LazyLogbook, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -18,15 +18,9 @@ from lightpen_app.work.swing_run import SwingRun
 
 
 class LastResultPresenter(QObject):
-    """Shows the last result in one panel, its swing in another.
+    """Shows the last result in one panel, its swing in another."""
 
-    Signals
-    -------
-    verification_requested()
-        The tip that is shown shall be verified.
-    """
-
-    verification_requested = Signal()
+    verification_requested = Signal()  # the tip that is shown shall be verified
 
     def __init__(
         self,

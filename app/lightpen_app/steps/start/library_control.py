@@ -37,25 +37,13 @@ from lightpen_app.work.workbench import Workbench
 class LibraryControl(QObject):
     """Keeps the lists and the dialog of the library, and answers barcodes.
 
-    Parameters
-    ----------
-    names : NamesForm
-        Form whose lists are filled.
-    question : QuestionBar
-        Asks whether an unknown barcode is to be added.
-    page : QWidget
-        Above which the dialog opens.
-
-    Signals
-    -------
-    chosen(ItemKind, str)
-        An item was chosen, in a list, in the dialog or by its barcode.
-    unknown_declined()
-        A barcode is of no tip in the library, and none is to be added: whatever tip is
-        in the field is not the one at hand.
+    The question asks whether an unknown barcode is to be added.
     """
 
+    # ItemKind, str: an item was chosen, in a list, in the dialog or by its barcode
     chosen = Signal(object, str)
+    # A barcode is of no tip in the library, and none is to be added: whatever tip is in
+    # the field is not the one at hand.
     unknown_declined = Signal()
 
     def __init__(

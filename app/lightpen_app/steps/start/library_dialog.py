@@ -53,45 +53,24 @@ LONGEST_REASON = 200  # characters
 
 @dataclass(frozen=True)
 class RequestedChange:
-    """A change that is requested.
-
-    Attributes
-    ----------
-    picture : str
-        Path of another picture; empty for none.
-    is_new : bool
-        Whether the item is to be added.
-    signature : Signature or None
-        Signature of a supervisor, if one is required.
-    before : item or None
-        The item as it was shown; None for a new one.
-    """
+    """A change that is requested."""
 
     item: AnyItem
-    picture: str
-    is_new: bool
+    picture: str  # path of another picture; empty for none
+    is_new: bool  # whether the item is to be added
     reason: str
-    signature: Signature | None
-    before: AnyItem | None = None
+    signature: Signature | None  # signature of a supervisor, if one is required
+    before: AnyItem | None = None  # the item as it was shown; None for a new one
 
 
 class LibraryDialog(FittedWindow, Translated, QDialog):
     """Lists the items of the library; adds, changes and retires them.
 
-    Parameters
-    ----------
-    folder : Path
-        The data folder, in which pictures are kept.
-
-    Signals
-    -------
-    change_asked(Asked)
-    chosen(ItemKind, str)
-        An item is to be calibrated with.
+    Pictures are kept in the data folder.
     """
 
-    change_asked = Signal(object)
-    chosen = Signal(object, str)
+    change_asked = Signal(object)  # RequestedChange
+    chosen = Signal(object, str)  # ItemKind, str: an item is to be calibrated with
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -24,14 +24,10 @@ from lightpen_app.work.workbench import Workbench
 
 
 class LimitsDialog(FittedWindow, Translated, QDialog):
-    """Shows limits; a supervisor may change them.
+    """Shows limits; a supervisor may change them."""
 
-    Signals
-    -------
-    signed(StationLimits, Signature, str)
-        Limits to be set, who signs, and a new password or none.
-    """
-
+    # StationLimits, Signature, str: limits to be set, who signs, and a new password or
+    # none
     signed = Signal(object, object, str)
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -17,15 +17,9 @@ WIDTH = 112 * GRID  # px
 
 
 class Introduction(FittedWindow, QDialog):
-    """Shows item, method and steps.
+    """Shows item, method and steps."""
 
-    Signals
-    -------
-    trial_requested()
-        A simulated pen is to be calibrated.
-    """
-
-    trial_requested = Signal()
+    trial_requested = Signal()  # a simulated pen is to be calibrated
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,15 +55,9 @@ DEMO = (sys.executable, ["-m", "lightpen_app", "--demo"])
 
 
 class NewcomerPanel(Translated, QGroupBox):
-    """Introduces the program, plays the demo, and starts a trial.
+    """Introduces the program, plays the demo, and starts a trial."""
 
-    Signals
-    -------
-    trial_requested()
-        A simulated pen is to be calibrated.
-    """
-
-    trial_requested = Signal()
+    trial_requested = Signal()  # a simulated pen is to be calibrated
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

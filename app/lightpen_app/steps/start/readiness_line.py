@@ -17,15 +17,9 @@ from lightpen_app.widgets.status_mark import message_icon
 
 
 class ReadinessLine(QFrame):
-    """Shows station and operator, what is ready, and below it what is not.
+    """Shows station and operator, what is ready, and below it what is not."""
 
-    Signals
-    -------
-    step_requested(str)
-        Where an item is put right.
-    """
-
-    step_requested = Signal(str)
+    step_requested = Signal(str)  # where an item is put right
 
     def __init__(self, n_items: int, parent: QWidget | None = None) -> None:
         super().__init__(parent)

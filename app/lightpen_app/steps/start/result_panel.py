@@ -43,44 +43,21 @@ SIZES = (  # of age, words and figures, where there is little room, plenty, and 
 
 @dataclass(frozen=True, eq=False)
 class LastResult:
-    """Data of the current tip.
+    """Data of the current tip."""
 
-    Attributes
-    ----------
-    result : Result or None
-        None if there is none yet.
-    is_named : bool
-        Whether pen and tip are named at all.
-    fault : str
-        Why it is unknown; else empty.
-    is_simulated : bool
-        Whether the pen is simulated.
-    """
-
-    result: Result | None = None
-    is_named: bool = True
-    fault: str = ""
-    is_simulated: bool = False
+    result: Result | None = None  # None if there is none yet
+    is_named: bool = True  # whether pen and tip are named at all
+    fault: str = ""  # why it is unknown; else empty
+    is_simulated: bool = False  # whether the pen is simulated
 
 
 class LastResultPanel(Translated, QGroupBox):
-    """Shows the last accepted calibration: age, verdict, tip and uncertainty.
+    """Shows the last accepted calibration: age, verdict, tip and uncertainty."""
 
-    Parameters
-    ----------
-    now : callable
-        Returns the date and time for ages.
-
-    Signals
-    -------
-    take_back_requested(Result, str, Signature or None)
-        The result that is shown shall not be in force any more.
-    verification_requested()
-        The tip that is shown shall be verified.
-    """
-
+    # Result, str, Signature or None: the result that is shown shall not be in force any
+    # more
     take_back_requested = Signal(object, str, object)
-    verification_requested = Signal()
+    verification_requested = Signal()  # the tip that is shown shall be verified
 
     def __init__(
         self, now: Callable[[], datetime], parent: QWidget | None = None

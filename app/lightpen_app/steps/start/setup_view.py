@@ -17,20 +17,9 @@ from lightpen_app.work.workbench import Workbench
 
 
 class SetupView(Translated, QWidget):
-    """Setup of a station.
+    """Setup of a station."""
 
-    Signals
-    -------
-    done()
-        The day page shall be shown.
-
-    Attributes
-    ----------
-    names, limits, assumed, sound_test, folder, newcomer
-        The panels.
-    """
-
-    done = Signal()
+    done = Signal()  # the day page shall be shown
 
     def __init__(
         self,

@@ -16,13 +16,7 @@ STEP_MS = 1000  # from one sound to the next; none is longer
 
 
 class SoundTest(Translated, QWidget):
-    """Plays the sounds one after the other, or reports why audio is unavailable.
-
-    Parameters
-    ----------
-    step_ms : int, optional
-        Interval between two sounds.
-    """
+    """Plays the sounds one after the other, or reports why audio is unavailable."""
 
     def __init__(
         self, sounds: Sounds, step_ms: int = STEP_MS, parent: QWidget | None = None

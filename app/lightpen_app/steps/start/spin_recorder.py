@@ -15,14 +15,9 @@ MOST = 500  # postures
 
 
 class SpinRecorder(QObject):
-    """Keeps the postures of the pen while it is spun.
+    """Keeps the postures of the pen while it is spun."""
 
-    Signals
-    -------
-    message_sent(str)
-        How far the spin is, or why it does not show the axis yet.
-    """
-
+    # How far the spin is, or why it does not show the axis yet.
     message_sent = Signal(str)
 
     def __init__(self, live: LiveView, parent: QObject | None = None) -> None:

@@ -15,10 +15,7 @@ ReadPicture = Callable[[], bytes]  # raises a `LightpenError`
 class TipPicture(Translated, QLabel):
     """Shows a picture, or why it cannot be shown; it is read off the GUI's thread.
 
-    Parameters
-    ----------
-    place : QSize
-        In which it is shown as large as it can be, px.
+    ``place`` is where it is shown as large as it can be, px.
     """
 
     def __init__(self, place: QSize, parent: QWidget | None = None) -> None:

@@ -37,14 +37,9 @@ class LeaningDial(PostureDial):
     The mouse leans it to where it is dragged. The wheel, or a drag with Shift, turns it
     about its own axis; so does a drag of the bar. The arrow keys lean it, comma and
     full stop turn it, Home puts it upright.
-
-    Signals
-    -------
-    leaned(Posture)
-        The user wants the pen held so.
     """
 
-    leaned = Signal(object)
+    leaned = Signal(object)  # Posture: the user wants the pen held so
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -53,51 +53,32 @@ class SideAction(Enum):
 
 @dataclass(frozen=True, eq=False)
 class SwingPageState:
-    """Content of the page.
-
-    Attributes
-    ----------
-    value, operator_value : OperatorValue
-        Content of the page and of the operator view.
-    note : str
-        Images that are not counted.
-    stand : DisplayedPosture or None
-        How the pen is drawn in space.
-    why_not_side : str
-        Why the button beside Start over cannot be pressed.
-    knows_side : bool
-        Whether the operator may say that left and right are swapped.
-    """
+    """Content of the page."""
 
     value: OperatorValue
     operator_value: OperatorValue
-    note: str
+    note: str  # images that are not counted
     warning: StatusMessage
-    stand: DisplayedPosture | None
+    stand: DisplayedPosture | None  # how the pen is drawn in space
     is_verdict: bool
     is_capturing: bool
     has_fault: bool
     is_complete: bool
     main: MainAction
     side: SideAction
-    why_not_side: str
-    knows_side: bool
+    why_not_side: str  # why the button beside Start over cannot be pressed
+    knows_side: bool  # whether the operator may say that left and right are swapped
 
 
 @dataclass(frozen=True, eq=False)
 class SwingProgress:
-    """Missing images of a swing, computed once for each accepted image.
-
-    Attributes
-    ----------
-    to_go : RemainingImages or None
-        Displayed number of remaining images; None if none is displayed.
-    """
+    """Missing images of a swing, computed once for each accepted image."""
 
     kept: AcceptedImages
     record_folder: Path | None
     limits: SwingLimits
     short: Shortfall
+    # Displayed number of remaining images; None if none is displayed.
     to_go: RemainingImages | None
 
 
@@ -125,15 +106,7 @@ def advance_progress(
 
 
 class SwingPresenter(QObject):
-    """Computes the page state; counts images beside the swing.
-
-    Attributes
-    ----------
-    sight : LiveDetectionView
-        Looks at the live images.
-    solved : float
-        How far the tip is computed, 0 to 1.
-    """
+    """Computes the page state; counts images beside the swing."""
 
     def __init__(self, run: SwingRun, live: LiveView, parent: QObject) -> None:
         super().__init__(parent)
@@ -141,7 +114,7 @@ class SwingPresenter(QObject):
         self._words = SwingWords(self)
         self._progress: SwingProgress | None = None
         self.sight = LiveDetectionView(run, self)
-        self.solved = 0.0
+        self.solved = 0.0  # how far the tip is computed, 0 to 1
 
     def view_state(self, *, is_away: bool) -> SwingViewState | None:
         """Return the view state of the swing; None without one."""

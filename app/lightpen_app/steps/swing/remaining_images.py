@@ -15,27 +15,16 @@ class RemainingImages:
 
     The estimate is renewed with each image and fluctuates. The displayed number in all
     stays until it is wrong by more than the accuracy of the estimate.
-
-    Attributes
-    ----------
-    n_in_all : int
-        Images at the end; the remaining ones are rounded to the accuracy of the
-        estimate.
-    n_kept : int
-        Number of images at present.
-    n_before : int
-        Images that remained when the number in all was last changed.
-    fraction : float
-        Of all images, that are there; it goes back only when images are dropped.
-    has_risen : bool
-        Whether more remained at the last change than at the one before, though none
-        were dropped.
     """
 
+    # Images at the end; the remaining ones are rounded to the accuracy of the estimate.
     n_in_all: int
-    n_kept: int
-    n_before: int
+    n_kept: int  # number of images at present
+    n_before: int  # images that remained when the number in all was last changed
+    # Of all images, that are there; it goes back only when images are dropped.
     fraction: float
+    # Whether more remained at the last change than at the one before, though none were
+    # dropped.
     has_risen: bool = False
 
     @property

@@ -18,16 +18,10 @@ COVER_S = 2.0
 
 
 class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
-    """Lets the simulated operator do things; hidden with a real pen.
-
-    Signals
-    -------
-    led_by_itself()
-        From now on the pen is not where the user wanted it last.
-    """
+    """Lets the simulated operator do things; hidden with a real pen."""
 
     narrow_below = 100 * GRID  # px; then its buttons are closer together
-    led_by_itself = Signal()
+    led_by_itself = Signal()  # from now on the pen is not where the user wanted it last
 
     def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
         super().__init__(live, parent)

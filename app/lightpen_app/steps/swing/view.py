@@ -41,15 +41,7 @@ ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
 
 
 class SwingView(ResponsiveLayout, Translated, QWidget):
-    """Shows a swing at one moment.
-
-    Attributes
-    ----------
-    side, start_over : PushButton
-        The buttons at the upper right.
-    swapped : PushButton
-        For an operator who stands elsewhere than the arrow assumes.
-    """
+    """Shows a swing at one moment."""
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
     large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
@@ -61,7 +53,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._room = NO_ROOM  # so that its least size at first widens no window
 
         # Widgets
-        self.side, self.start_over = PushButton(), PushButton()
+        self.side, self.start_over = PushButton(), PushButton()  # at the upper right
+        # For an operator who stands elsewhere than the arrow assumes.
         self.swapped = PushButton()
         self._instruction = FittedText(TextSize.HUGE)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)

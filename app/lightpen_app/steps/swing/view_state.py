@@ -67,48 +67,28 @@ _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
 
 @dataclass(frozen=True, eq=False)
 class SwingViewState:
-    """Input of the displayed values.
-
-    Attributes
-    ----------
-    connection : Connection
-        How the camera is.
-    seen : str
-        Content of the last image in a few words.
-    has_unfit_spots : bool
-        Whether the last images show enough spots, but not those of the pen.
-    has_fault : bool
-        Whether the swing was paused because an image could not be recorded.
-    solving : float or None
-        How far the tip is computed, 0 to 1; None while it is not.
-    is_accepted : bool
-        Whether the tip is in force.
-    stillness : float
-        How long the pen has been upright and still after the verdict: 1 is enough.
-    origin : Origin or None
-        Origin of the images.
-    is_simulated : bool
-        Whether the pen is led by the mouse, so that it leans as the camera sees it.
-    is_away : bool
-        Whether another step is shown.
-    to_go : RemainingImages or None
-        How many images are to go, by this moment and those before it.
-    """
+    """Input of the displayed values."""
 
     setup: SwingSetup
     state: SwingState
     short: Shortfall
-    connection: Connection = Connection.STREAMING
-    seen: str = ""
+    connection: Connection = Connection.STREAMING  # how the camera is
+    seen: str = ""  # content of the last image in a few words
+    # Whether the last images show enough spots, but not those of the pen.
     has_unfit_spots: bool = False
+    # Whether the swing was paused because an image could not be recorded.
     has_fault: bool = False
+    # How far the tip is computed, 0 to 1; None while it is not.
     solving: float | None = None
     verdict: Verdict | None = None
-    is_accepted: bool = False
+    is_accepted: bool = False  # whether the tip is in force
+    # How long the pen has been upright and still after the verdict: 1 is enough.
     stillness: float = 0.0
-    origin: Origin | None = None
+    origin: Origin | None = None  # origin of the images
+    # Whether the pen is led by the mouse, so that it leans as the camera sees it.
     is_simulated: bool = False
-    is_away: bool = False
+    is_away: bool = False  # whether another step is shown
+    # How many images are to go, by this moment and those before it.
     to_go: RemainingImages | None = None
 
     @cached_property

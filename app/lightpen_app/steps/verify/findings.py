@@ -40,18 +40,10 @@ PICTURE_SHARE, LARGE_PICTURE_SHARE, TABLES_SHARE = 5, 9, 13  # of the width
 
 @dataclass(frozen=True)
 class TaskPicture:
-    """A picture of a task beside its figures.
+    """A picture of a task beside its figures."""
 
-    Attributes
-    ----------
-    make : callable
-        Returns the widget, which has `set_value`.
-    value : callable
-        Returns what it shows.
-    """
-
-    make: Callable[[], Any]
-    value: Callable[[SessionSetup, SessionState, AnyTask], Any]
+    make: Callable[[], Any]  # returns the widget, which has `set_value`
+    value: Callable[[SessionSetup, SessionState, AnyTask], Any]  # returns what it shows
 
 
 def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> DialValue:

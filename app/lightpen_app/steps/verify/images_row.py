@@ -13,15 +13,9 @@ STEPS = 1000  # of the progress
 
 
 class ImagesRow(Translated, QWidget):
-    """A place of images, and whether the pen is held still in them.
+    """A place of images, and whether the pen is held still in them."""
 
-    Signals
-    -------
-    read_requested(str, bool)
-        The place, and whether the pen is held still through the images of a touch.
-    cancel_requested()
-    """
-
+    # The place, and whether the pen is held still through the images of a touch.
     read_requested = Signal(str, bool)
     cancel_requested = Signal()
 

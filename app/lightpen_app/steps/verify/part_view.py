@@ -27,25 +27,13 @@ FROM_ABOVE = np.array([0.6, 0.0, 0.0])  # rotation vector of the first view
 
 @dataclass(frozen=True, eq=False)
 class PartValue:
-    """Drawn content of a part, frame of the camera, mm.
+    """Drawn content of a part, frame of the camera, mm."""
 
-    Attributes
-    ----------
-    points : (N, 3) array
-        Ball centres.
-    deviations : (N, 3) array
-        From the feature to each point.
-    outlines : tuple of (M, 3) array
-        Lines of the features.
-    tip, goal : (3,) array or None
-        Tip at present; most informative next point.
-    """
-
-    points: FloatArray
-    deviations: FloatArray
-    outlines: tuple[FloatArray, ...] = ()
-    tip: FloatArray | None = None
-    goal: FloatArray | None = None
+    points: FloatArray  # (N, 3), ball centres
+    deviations: FloatArray  # (N, 3), from the feature to each point
+    outlines: tuple[FloatArray, ...] = ()  # lines of the features
+    tip: FloatArray | None = None  # (3,), at present
+    goal: FloatArray | None = None  # (3,), most informative next point
 
 
 EMPTY = np.zeros((0, 3))

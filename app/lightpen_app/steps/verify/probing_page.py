@@ -42,13 +42,7 @@ SOUNDS: dict[SessionEventKind, Sound] = {
 
 
 class ProbingPage(ResponsiveLayout, Page):
-    """Shows a session and leads it; nothing on it must be pressed meanwhile.
-
-    Parameters
-    ----------
-    presenter : VerifyPresenter
-        Computes what is shown of `run`.
-    """
+    """Shows a session and leads it; nothing on it must be pressed meanwhile."""
 
     shows_images = True
     narrow_below = 150 * GRID  # px; then the live image is a page of the list

@@ -21,17 +21,11 @@ TURN = 16 * 360  # of a circle, as Qt counts
 
 @dataclass(frozen=True)
 class RingValue:
-    """Touches of a ring.
+    """Touches of a ring."""
 
-    Attributes
-    ----------
-    angles : tuple of float
-        Of the touches: from the right against the clock as the camera sees them, rad.
-    covered, needed : float
-        Degrees: all but the largest gap, and how much of it is requested.
-    """
-
+    # Of the touches: from the right against the clock as the camera sees them, rad.
     angles: tuple[float, ...] = ()
+    # Degrees: all but the largest gap, and how much of it is requested.
     covered: float = 0.0
     needed: float = 270.0
 

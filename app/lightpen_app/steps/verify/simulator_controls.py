@@ -18,13 +18,7 @@ from lightpen_app.work.live_view import LiveView
 
 
 class ProbingSimulatorControls(SimulatorControls):
-    """Lets the simulated operator touch, or lift the pen; hidden with a real pen.
-
-    Parameters
-    ----------
-    tasks : collection of VerificationTask
-        Tasks of the page, whose artefacts are described.
-    """
+    """Lets the simulated operator touch, or lift the pen; hidden with a real pen."""
 
     def __init__(
         self, live: LiveView, tasks: Collection[AnyTask], parent: QWidget | None = None

@@ -74,20 +74,9 @@ class SurfaceField(ChoiceField):
 
 
 class TaskForm(Translated, QWidget):
-    """Shows whether a task is chosen, and its options.
+    """Shows whether a task is chosen, and its options."""
 
-    Parameters
-    ----------
-    beside : QWidget
-        What stands at the right of the choice.
-
-    Signals
-    -------
-    value_changed()
-        The user chose otherwise.
-    """
-
-    value_changed = Signal()
+    value_changed = Signal()  # the user chose otherwise
 
     def __init__(
         self, task: AnyTask, *beside: QWidget, parent: QWidget | None = None

@@ -21,20 +21,9 @@ from lightpen_app.widgets.translated import Translated
 
 
 class TaskPanel(Translated, QWidget):
-    """Shows a task of a verification.
+    """Shows a task of a verification."""
 
-    Parameters
-    ----------
-    runner : VerificationRunner
-        Does the task again, or with recorded images.
-
-    Signals
-    -------
-    value_changed(VerificationChoices)
-        The user chose otherwise.
-    """
-
-    value_changed = Signal(object)
+    value_changed = Signal(object)  # VerificationChoices: the user chose otherwise
 
     def __init__(
         self, task: AnyTask, runner: VerificationRunner, parent: QWidget | None = None

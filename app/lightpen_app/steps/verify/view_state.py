@@ -16,15 +16,9 @@ from lightpen_app.widgets.sign_label import StatusMessage
 
 @dataclass(frozen=True)
 class Headline:
-    """Status of the page for the window.
+    """Status of the page for the window."""
 
-    Attributes
-    ----------
-    lead : str
-        Below its title.
-    """
-
-    lead: str = ""
+    lead: str = ""  # below its title
     tone: Tone = Tone.QUIET
     action: MainAction = field(default_factory=lambda: MainAction(""))
     is_complete: bool = False
@@ -33,27 +27,15 @@ class Headline:
 
 @dataclass(frozen=True, eq=False)
 class VerifyView:
-    """Content of the page of a verification, except the results.
-
-    Attributes
-    ----------
-    operator : OperatorValue
-        Content of the operator view.
-    lamps : StatusMessage
-        The drift of fixed lamps, unless it is the verdict.
-    titles : tuple of StatusMessage
-        Titles of the tasks with their progress.
-    task : VerificationTask or None
-        Current task.
-    reading : float or None
-        How much of recorded images is read, 0 to 1; None while none are.
-    """
+    """Content of the page of a verification, except the results."""
 
     headline: Headline = field(default_factory=Headline)
     operator: OperatorValue = field(default_factory=OperatorValue)
+    # The drift of fixed lamps, unless it is the verdict.
     lamps: StatusMessage = field(default_factory=StatusMessage)
-    titles: tuple[StatusMessage, ...] = ()
-    task: AnyTask | None = None
+    titles: tuple[StatusMessage, ...] = ()  # titles of the tasks with their progress
+    task: AnyTask | None = None  # current task
+    # How much of recorded images is read, 0 to 1; None while none are.
     reading: float | None = None
     pause: str = ""
     can_be_accepted: bool = False
