@@ -7,7 +7,8 @@ is then as precise as a fit of the rim, at the cost of one pass over a small win
 moments of f up to the third order also show whether the region is a whole ellipse.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import hypot, pi, sqrt
 from typing import NamedTuple
 
@@ -178,9 +179,9 @@ class Disc(NamedTuple):
     and noise explain how it differs from an ellipse; a sliver of 1 px off a disc of
     42 px, which shifts the centre by 0.13 px, is beyond that. `others` are further
     regions in the box that was requested. `is_even` shows that its light is as even as
-    its outline supposes. `rim` is where the fit of its rim may begin,
-    by which `with_rims` measures a disc that is not evenly lit; `filled`
-    has the moments of a ring with its dark middle filled, if that makes it whole.
+    its outline supposes. `rim` is where the fit of its rim may begin, by which
+    `with_rims` measures a disc that is not evenly lit; `filled` returns the moments of
+    a ring with its dark middle filled, if that makes it whole.
     """
 
     moments: DiscMoments
@@ -193,7 +194,7 @@ class Disc(NamedTuple):
     others: tuple[PixelBox, ...]
     is_even: bool = True
     rim: EdgeStart | None = None
-    filled: DiscMoments | None = None
+    filled: Callable[[], DiscMoments | None] | None = None
 
     @property
     def cut_height(self) -> float:
@@ -264,36 +265,20 @@ def _measure_window(
     if moments is None:
         return None
     moments = _unshaded(moments, window, soft, around, levels)
-    height, width = image.shape
-    leaves_image = (
-        region.left == 0
-        or region.top == 0
-        or region.right == width
-        or region.bottom == height
+    sides = zip(region, frame, (0, 0, *image.shape[::-1]), strict=True)
+    reached = [there == of_image for here, there, of_image in sides if here == there]
+    leaves_image, leaves_window = any(reached), not all(reached)
+    relative_noise = noise / contrast
+    is_whole = not reached and _is_ellipse(moments, relative_noise)
+    is_even = is_whole and _is_even(
+        moments, window, soft, around, levels, relative_noise
     )
-    leaves_window = (
-        (region.left == frame.left > 0)
-        or (region.top == frame.top > 0)
-        or (region.right == frame.right < width)
-        or (region.bottom == frame.bottom < height)
-    )
-    is_inside = not (leaves_image or leaves_window)
-    is_whole = is_inside and _is_ellipse(moments, noise / contrast)
     rim, filled = None, None
-    is_even = (
-        is_inside
-        and is_whole
-        and _is_even(moments, window, soft, around, levels, noise / contrast)
-    )
-    if is_inside and not (is_even and moments.edge_width < WIDE_EDGE):
+    if not reached and not (is_even and moments.edge_width < WIDE_EDGE):
         rim = _rim_start(soft, around)
         if not is_whole and _has_dark_middle(moments, soft, around):
-            filled = _moments(_without_hole(soft), around, (high - low) / contrast)
-            if filled is not None and not (
-                filled.area > HOLE * moments.area
-                and _is_ellipse(filled, noise / contrast)
-            ):
-                filled = None
+            ramp = (high - low) / contrast
+            filled = partial(_filled, moments, soft, around, ramp, relative_noise)
     return Disc(
         moments,
         levels,
@@ -319,36 +304,38 @@ def with_rims(
     before : sequence of EdgeStart
         Discs of the image before, where the fits begin.
     """
-    found = [
-        disc._replace(is_whole=True, moments=disc.filled) if disc.filled else disc
-        for disc in discs
-    ]
-    unclear = [i for i, disc in enumerate(discs) if disc.rim is not None]
-    if not unclear:
-        return found
-    starts = [_known(disc, before) for disc in discs if disc.rim is not None]
-    for i, rim in zip(unclear, fit_edges(image, starts), strict=True):
+    found = list(discs)
+    unclear = [i for i, disc in enumerate(discs) if disc.rim or disc.filled]
+    rims = iter(fit_edges(image, _starts(discs, before)))
+    for i in unclear:
+        disc = discs[i]
+        rim = next(rims) if disc.rim else None
         # What looks blurred may be a dome without light at its rim, which is sharp.
-        wide = discs[i].moments.edge_width if discs[i].is_even else float("inf")
-        if rim is None or not rim.is_whole:
-            continue
-        if GAUSSIAN_RISE * rim.sigma < SHARPER * wide:
-            found[i] = discs[i]._replace(is_whole=True, moments=_moments_of(rim))
+        wide = disc.moments.edge_width if disc.is_even else float("inf")
+        moments = None
+        if rim and rim.is_whole and GAUSSIAN_RISE * rim.sigma < SHARPER * wide:
+            moments = _moments_of(rim)
+        elif disc.filled:
+            moments = disc.filled()
+        if moments:
+            found[i] = disc._replace(is_whole=True, moments=moments)
     return found
 
 
-def _known(disc: Disc, before: Sequence[EdgeStart]) -> EdgeStart:
-    """Return the start of an edge fit: as the nearest previous disc, if any."""
-    assert disc.rim is not None
-    if not before:
-        return disc.rim
-    x, y = disc.rim.center.tolist()
-    near = min(before, key=lambda one: hypot(one.center[0] - x, one.center[1] - y))
-    size = sqrt(float(np.trace(near.shape)))
-    gap = hypot(near.center[0] - x, near.center[1] - y)
-    if gap > 2 * size:
-        return disc.rim
-    return near._replace(center=disc.rim.center - near.offset)
+def _starts(discs: Sequence[Disc], before: Sequence[EdgeStart]) -> list[EdgeStart]:
+    """Return the starts of edge fits: as the nearest previous discs, if any."""
+    starts = [disc.rim for disc in discs if disc.rim is not None]
+    if not starts or not before:
+        return starts
+    here, there = (
+        np.array([start.center for start in some]) for some in (starts, before)
+    )
+    gaps = np.linalg.norm(here[:, None] - there, axis=2)
+    for i, nearest in enumerate(gaps.argmin(axis=1).tolist()):
+        near = before[nearest]
+        if gaps[i, nearest] <= 2 * sqrt(near.shape[0, 0] + near.shape[1, 1]):
+            starts[i] = near._replace(center=starts[i].center - near.offset)
+    return starts
 
 
 def _separate(
@@ -414,12 +401,21 @@ def _has_dark_middle(moments: DiscMoments, soft: MatLike, frame: PixelBox) -> bo
     return bool(soft[rows, columns].min(initial=255) < FULLY)
 
 
-def _without_hole(soft: MatLike) -> MatLike:
-    """Return a soft-thresholded region with enclosed holes filled."""
+def _filled(
+    moments: DiscMoments,
+    soft: MatLike,
+    frame: PixelBox,
+    ramp: float,
+    relative_noise: float,
+) -> DiscMoments | None:
+    """Return the moments with enclosed holes filled, if that makes an ellipse."""
     _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
     contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)
-    return cv2.max(soft, crest)
+    filled = _moments(cv2.max(soft, crest), frame, ramp)
+    if filled is None or filled.area <= HOLE * moments.area:
+        return None
+    return filled if _is_ellipse(filled, relative_noise) else None
 
 
 def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
@@ -428,14 +424,14 @@ def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
     m = cv2.moments(contours[0])
     if m["m00"] < MIN_AREA:
         return None
-    shape = np.array([[m["mu20"], m["mu11"]], [m["mu11"], m["mu02"]]]) / m["m00"]
-    determinant = float(np.linalg.det(shape))
+    xx, xy, yy = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
+    determinant = xx * yy - xy**2
     if determinant <= 0 or m["m00"] < MIN_OUTLINE * 4 * pi * sqrt(determinant):
         return None
     center = np.array(
         [frame.left + m["m10"] / m["m00"], frame.top + m["m01"] / m["m00"]]
     )
-    return EdgeStart(center, shape)
+    return EdgeStart(center, np.array([[xx, xy], [xy, yy]]))
 
 
 def _moments_of(rim: EdgeFit) -> DiscMoments:

@@ -122,7 +122,7 @@ class _Ellipses(NamedTuple):
     @property
     def semi_axes(self) -> tuple[FloatArray, FloatArray]:
         """Semi-axes, the longer first, px, (D,) each."""
-        a, b, c, d = np.moveaxis(self.roots.reshape(-1, 4), -1, 0)
+        a, b, c, d = self.roots.reshape(-1, 4).T
         sums, differences = np.hypot(a + d, b - c), np.hypot(a - d, b + c)
         return (sums + differences) / 2, np.abs(sums - differences) / 2
 
@@ -251,12 +251,13 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
     return found
 
 
-def _rim(ellipses: _Ellipses, sigmas: FloatArray, d: int, is_whole: bool) -> EdgeFit:
-    root, sigma = ellipses.roots[d], float(sigmas[d])
+def _rim(ellipses: _Ellipses, sigmas: FloatArray, disc: int, is_whole: bool) -> EdgeFit:
+    root, sigma = ellipses.roots[disc], float(sigmas[disc])
     shape = root @ root.T / 4
     # Blur pulls the half level of a convex rim inwards, by sigma^2 over its diameter.
-    growth = sigma**2 / (4 * sqrt(np.linalg.det(shape)))
-    return EdgeFit(ellipses.centers[d], shape * (1 + growth), sigma, is_whole)
+    (a, b), (c, d) = root.tolist()
+    growth = sigma**2 / abs(a * d - b * c)
+    return EdgeFit(ellipses.centers[disc], shape * (1 + growth), sigma, is_whole)
 
 
 def _rays(ellipses: _Ellipses, spacing: float) -> _Rays:
@@ -285,7 +286,7 @@ def _arms(n_rays: int) -> tuple[FloatArray, FloatArray]:
 def _moved(ellipses: _Ellipses, steps: FloatArray) -> _Ellipses:
     size, along, across = steps[:, 2], steps[:, 3], steps[:, 4]
     stretch = np.array([[1 + size + along, across], [across, 1 + size - along]])
-    roots = ellipses.roots @ np.moveaxis(stretch, -1, 0)
+    roots = ellipses.roots @ stretch.transpose(2, 0, 1)
     return _Ellipses(ellipses.centers + steps[:, :2], roots)
 
 
@@ -415,6 +416,8 @@ def _are_even(dents: FloatArray, shorter_axes: FloatArray) -> BoolArray:
     smooth = _smooth(dents, 3)
     differences = np.abs(dents - np.roll(dents, 1, axis=1))
     # Of the difference of two normal variables, and the mean of three.
-    sigmas = np.median(differences, axis=1) / normal_quantile(0.25) / sqrt(6)
+    middle = differences.shape[1] // 2
+    medians = np.partition(differences, middle, axis=1)[:, middle]
+    sigmas = medians / normal_quantile(0.25) / sqrt(6)
     limits = np.minimum(MAX_DENT, MAX_RELATIVE_DENT * shorter_axes)
     return np.asarray(np.abs(smooth).max(axis=1) < limits + DENT_SIGMAS * sigmas)

@@ -145,8 +145,7 @@ def settle(sight: SpotArrays, pen: Constellation, candidates: Candidates) -> Can
     """
     for scale, tolerance in SETTLING:
         weights = 1 / (1 + (candidates.residuals / scale) ** 2)
-        offsets = _offsets(sight, pen, candidates)
-        there = _step(sight, pen, candidates, offsets, weights)
+        there = _step(sight, pen, candidates, weights)
         candidates = match(sight, pen, there.image, there.R, there.t, tolerance)
     settled = _drop_misshapen(sight, pen, candidates)
     settled = fit(sight, pen, _drop(settled, _out_of_gate(settled)))
@@ -166,10 +165,10 @@ def fit(
     eccentric = conic_centers(leds, pen.normals @ R_t, pen.radius) * sight.focal
     eccentric -= _project(sight, leds)
     even = np.ones_like(candidates.residuals)
-    offsets = _offsets(sight, pen, candidates, eccentric)
     for _ in range(n_steps):
-        candidates = _step(sight, pen, candidates, offsets, even)
-        offsets = _offsets(sight, pen, candidates, eccentric)
+        candidates = _step(sight, pen, candidates, even, eccentric)
+    leds = pen.leds @ candidates.R.transpose(0, 2, 1) + candidates.t[:, None]
+    offsets = _offsets(sight, candidates, leds, eccentric)
     return replace(candidates, residuals=np.linalg.norm(offsets, axis=-1))
 
 
@@ -235,12 +234,11 @@ def _project(sight: SpotArrays, leds: FloatArray) -> FloatArray:
 
 def _offsets(
     sight: SpotArrays,
-    pen: Constellation,
     candidates: Candidates,
-    eccentric: FloatArray | float = 0.0,
+    leds: FloatArray,
+    eccentric: FloatArray | float,
 ) -> FloatArray:
     """Return spots minus predicted ellipse centres, (C, L, 2), px; 0 without a spot."""
-    leds = pen.leds @ candidates.R.transpose(0, 2, 1) + candidates.t[:, None]
     offsets = _paired_points(sight, candidates) - _project(sight, leds) - eccentric
     offsets[candidates.spot < 0] = 0
     return offsets
@@ -250,12 +248,13 @@ def _step(
     sight: SpotArrays,
     pen: Constellation,
     candidates: Candidates,
-    offsets: FloatArray,
     weights: FloatArray,
+    eccentric: FloatArray | float = 0.0,
 ) -> Candidates:
     """Make one weighted Gauss-Newton step on poses, rotating in the camera frame."""
     arms = pen.leds @ candidates.R.transpose(0, 2, 1)
     leds = arms + candidates.t[:, None]
+    offsets = _offsets(sight, candidates, leds, eccentric)
     scale = sight.focal / leds[..., 2]
     moves = np.zeros((*scale.shape, 2, 3))
     moves[..., 0, 0] = moves[..., 1, 1] = scale
