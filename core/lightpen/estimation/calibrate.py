@@ -83,27 +83,16 @@ from lightpen.model.rig import Rig, of_camera, rig_of
 
 @dataclass(frozen=True, eq=False)
 class CameraImages:
-    """The images of one camera in a calibration, one at each of N moments.
-
-    Attributes
-    ----------
-    reasons : tuple of Reason
-        Why an image was left out; `Reason.NONE` for the used ones.
-    rms : (N,) array
-        Root mean square residual of each image, px; NaN without a pose.
-    leds_used : (N, L) array of bool
-    total_rms : float
-        Root mean square residual of all LEDs used, px.
-    path : CameraPath or None
-        Motion of the camera by its fixed lamps; None without any.
-    """
+    """The images of one camera in a calibration, one at each of N moments."""
 
     observations: Observations
+    # Why an image was left out; `Reason.NONE` for the used ones.
     reasons: tuple[Reason, ...]
+    # (N,), root mean square residual of each image, px; NaN without a pose.
     rms: FloatArray
-    leds_used: BoolArray
-    total_rms: float
-    path: CameraPath | None
+    leds_used: BoolArray  # (N, L)
+    total_rms: float  # root mean square residual of all LEDs used, px
+    path: CameraPath | None  # motion of the camera by its fixed lamps; None without any
 
     @property
     def used(self) -> BoolArray:
@@ -119,64 +108,38 @@ class Calibration:
     that entered them, in the same order. An image of which the joint fit uses no LED is
     among these M and not among the used ones. Of a rig, the images of one moment count
     as one, and the camera frame is that of the first camera.
-
-    Attributes
-    ----------
-    reasons : tuple of Reason
-        Why an image was left out; `Reason.NONE` for the used ones.
-    used : (N,) array of bool
-    tips_cam : (N, 3) array
-        Tip by the pose of each image alone, camera frame, mm; NaN without a pose.
-    rms : (N,) array
-        Root mean square residual of each image, px: of a used one in the joint fit, of
-        another about its own pose; NaN without a pose.
-    joint : JointFit
-        Tip, cone and rotations, with all parameters as adjusted.
-    bundle : Bundle
-        The bundle adjustment.
-    stated : Priors
-        Priors from the files, with defaults where these state none.
-    priors : Priors
-        The same with contradicted numbers released.
-    assumptions : Assumptions
-        Default uncertainties where the files state none.
-    growth : float
-        Thermal expansion of the pen against its file, relative.
-    shares_images : bool
-        Whether the files of camera or pen were found from these images, which are not
-        counted twice.
-    contradictions : tuple of Contradiction
-        Numbers of the files that the images contradict.
-    two_stage : TwoStageFit
-        The paper's method on the same images, of the first camera.
-    two_stage_covariance : (6, 6) array
-        Of its (tip, cone) by the covariances of the poses, mm^2.
-    instrument : Instrument
-        Cameras and pen as adjusted, for measurements with this tip.
-    lags : tuple of TimeLag or None
-        Time lag of each camera of a rig but the first.
     """
 
     cameras: tuple[CameraImages, ...]
+    # Why an image was left out; `Reason.NONE` for the used ones.
     reasons: tuple[Reason, ...]
-    used: BoolArray
+    used: BoolArray  # (N,)
+    # (N, 3), tip by the pose of each image alone, camera frame, mm; NaN without a pose.
     tips_cam: FloatArray
+    # (N,), root mean square residual of each image, px: of a used one in the joint fit,
+    # of another about its own pose; NaN without a pose.
     rms: FloatArray
-    joint: JointFit
+    joint: JointFit  # tip, cone and rotations, with all parameters as adjusted
     bundle: Bundle
-    stated: Priors
-    priors: Priors
-    assumptions: Assumptions
-    growth: float
+    stated: Priors  # priors from the files, with defaults where these state none
+    priors: Priors  # the same with contradicted numbers released
+    assumptions: Assumptions  # default uncertainties where the files state none
+    growth: float  # thermal expansion of the pen against its file, relative
+    # Whether the files of camera or pen were found from these images, which are not
+    # counted twice.
     shares_images: bool
+    # Numbers of the files that the images contradict.
     contradictions: tuple[Contradiction, ...]
-    two_stage: TwoStageFit
+    two_stage: TwoStageFit  # the paper's method on the same images, of the first camera
+    # (6, 6), of its (tip, cone) by the covariances of the poses, mm^2.
     two_stage_covariance: FloatArray
     budget: Budget
+    # Cameras and pen as adjusted, for measurements with this tip.
     instrument: Instrument
     halves: SplitHalfCheck
     leds: LedQuality
     coverage: Coverage
+    # Time lag of each camera of a rig but the first.
     lags: tuple[TimeLag | None, ...] = ()
     second: SecondCone | None = None
 
@@ -312,21 +275,12 @@ def _before_images(rig: Rig, pen: Pen, observations: Sequence[Observations]) -> 
 
 @dataclass(frozen=True, eq=False)
 class _SingleCameraFits:
-    """Step 1: the images of C cameras at N moments, each alone.
-
-    Attributes
-    ----------
-    steady : tuple of SteadyImages
-        The same with the camera's own motion removed.
-    pixels : (N, C, L, 2) array
-        LED centres of these, px.
-    reasons : (N, C) array of Reason
-    """
+    """Step 1: the images of C cameras at N moments, each alone."""
 
     observations: tuple[Observations, ...]
-    steady: tuple[SteadyImages, ...]
-    pixels: FloatArray
-    reasons: npt.NDArray[np.object_]
+    steady: tuple[SteadyImages, ...]  # the same with the camera's own motion removed
+    pixels: FloatArray  # (N, C, L, 2), LED centres of these, px
+    reasons: npt.NDArray[np.object_]  # (N, C)
 
     @property
     def posed(self) -> list[PosedImages]:
@@ -349,47 +303,30 @@ class _SingleCameraFits:
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """Step 2: the fit that the adjustment starts from, parameters of the files held.
+    """Step 2: the fit that the adjustment starts from, parameters of the files held."""
 
-    Attributes
-    ----------
-    rig : Rig
-        The file's cameras where the images put them.
-    extrinsics : (6 (C - 1),) array or None
-        Their extrinsics less those of the rig file, rad and mm; None of one camera.
-    reasons : (N, C) array of Reason
-    moments : (M,) array of int
-        Moments of which an image takes part.
-    pixels : (M, C, L, 2) array
-        Of these, px; NaN of images that do not take part.
-    """
-
-    rig: Rig
+    rig: Rig  # the file's cameras where the images put them
+    # (6 (C - 1),), their extrinsics less those of the rig file, rad and mm; None of one
+    # camera.
     extrinsics: FloatArray | None
     lags: tuple[TimeLag | None, ...]
-    reasons: npt.NDArray[np.object_]
-    moments: IntArray
+    reasons: npt.NDArray[np.object_]  # (N, C)
+    moments: IntArray  # (M,), moments of which an image takes part
+    # (M, C, L, 2), of these, px; NaN of images that do not take part.
     pixels: FloatArray
     joint: JointFit
 
 
 @dataclass(frozen=True, eq=False)
 class _Adjusted:
-    """Step 3: the bundle adjustment, and the joint fit at its solution.
-
-    Attributes
-    ----------
-    pixels : (M, C, L, 2) array
-        LED centres less the effects of lens and mechanics, px.
-    second : SecondImages or None
-        Images of a second swing, which are the last adjusted.
-    """
+    """Step 3: the bundle adjustment, and the joint fit at its solution."""
 
     adjustment: Adjustment
     joint: JointFit
     stated: Priors
+    # (M, C, L, 2), LED centres less the effects of lens and mechanics, px
     pixels: FloatArray
-    second: SecondImages | None
+    second: SecondImages | None  # images of a second swing, which are the last adjusted
 
 
 def _fit_single_cameras(

@@ -58,48 +58,26 @@ OF_OTHERS = {
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """The distributions that all trials draw from.
+    """The distributions that all trials draw from."""
 
-    Attributes
-    ----------
-    camera, pen : Camera, Pen
-        The truth, with what their files state of themselves.
-    rotations : (N, 3, 3) array
-        Of cam_from_pen.
-    seen : (N, L) array of bool
-        LEDs that the images show.
-    sigma : float
-        Noise of one image coordinate, px.
-    led_covariance : (3 L, 3 L) array
-        Of all LED coordinates of a file, mm^2.
-    forms : (N, m) array
-        In which the seat may follow the lean, and the cone drift.
-    move_covariance : (3 m, 3 m) array
-        Of the moves of the cone in them, mm^2.
-    jitter : (3, 3) array
-        Covariance of the seat from image to image, mm^2.
-    mechanics : (N, L, 2, k) array
-        Derivative of the LEDs' images by the unknowns of mechanics, px by mm or px.
-    mechanics_covariance : (k, k) array
-        Mean square of these by their priors.
-    edge_widths : (N,) array
-        Of the LEDs, px; NaN where no areas are known.
-    """
-
+    # `camera` and `pen`: the truth, with what their files state of themselves.
     camera: Camera
     pen: Pen
     tip_pen: FloatArray
     cone_cam: FloatArray
-    rotations: FloatArray
-    seen: BoolArray
-    sigma: float
-    led_covariance: FloatArray
+    rotations: FloatArray  # (N, 3, 3), of cam_from_pen
+    seen: BoolArray  # (N, L), LEDs that the images show
+    sigma: float  # noise of one image coordinate, px
+    led_covariance: FloatArray  # (3 L, 3 L), of all LED coordinates of a file, mm^2
+    # (N, m), in which the seat may follow the lean, and the cone drift.
     forms: FloatArray
-    move_covariance: FloatArray
-    jitter: FloatArray
+    move_covariance: FloatArray  # (3 m, 3 m), of the moves of the cone in them, mm^2
+    jitter: FloatArray  # (3, 3), covariance of the seat from image to image, mm^2
+    # (N, L, 2, k), derivative of the LEDs' images by the unknowns of mechanics, px by
+    # mm or px
     mechanics: FloatArray
-    mechanics_covariance: FloatArray
-    edge_widths: FloatArray
+    mechanics_covariance: FloatArray  # (k, k), mean square of these by their priors
+    edge_widths: FloatArray  # (N,), of the LEDs, px; NaN where no areas are known
     priors: Priors
     assumptions: Assumptions
     seed: int
@@ -107,21 +85,11 @@ class Trials:
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """The tip from many trials, compared with the linear budget.
+    """The tip from many trials, compared with the linear budget."""
 
-    Attributes
-    ----------
-    errors : (M, 3) array
-        Of the tip in each trial that could be solved, mm.
-    linear : (3,) array
-        Standard uncertainty by the budget, mm.
-    n_failed : int
-        Trials that gave no tip.
-    """
-
-    errors: FloatArray
-    linear: FloatArray
-    n_failed: int
+    errors: FloatArray  # (M, 3), of the tip in each trial that could be solved, mm
+    linear: FloatArray  # (3,), standard uncertainty by the budget, mm
+    n_failed: int  # trials that gave no tip
 
     @property
     def deviation(self) -> FloatArray:

@@ -37,20 +37,12 @@ NOT_COVERED = message("pivot.not-covered")
 
 @dataclass(frozen=True, eq=False)
 class PivotCalibration:
-    """Tip and pivot of poses, with covariance and warnings.
+    """Tip and pivot of poses, with covariance and warnings."""
 
-    Attributes
-    ----------
-    fit : PivotFit
-        Its covariance is that of independent noise.
-    covariance : (6, 6) array
-        Of (tip_pen, pivot_cam), with residuals that hang together, mm^2.
-    groups : PoseGroups or None
-        Set if the poses have two tips or pivots; the fit uses the larger group.
-    """
-
-    fit: PivotFit
+    fit: PivotFit  # its covariance is that of independent noise
+    # (6, 6), of (tip_pen, pivot_cam), with residuals that hang together, mm^2.
     covariance: FloatArray
+    # Set if the poses have two tips or pivots; the fit uses the larger group.
     groups: PoseGroups | None
     warnings: tuple[Message, ...]
 

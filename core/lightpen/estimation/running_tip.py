@@ -15,18 +15,11 @@ from lightpen.model.rigid import skew
 
 @dataclass(frozen=True, eq=False)
 class RunningTip:
-    """The tip by the first n images, for n = `first`, `first` + 1 ...
-
-    Attributes
-    ----------
-    tips : (M, 3) array
-        Pen frame, mm.
-    covariances : (M, 3, 3) array
-        By noise that is independent from image to image, mm^2.
-    """
+    """The tip by the first n images, for n = `first`, `first` + 1 ..."""
 
     first: int
-    tips: FloatArray
+    tips: FloatArray  # (M, 3), pen frame, mm
+    # (M, 3, 3), by noise that is independent from image to image, mm^2.
     covariances: FloatArray
 
 

@@ -34,27 +34,13 @@ TINY = 1e-30
 
 @dataclass(frozen=True, eq=False)
 class SpinFit:
-    """The axis that a pen was spun about.
+    """The axis that a pen was spun about."""
 
-    Attributes
-    ----------
-    axis_pen : (3,) array
-        Unit vector from the ball into the pen, pen frame.
-    axis_cam : (3,) array
-        The same in the camera frame.
-    expanded_uncertainty : float
-        U (k = 2) of its direction, rad.
-    turn : float
-        Angle that the pen was turned through, rad.
-    wobble : float
-        By which the axis was tilted on the way, rms, rad.
-    """
-
-    axis_pen: FloatArray
-    axis_cam: FloatArray
-    expanded_uncertainty: float
-    turn: float
-    wobble: float
+    axis_pen: FloatArray  # (3,), unit vector from the ball into the pen, pen frame
+    axis_cam: FloatArray  # (3,), the same in the camera frame
+    expanded_uncertainty: float  # U (k = 2) of its direction, rad
+    turn: float  # angle that the pen was turned through, rad
+    wobble: float  # by which the axis was tilted on the way, rms, rad
 
 
 def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinFit:

@@ -54,28 +54,16 @@ MOST_SHRUNK = 0.01  # of an assumed standard deviation
 
 @dataclass(frozen=True, eq=False)
 class Adjustment:
-    """An adjustment of tip, cone and all parameters of the files.
+    """An adjustment of tip, cone and all parameters of the files."""
 
-    Attributes
-    ----------
-    bundle : Bundle
-        The estimate, with assumed camera priors shrunk, and without unlikely mechanics.
-    unshrunk : Bundle
-        The same with these priors as assumed.
-    whole : Bundle
-        The same with all mechanics, too; its covariance is the uncertainty.
-    priors : Priors
-        Priors of ``unshrunk`` with contradicted numbers released.
-    effects : tuple of SearchedEffect
-        Of lens and timing; candidates are unknowns of all three.
-    """
-
+    # The estimate, with assumed camera priors shrunk, and without unlikely mechanics.
     bundle: Bundle
-    unshrunk: Bundle
-    whole: Bundle
-    priors: Priors
+    unshrunk: Bundle  # the same with these priors as assumed
+    whole: Bundle  # the same with all mechanics, too; its covariance is the uncertainty
+    priors: Priors  # priors of ``unshrunk`` with contradicted numbers released
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
+    # Of lens and timing; candidates are unknowns of all three.
     effects: tuple[SearchedEffect, ...]
 
     def shift_from(self, other: Bundle) -> FloatArray:

@@ -54,57 +54,34 @@ OPPOSED = 0.5  # share of the last step; a step back by more is halved
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """A solution of the bundle adjustment, with p unknowns.
-
-    Attributes
-    ----------
-    state : BundleState
-        State with adjusted cameras and pen.
-    values : (p,) array
-        Deviations from the files; tip and cone are 0.
-    components : Components
-        Standard deviations of the random effects in the fit.
-    budget_components : Components
-        The same in the uncertainty budget: less than in the fit where correlated noise
-        explains a part of them.
-    residuals : (N, C, L, 2) array
-        Observed minus modelled centres, px, the seat included; NaN where not seen.
-    used : (N, C, L) array of bool
-    sigma : float
-        Noise of one image coordinate, px.
-    information : (p, p) array
-        N of equation (14), of the images, rotations eliminated.
-    prior_information : (p, p) array
-        L of equation (14).
-    measured_information : (p, p) array
-        M of equation (14), of disc areas and the distance of two cones.
-    jitter_information : (p, p) array
-        Part of the covariance of the right side that is from a significant jitter of
-        the seat: J of equation (15).
-    insignificant_jitter : (p, p) array
-        The same of the expected jitter where it is not significant.
-    weight_sigma : float
-        Standard deviation by which LEDs were weighted, px: ``sigma``, and more where
-        noise is correlated.
-    covariance : (p, p) array
-        P of equation (14), images taken as independent.
-    """
+    """A solution of the bundle adjustment, with p unknowns."""
 
     unknowns: Unknowns
-    state: BundleState
-    values: FloatArray
-    components: Components
+    state: BundleState  # state with adjusted cameras and pen
+    values: FloatArray  # (p,), deviations from the files; tip and cone are 0
+    components: Components  # standard deviations of the random effects in the fit
+    # The same in the uncertainty budget: less than in the fit where correlated noise
+    # explains a part of them.
     budget_components: Components
+    # (N, C, L, 2), observed minus modelled centres, px, the seat included; NaN where
+    # not seen.
     residuals: FloatArray
-    used: BoolArray
-    sigma: float
+    used: BoolArray  # (N, C, L)
+    sigma: float  # noise of one image coordinate, px
+    # (p, p), N of equation (14), of the images, rotations eliminated.
     information: FloatArray
-    prior_information: FloatArray
+    prior_information: FloatArray  # (p, p), L of equation (14)
+    # (p, p), M of equation (14), of disc areas and the distance of two cones.
     measured_information: FloatArray
+    # (p, p), part of the covariance of the right side that is from a significant jitter
+    # of the seat: J of equation (15).
     jitter_information: FloatArray
+    # (p, p), the same of the expected jitter where it is not significant.
     insignificant_jitter: FloatArray
+    # Standard deviation by which LEDs were weighted, px: ``sigma``, and more where
+    # noise is correlated.
     weight_sigma: float
-    covariance: FloatArray
+    covariance: FloatArray  # (p, p), P of equation (14), images taken as independent
 
     @cached_property
     def budget_prior(self) -> FloatArray:

@@ -12,30 +12,15 @@ NONE = Component(0.0, 0.0)
 
 
 class Components(NamedTuple):
-    """Estimated standard deviations of the random effects.
+    """Estimated standard deviations of the random effects."""
 
-    Attributes
-    ----------
-    leds : Component
-        Of one LED coordinate, mm; none where the images do not contradict the file.
-    seat : tuple of Component
-        Of the seat by each kind of mode, mm.
-    oval : Component
-        Of the two coefficients of an oval seat, see `oval_seat`, mm.
-    drift : Component
-        Of the cone over the whole range of each drift mode, mm.
-    jitter : RandomEffect
-        Seating from image to image.
-    effects : tuple of EffectComponent
-        Of the effects that are fitted.
-    """
-
+    # Of one LED coordinate, mm; none where the images do not contradict the file.
     leds: Component
-    seat: tuple[Component, ...]
-    oval: Component
-    drift: Component
-    jitter: RandomEffect
-    effects: tuple[EffectComponent, ...] = ()
+    seat: tuple[Component, ...]  # of the seat by each kind of mode, mm
+    oval: Component  # of the two coefficients of an oval seat, see `oval_seat`, mm
+    drift: Component  # of the cone over the whole range of each drift mode, mm
+    jitter: RandomEffect  # seating from image to image
+    effects: tuple[EffectComponent, ...] = ()  # of the effects that are fitted
 
     @property
     def sigmas(self) -> list[float]:

@@ -30,36 +30,22 @@ SCALE = message("file.scale")
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A number of a file that the images contradict.
+    """A number of a file that the images contradict."""
 
-    Attributes
-    ----------
-    what : Message
-        Name of it.
-    stated, stated_uncertainty : float
-        Value in the file and its U (k = 2), in ``unit``.
-    estimated, estimated_uncertainty : float
-        Estimate of the images without it; U (k = 2), in ``unit``.
-    deviations : float
-        Their difference in standard deviations.
-    camera : str
-        Camera whose file is concerned; empty for a single camera.
-    of_rig : bool
-        Whether it is the rig's file that says so, and not the camera's.
-    of_pen : bool
-        Whether it is the LED file.
-    """
-
-    what: Message
+    what: Message  # name of it
     unit: str
+    # `stated` and `stated_uncertainty`: value in the file and its U (k = 2), in
+    # ``unit``.
     stated: float
     stated_uncertainty: float
+    # `estimated` and `estimated_uncertainty`: estimate of the images without it; U (k =
+    # 2), in ``unit``.
     estimated: float
     estimated_uncertainty: float
-    deviations: float
-    camera: str
-    of_rig: bool
-    of_pen: bool = False
+    deviations: float  # their difference in standard deviations
+    camera: str  # camera whose file is concerned; empty for a single camera
+    of_rig: bool  # whether it is the rig's file that says so, and not the camera's
+    of_pen: bool = False  # whether it is the LED file
 
     @property
     def message(self) -> Message:
@@ -111,17 +97,10 @@ class Contradiction:
 
 @dataclass(frozen=True, eq=False)
 class ContradictedInputs:
-    """The contradicted numbers of the files of cameras and rig.
+    """The contradicted numbers of the files of cameras and rig."""
 
-    Attributes
-    ----------
-    numbers : dict of tuple of int
-        Indices of the numbers by index of the file; the rig's file is the last.
-    priors : Priors
-        Priors with the contradicted numbers released.
-    """
-
-    priors: Priors
+    priors: Priors  # priors with the contradicted numbers released
+    # Indices of the numbers by index of the file; the rig's file is the last.
     numbers: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
 

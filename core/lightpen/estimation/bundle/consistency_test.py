@@ -27,29 +27,16 @@ TRIED_TOGETHER = 3  # numbers; more that are wrong are found one by one
 
 @dataclass(frozen=True, eq=False)
 class FileNumber:
-    """A named number of a file, as a linear function of the k unknowns of that file.
-
-    Attributes
-    ----------
-    value : float
-        Stated value in ``unit``.
-    by : (k,) array
-        Derivative of the number by the unknowns.
-    along : (k,) array
-        Change of the unknowns that changes the number, and no other one, by 1.
-    size : float
-        Unit of the unknowns in ``unit``.
-    camera : str
-        Name of the camera whose file states it.
-    """
+    """A named number of a file, as a linear function of the k unknowns of that file."""
 
     what: Message
     unit: str
-    value: float
-    by: FloatArray
+    value: float  # stated value in ``unit``
+    by: FloatArray  # (k,), derivative of the number by the unknowns
+    # (k,), change of the unknowns that changes the number, and no other one, by 1.
     along: FloatArray
-    size: float = 1.0
-    camera: str = ""
+    size: float = 1.0  # unit of the unknowns in ``unit``
+    camera: str = ""  # name of the camera whose file states it
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,42 +51,25 @@ class _Estimate:
 
 @dataclass(frozen=True)
 class ImageEstimate:
-    """Estimate of a number without its prior, in the unit of the unknowns.
+    """Estimate of a number without its prior, in the unit of the unknowns."""
 
-    Attributes
-    ----------
-    change, sigma : float
-        Difference from the file, with its standard deviation.
-    stated_sigma : float
-        Standard deviation that the file states.
-    deviations : float
-        The difference in standard deviations, by equation (8).
-    """
-
+    # `change` and `sigma`: difference from the file, with its standard deviation.
     change: float
     sigma: float
-    stated_sigma: float
-    deviations: float
+    stated_sigma: float  # standard deviation that the file states
+    deviations: float  # the difference in standard deviations, by equation (8)
 
 
 @dataclass(frozen=True, eq=False)
 class FileFit:
-    """Prior and likelihood of the k unknowns of one file, all others marginalised.
-
-    Attributes
-    ----------
-    stated : (k, k) array
-        Covariance that the file states.
-    information, right : (k, k) and (k,) array
-        Of the images.
-    correlation_excess : (k, k) array
-        Covariance of ``right`` beyond the information, by correlated noise.
-    """
+    """Prior and likelihood of the k unknowns of one file, all others marginalised."""
 
     numbers: tuple[FileNumber, ...]
-    stated: FloatArray
+    stated: FloatArray  # (k, k), covariance that the file states
+    # `information` and `right`: (k, k) and (k,), of the images.
     information: FloatArray
     right: FloatArray
+    # (k, k), covariance of ``right`` beyond the information, by correlated noise.
     correlation_excess: FloatArray
 
     @classmethod

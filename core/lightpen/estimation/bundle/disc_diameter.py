@@ -34,21 +34,12 @@ MIN_READINGS = 20
 
 @dataclass(frozen=True)
 class DiameterReading:
-    """Disc diameter by the areas of the images.
+    """Disc diameter by the areas of the images."""
 
-    Attributes
-    ----------
-    value : float
-        mm.
-    sigma : float
-        Its standard uncertainty, mm.
-    shift : float
-        Standard uncertainty of a common shift of all LEDs along their normals by uneven
-        faces, mm.
-    """
-
-    value: float
-    sigma: float
+    value: float  # mm
+    sigma: float  # its standard uncertainty, mm
+    # Standard uncertainty of a common shift of all LEDs along their normals by uneven
+    # faces, mm
     shift: float
 
 

@@ -39,30 +39,19 @@ OF_ONE_CAMERA = (
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """An effect that is fitted.
-
-    Attributes
-    ----------
-    camera : str
-        Of a rig, whose images it shifts; empty of a single camera, and of the pen.
-    size : float
-        Its value where it has one unknown, else the length of the vector of its
-        values, of a lens the root mean square shift: mm, of lens and camera tilt px, of
-        time image intervals.
-    sigma : float or None
-        Standard uncertainty of the size; None of a lens.
-    gain : float
-        Twice the logarithm of the likelihood ratio of this effect to no effect.
-    interval_ms : float or None
-        Time from one image to the next, if known.
-    """
+    """An effect that is fitted."""
 
     name: EffectName
+    # Of a rig, whose images it shifts; empty of a single camera, and of the pen.
     camera: str
+    # Its value where it has one unknown, else the length of the vector of its values,
+    # of a lens the root mean square shift: mm, of lens and camera tilt px, of time
+    # image intervals.
     size: float
-    sigma: float | None
+    sigma: float | None  # standard uncertainty of the size; None of a lens
+    # Twice the logarithm of the likelihood ratio of this effect to no effect.
     gain: float
-    interval_ms: float | None = None
+    interval_ms: float | None = None  # time from one image to the next, if known
 
     @property
     def is_certain(self) -> bool:

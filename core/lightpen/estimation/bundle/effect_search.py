@@ -25,20 +25,13 @@ from lightpen.model.information import inverse
 
 @dataclass(frozen=True, eq=False)
 class SearchedEffect:
-    """An effect beside a fit without it.
-
-    Attributes
-    ----------
-    by_unknowns : (6, k) array
-        Error of (tip, cone) by its unknowns where they are held at 0.
-    is_candidate : bool
-        Whether the images support it.
-    """
+    """An effect beside a fit without it."""
 
     effect: Effect
     component: EffectComponent
+    # (6, k), error of (tip, cone) by its unknowns where they are held at 0.
     by_unknowns: FloatArray
-    is_candidate: bool
+    is_candidate: bool  # whether the images support it
 
     @property
     def covariance(self) -> FloatArray:

@@ -90,27 +90,18 @@ LARGEST = {
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect with k unknowns.
-
-    Attributes
-    ----------
-    camera : int
-        Of the rig, whose images it shifts; 0 of an effect that all cameras see.
-    columns : (N, C, L, 2, k) array
-        Derivative of the LEDs' images, px by mm or px.
-    shapes : tuple of (k, k) array
-        Covariances that it may have, for a standard deviation of 1.
-    stated : float
-        Standard deviation that is stated, assumed or usual, mm or px; 0 if none is.
-    is_exact : bool
-        Whether the covariance is ``shapes[0]`` times the stated variance.
-    """
+    """One effect with k unknowns."""
 
     name: EffectName
+    # Of the rig, whose images it shifts; 0 of an effect that all cameras see.
     camera: int
+    # (N, C, L, 2, k), derivative of the LEDs' images, px by mm or px
     columns: FloatArray
+    # Each (k, k), covariances that it may have, for a standard deviation of 1.
     shapes: tuple[FloatArray, ...]
+    # Standard deviation that is stated, assumed or usual, mm or px; 0 if none is.
     stated: float = 0.0
+    # Whether the covariance is ``shapes[0]`` times the stated variance.
     is_exact: bool = False
 
     @property
@@ -155,24 +146,14 @@ class Effect:
 
 
 class EffectComponent(NamedTuple):
-    """Size of an effect by likelihood.
+    """Size of an effect by likelihood."""
 
-    Attributes
-    ----------
-    sigma : float
-        Standard deviation of maximum likelihood, mm or px.
-    gain : float
-        Twice the logarithm of the likelihood ratio of this effect to no effect.
-    covariance : (k, k) array
-        Of the unknowns with that.
-    expected : (k, k) array
-        Of the unknowns, averaged over what their size may be; of timing their mean
-        square given the images; of mechanics their prior.
-    """
-
-    sigma: float
+    sigma: float  # standard deviation of maximum likelihood, mm or px
+    # Twice the logarithm of the likelihood ratio of this effect to no effect.
     gain: float
-    covariance: FloatArray
+    covariance: FloatArray  # (k, k), of the unknowns with that
+    # (k, k), of the unknowns, averaged over what their size may be; of timing their
+    # mean square given the images; of mechanics their prior.
     expected: FloatArray
 
     @property
@@ -262,16 +243,11 @@ def _root_of(covariance: FloatArray) -> FloatArray:
 
 
 class _Spectrum(NamedTuple):
-    """Unknowns ``root x`` as independent ones x of equal variance s^2 and information.
+    """Unknowns ``root x`` as independent x of one variance s^2 and information."""
 
-    Attributes
-    ----------
-    root : (k, k) array
-    seen, right : (k,) array
-        Information about each, and the right side that belongs to it.
-    """
-
-    root: FloatArray
+    root: FloatArray  # (k, k)
+    # `seen` and `right`: (k,), information about each, and the right side that belongs
+    # to it.
     seen: FloatArray
     right: FloatArray
 
@@ -299,21 +275,13 @@ class _Spectrum(NamedTuple):
 
 
 class ConeMoves(NamedTuple):
-    """Moves of the tip against the cone, mm, in the frame of the rig.
+    """Moves of the tip against the cone, mm, in the frame of the rig."""
 
-    Attributes
-    ----------
-    lean : (N, 2) array
-        The pen's axis across the axis of the cone, right and away.
-    compliance : (N, 3, 2) array
-        By 1 mm of compliance of the stylus, and of seat or stand.
-    loose : (N, 3, 3) array
-        By the three unknowns of a loose stylus.
-    """
-
+    # (N, 2), the pen's axis across the axis of the cone, right and away.
     lean: FloatArray
+    # (N, 3, 2), by 1 mm of compliance of the stylus, and of seat or stand.
     compliance: FloatArray
-    loose: FloatArray
+    loose: FloatArray  # (N, 3, 3), by the three unknowns of a loose stylus
 
 
 def cone_moves(rotations: FloatArray, axes: FloatArray) -> ConeMoves:

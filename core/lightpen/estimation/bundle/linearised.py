@@ -21,28 +21,16 @@ N_CONE = 3
 
 @dataclass(frozen=True, eq=False)
 class BundleState:
-    """Parameters of the images of a swing.
-
-    Attributes
-    ----------
-    tip_pen : (3,) array
-        mm.
-    cone_rig : (3,) array
-        mm.
-    rotations : (N, 3, 3) array
-        Of rig_from_pen.
-    at_second : (N,) array of bool or None
-        Images in which the tip rests in a second cone; None without one.
-    between_rig : (3,) array
-        From the first cone to the second, mm.
-    """
+    """Parameters of the images of a swing."""
 
     rig: Rig
     pen: Pen
-    tip_pen: FloatArray
-    cone_rig: FloatArray
-    rotations: FloatArray
+    tip_pen: FloatArray  # (3,), mm
+    cone_rig: FloatArray  # (3,), mm
+    rotations: FloatArray  # (N, 3, 3), of rig_from_pen
+    # (N,), images in which the tip rests in a second cone; None without one.
     at_second: BoolArray | None = None
+    # (3,), from the first cone to the second, mm
     between_rig: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
@@ -70,31 +58,21 @@ class BundleState:
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """The images of one camera around a state.
+    """The images of one camera around a state."""
 
-    Attributes
-    ----------
-    residuals : (N, L, 2) array
-        Observed minus modelled centres, px; NaN where an LED was not seen.
-    turn, cone, led : (N, L, 2, 3) array
-        Derivative of the modelled centres by the rotation vector of the image (left,
-        rad), the cone point and the LED itself (mm).
-    own : (N, L, 2, k) array
-        By the intrinsics of the camera and, unless it is the first of the rig, by its
-        rotation and translation in the rig.
-    effects : (N, L, 2, E) array
-        By the unknowns of `lightpen.estimation.bundle.effects`.
-    diameter : (N, L, 2) array
-        By the diameter of the discs.
-    """
-
+    # (N, L, 2), observed minus modelled centres, px; NaN where an LED was not seen.
     residuals: FloatArray
+    # `turn`, `cone` and `led`: (N, L, 2, 3), derivative of the modelled centres by the
+    # rotation vector of the image (left, rad), the cone point and the LED itself (mm).
     turn: FloatArray
     cone: FloatArray
     led: FloatArray
+    # (N, L, 2, k), by the intrinsics of the camera and, unless it is the first of the
+    # rig, by its rotation and translation in the rig.
     own: FloatArray
+    # (N, L, 2, E), by the unknowns of `lightpen.estimation.bundle.effects`.
     effects: FloatArray
-    diameter: FloatArray
+    diameter: FloatArray  # (N, L, 2), by the diameter of the discs
 
     def in_units_of(self, noise: FloatArray) -> "CameraView":
         """Return residuals and derivatives by the noise of each LED, (N, L)."""
@@ -164,39 +142,24 @@ class NormalEquations:
     """Normal equations of the images of a swing, in units of the noise.
 
     Columns: cone (3), each camera's own, effects (E), diameter, LEDs (3 L).
-
-    Attributes
-    ----------
-    N : (K, K) array
-    b : (K,) array
-    cone_rows : (N, 3, K) array
-        What each image adds to the three rows of the cone.
-    cone_right : (N, 3) array
-        What it adds to their right side.
     """
 
-    N: FloatArray
-    b: FloatArray
+    N: FloatArray  # (K, K)
+    b: FloatArray  # (K,)
+    # (N, 3, K), what each image adds to the three rows of the cone.
     cone_rows: FloatArray
-    cone_right: FloatArray
+    cone_right: FloatArray  # (N, 3), what it adds to their right side
 
 
 @dataclass(frozen=True, eq=False)
 class Eliminated(NormalEquations):
-    """The same with the rotations eliminated, equation (3).
+    """The same with the rotations eliminated, equation (3)."""
 
-    Attributes
-    ----------
-    turn : (N, q) array
-        Step of the eliminated unknowns of each image where the others stand: its
-        rotation, and with jitter its seat.
-    turn_by_step : (N, q, K) array
-    nuisance_covariance : (N, q, q) array
-        Inverse of the normal matrix of the eliminated unknowns.
-    """
-
+    # (N, q), step of the eliminated unknowns of each image where the others stand: its
+    # rotation, and with jitter its seat.
     turn: FloatArray
-    turn_by_step: FloatArray
+    turn_by_step: FloatArray  # (N, q, K)
+    # (N, q, q), inverse of the normal matrix of the eliminated unknowns.
     nuisance_covariance: FloatArray
 
 

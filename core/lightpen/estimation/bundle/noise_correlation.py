@@ -40,29 +40,18 @@ NOISE_PASSES = 2  # over variance and components
 
 @dataclass(frozen=True, eq=False)
 class Correlation:
-    """Correlation of the noise, and its effect on the covariance.
+    """Correlation of the noise, and its effect on the covariance."""
 
-    Attributes
-    ----------
-    coefficient : float
-        f of equation (12), of the errors of a coordinate from one image to the next; 0
-        where it is not significant.
-    noise : (6, 6) array
-        Covariance of (tip, cone) by noise, equation (13), mm^2.
-    factor : float
-        Ratio of that to the covariance by independent noise, on average.
-    components : Components or None
-        Components of LEDs, seat and drift in addition to correlated noise; None without
-        correlation.
-    excess : (p, p) array or None
-        Covariance of the fitted values by equation (13), less that of the fit; None
-        without correlation.
-    """
-
+    # F of equation (12), of the errors of a coordinate from one image to the next; 0
+    # where it is not significant.
     coefficient: float
-    noise: FloatArray
-    factor: float
+    noise: FloatArray  # (6, 6), covariance of (tip, cone) by noise, equation (13), mm^2
+    factor: float  # ratio of that to the covariance by independent noise, on average
+    # Components of LEDs, seat and drift in addition to correlated noise; None without
+    # correlation.
     components: Components | None
+    # (p, p), covariance of the fitted values by equation (13), less that of the fit;
+    # None without correlation.
     excess: FloatArray | None
 
 
@@ -129,18 +118,10 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
 
 
 class _NoiseModel(NamedTuple):
-    """The likeliest model with one coefficient of autoregression.
+    """The likeliest model with one coefficient of autoregression."""
 
-    Attributes
-    ----------
-    cost : float
-        Twice the negative logarithm of the restricted likelihood.
-    variance : float
-        Noise variance, relative to that of the LED weights.
-    """
-
-    cost: float
-    variance: float
+    cost: float  # twice the negative logarithm of the restricted likelihood
+    variance: float  # noise variance, relative to that of the LED weights
     components: Components
 
 

@@ -21,18 +21,10 @@ REFERENCE_TEMPERATURE = 20.0  # degrees C, at which lengths are stated: ISO 1
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Prior of some unknowns.
+    """Prior of some unknowns."""
 
-    Attributes
-    ----------
-    covariance : (k, k) array
-        Of their deviation from what the file says.
-    assumed : bool
-        Whether the file states none.
-    """
-
-    covariance: FloatArray
-    assumed: bool
+    covariance: FloatArray  # (k, k), of their deviation from what the file says
+    assumed: bool  # whether the file states none
 
 
 @dataclass(frozen=True)
@@ -45,49 +37,27 @@ class ConeSeparation:
 
 @dataclass(frozen=True, eq=False)
 class Priors:
-    """Priors of all unknowns but tip, cone and rotations.
+    """Priors of all unknowns but tip, cone and rotations."""
 
-    Attributes
-    ----------
-    cameras : tuple of Prior
-        Intrinsics of each camera.
-    extrinsics : Prior or None
-        Extrinsics of all cameras but the first, as in `Rig.covariance`; None for a
-        single camera.
-    scale : Prior
-        Relative scale of all LED coordinates, from the LED measurement.
-    temperature : Prior
-        Scale by temperature.
-    diameter : Prior
-        Of the discs, mm.
-    led_sigma : float or None
-        Of one LED coordinate, mm; None: to be found from the images.
-    compliance : float
-        Standard deviation of how far stylus, seat or stand give way, mm by the sine of
-        the lean.
-    led_covariance : (3 L, 3 L) array or None
-        Of all of them, mm^2, where more is known than ``led_sigma``.
-    form_error : float
-        Standard deviation of the seat along each axis in each mode, mm.
-    center_bias : float
-        Standard deviation of errors of a centre that repeat with the posture, px.
-    reading : DiameterReading or None
-        Disc diameter from the image areas.
-    separation : ConeSeparation or None
-        Separation of the second cone from the first.
-    """
-
-    cameras: tuple[Prior, ...]
+    cameras: tuple[Prior, ...]  # intrinsics of each camera
+    # Extrinsics of all cameras but the first, as in `Rig.covariance`; None for a single
+    # camera.
     extrinsics: Prior | None
-    scale: Prior
-    temperature: Prior
-    diameter: Prior
+    scale: Prior  # relative scale of all LED coordinates, from the LED measurement
+    temperature: Prior  # scale by temperature
+    diameter: Prior  # of the discs, mm
+    # Of one LED coordinate, mm; None: to be found from the images.
     led_sigma: float | None
-    form_error: float
+    form_error: float  # standard deviation of the seat along each axis in each mode, mm
+    # Standard deviation of errors of a centre that repeat with the posture, px
     center_bias: float
+    # Standard deviation of how far stylus, seat or stand give way, mm by the sine of
+    # the lean.
     compliance: float = 0.0
+    # (3 L, 3 L), of all of them, mm^2, where more is known than ``led_sigma``.
     led_covariance: FloatArray | None = None
-    reading: DiameterReading | None = None
+    reading: DiameterReading | None = None  # disc diameter from the image areas
+    # Separation of the second cone from the first.
     separation: ConeSeparation | None = None
 
     @property

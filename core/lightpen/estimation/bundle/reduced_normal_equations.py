@@ -14,25 +14,14 @@ class WhitenedEquations(NamedTuple):
     """Normal equations of all images by generalised least squares.
 
     The unknowns of each image are eliminated.
-
-    Attributes
-    ----------
-    information : (p, p) array
-    gradient : (p,) array
-    squares : float
-        Sum of the squared residuals after the unknowns of single images were
-        eliminated.
-    log_volume : float
-        Log determinants of the noise and of the eliminated unknowns.
-    n_free : int
-        Observations more than unknowns eliminated.
     """
 
-    information: FloatArray
-    gradient: FloatArray
+    information: FloatArray  # (p, p)
+    gradient: FloatArray  # (p,)
+    # Sum of the squared residuals after the unknowns of single images were eliminated.
     squares: float
-    log_volume: float
-    n_free: int
+    log_volume: float  # log determinants of the noise and of the eliminated unknowns
+    n_free: int  # observations more than unknowns eliminated
 
 
 RIDGE = 1e-12  # of the mean of a diagonal, where an image shows nothing
@@ -43,27 +32,16 @@ class ImageRows:
     """The linear model of a fit, in units of the standard deviation that weighs it.
 
     M is the number of coordinates of an image.
-
-    Attributes
-    ----------
-    eliminated : (N, M, q) array
-        Derivatives by the unknowns of each image.
-    nuisance_covariance : (N, q, q) array
-        Inverse of their normal matrix.
-    projected : (N, M, p) array
-        J of equation (13): ``common`` with the unknowns of each image eliminated.
-    common : (N, M, p) array
-        Derivatives by the common unknowns.
-    residuals : (N, M) array
-    used : (N, M) array of bool
     """
 
-    eliminated: FloatArray
-    nuisance_covariance: FloatArray
+    eliminated: FloatArray  # (N, M, q), derivatives by the unknowns of each image
+    nuisance_covariance: FloatArray  # (N, q, q), inverse of their normal matrix
+    # (N, M, p), J of equation (13): ``common`` with the unknowns of each image
+    # eliminated.
     projected: FloatArray
-    common: FloatArray
-    residuals: FloatArray
-    used: BoolArray
+    common: FloatArray  # (N, M, p), derivatives by the common unknowns
+    residuals: FloatArray  # (N, M)
+    used: BoolArray  # (N, M)
 
     def whitened(
         self, coefficients: FloatArray, jitter: FloatArray | None

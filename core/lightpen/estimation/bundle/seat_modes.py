@@ -20,21 +20,11 @@ SMALLEST = 1e-9  # size of a mode; less is rounding
 
 
 class SeatModes(NamedTuple):
-    """Weights of the modes in each of N images.
+    """Weights of the modes in each of N images."""
 
-    Attributes
-    ----------
-    lean : (N, 7) array
-        Of the seat, see `tilt_modes`.
-    oval : (21, 2) array
-        Moves in these modes by an oval seat, see `oval_seat`.
-    drift : (N, D) array
-        Of the cone, see `drift_modes`.
-    """
-
-    lean: FloatArray
-    oval: FloatArray
-    drift: FloatArray
+    lean: FloatArray  # (N, 7), of the seat, see `tilt_modes`
+    oval: FloatArray  # (21, 2), moves in these modes by an oval seat, see `oval_seat`
+    drift: FloatArray  # (N, D), of the cone, see `drift_modes`
 
 
 def seat_modes_of(rotations: FloatArray, shifts: FloatArray | None = None) -> SeatModes:

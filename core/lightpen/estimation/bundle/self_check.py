@@ -34,18 +34,10 @@ RIDGE = 1e-9  # of the trace of the normal matrix of a pose
 
 
 class SelfCheck(NamedTuple):
-    """Cross-validation: prediction of LEDs by the others.
+    """Cross-validation: prediction of LEDs by the others."""
 
-    Attributes
-    ----------
-    value : float
-        1 by chance; larger where errors follow the posture.
-    limit : float
-        Which noise alone exceeds in one of a hundred swings.
-    """
-
-    value: float
-    limit: float
+    value: float  # 1 by chance; larger where errors follow the posture
+    limit: float  # which noise alone exceeds in one of a hundred swings
 
     @property
     def is_passed(self) -> bool:

@@ -17,20 +17,12 @@ FEWEST_LEDS = 4  # that define a frame
 
 
 class TipFrames(NamedTuple):
-    """The tip in both frames, (3,) each, mm.
+    """The tip in both frames, (3,) each, mm."""
 
-    Attributes
-    ----------
-    of_file : (3,) array
-        In the frame in which the LEDs that are not displaced fit the file best.
-    of_all : (3,) array
-        In the frame in which all LEDs as they are fit it best.
-    is_of_file : bool
-        Whether result and U refer to the former: the displaced LEDs were left out.
-    """
-
+    # (3,), in the frame in which the LEDs that are not displaced fit the file best.
     of_file: FloatArray
-    of_all: FloatArray
+    of_all: FloatArray  # (3,), in the frame in which all LEDs as they are fit it best
+    # Whether result and U refer to the former: the displaced LEDs were left out.
     is_of_file: bool
 
 

@@ -50,39 +50,21 @@ class ParameterLayout(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """The unknowns of a fit as combinations of the columns of `NormalEquations`.
+    """The unknowns of a fit as combinations of the columns of `NormalEquations`."""
 
-    Attributes
-    ----------
-    layout : ParameterLayout
-        Indices of each kind.
-    mixing : (K, p0) array
-        Columns of `NormalEquations` by the unknowns common to all images.
-    forms : (N, m) array
-        Weights of the moves of the cone in each image: seat modes, drift modes, and 1
-        at the second cone.
-    oval : (21, 2) array
-        Moves in the seat modes by an oval seat.
-    basis : (3 L, 3 L - 6) array
-        Moves of LEDs but those of the pen as a whole.
-    scaling : (3 L,) array
-        Move of the LEDs by a scale of 1.
-    effects : tuple of Effect
-        That are fitted.
-    noise : (N, C, L) array
-        Noise of the LEDs' centres, by that of a usual one.
-    """
-
-    layout: ParameterLayout
+    layout: ParameterLayout  # indices of each kind
     start: BundleState
+    # (K, p0), columns of `NormalEquations` by the unknowns common to all images.
     mixing: FloatArray
+    # (N, m), weights of the moves of the cone in each image: seat modes, drift modes,
+    # and 1 at the second cone.
     forms: FloatArray
-    oval: FloatArray
-    basis: FloatArray
-    scaling: FloatArray
+    oval: FloatArray  # (21, 2), moves in the seat modes by an oval seat
+    basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs but those of the pen as a whole
+    scaling: FloatArray  # (3 L,), move of the LEDs by a scale of 1
     priors: Priors
-    effects: tuple[Effect, ...]
-    noise: FloatArray
+    effects: tuple[Effect, ...]  # that are fitted
+    noise: FloatArray  # (N, C, L), noise of the LEDs' centres, by that of a usual one
 
     @classmethod
     def of(

@@ -39,24 +39,13 @@ FAR = 3.0  # times the usual distance; what lies farther has slipped
 
 @dataclass(frozen=True, eq=False)
 class CameraPath:
-    """Shift of the images of a camera by its fixed lamps.
+    """Shift of the images of a camera by its fixed lamps."""
 
-    Attributes
-    ----------
-    lamps : (K, 2) array
-        Of the lamps, px.
-    shifts : (N, 2) array
-        Shift of each image, filtered of noise, px; 0 on average.
-    noise : float
-        Standard deviation of a coordinate of the lamps in one image, px.
-    is_followed : bool
-        Whether the pen shifts with the lamps: the camera moves.
-    """
-
-    lamps: FloatArray
+    lamps: FloatArray  # (K, 2), of the lamps, px
+    # (N, 2), shift of each image, filtered of noise, px; 0 on average.
     shifts: FloatArray
-    noise: float
-    is_followed: bool = False
+    noise: float  # standard deviation of a coordinate of the lamps in one image, px
+    is_followed: bool = False  # whether the pen shifts with the lamps: the camera moves
 
     @cached_property
     def moved(self) -> float:
@@ -67,19 +56,11 @@ class CameraPath:
 
 @dataclass(frozen=True, eq=False)
 class SteadyImages:
-    """The images of one camera with its motion removed.
+    """The images of one camera with its motion removed."""
 
-    Attributes
-    ----------
-    observations : Observations
-        Observations with the camera motion removed.
-    path : CameraPath or None
-        None without a fixed lamp in view.
-    """
-
-    observations: Observations
+    observations: Observations  # observations with the camera motion removed
     posed: PosedImages
-    path: CameraPath | None
+    path: CameraPath | None  # None without a fixed lamp in view
 
 
 def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> SteadyImages:

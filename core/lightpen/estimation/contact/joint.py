@@ -53,36 +53,22 @@ ONE_LED_RIDGE = 1e-10  # of the trace; or all but one, about which it turns free
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """Tip and cone from all images together.
+    """Tip and cone from all images together."""
 
-    Attributes
-    ----------
-    tip_pen : (3,) array
-        Tip in the pen frame, mm.
-    cone_cam : (3,) array
-        Cone point in the frame of the camera, or of the rig, mm.
-    rotations : (N, 3, 3) array
-        Of cam_from_pen, or rig_from_pen.
-    residuals : (N, L, 2) array
-        Observed minus modelled ellipse centres, px; NaN where an LED was not seen. Of
-        C cameras (N, C L, 2): the LEDs of one camera after those of the other.
-    used : (N, L) array of bool
-        LEDs below the outlier threshold; none of an image that has fewer than three.
-    sigma : float
-        Standard deviation of one image coordinate, px.
-    information : (N, 6, 6) array
-        What each image says of (tip, cone), rotation eliminated, 1/mm^2.
-    gradients : (N, 6) array
-        ``information`` times the step that the image alone would take, 1/mm.
-    """
-
-    tip_pen: FloatArray
+    tip_pen: FloatArray  # (3,), tip in the pen frame, mm
+    # (3,), cone point in the frame of the camera, or of the rig, mm
     cone_cam: FloatArray
-    rotations: FloatArray
+    rotations: FloatArray  # (N, 3, 3), of cam_from_pen, or rig_from_pen
+    # (N, L, 2). Observed minus modelled ellipse centres, px; NaN where an LED was not
+    # seen. Of C cameras (N, C L, 2): the LEDs of one camera after those of the other.
     residuals: FloatArray
+    # (N, L), LEDs below the outlier threshold; none of an image that has fewer than
+    # three.
     used: BoolArray
-    sigma: float
+    sigma: float  # standard deviation of one image coordinate, px
+    # (N, 6, 6), what each image says of (tip, cone), rotation eliminated, 1/mm^2.
     information: FloatArray
+    # (N, 6), ``information`` times the step that the image alone would take, 1/mm
     gradients: FloatArray
 
     @property
@@ -193,23 +179,15 @@ def joint_at(
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """The model around one state.
+    """The model around one state."""
 
-    Attributes
-    ----------
-    rotations, tip_pen, cone_cam : (N, 3, 3), (3,), (3,) array
-        The state.
-    residuals : (N, C L, 2) array
-        Observed minus modelled, px.
-    jacobian : (N, C L, 2, 6) array
-        d pixel by the image's rotation vector (left) and the cone; rad, mm. The tip
-        moves the images as the cone does, turned: `by_tip_and_cone`.
-    """
-
+    # `rotations`, `tip_pen` and `cone_cam`: (N, 3, 3) and (3,) and (3,), the state.
     rotations: FloatArray
     tip_pen: FloatArray
     cone_cam: FloatArray
-    residuals: FloatArray
+    residuals: FloatArray  # (N, C L, 2), observed minus modelled, px
+    # (N, C L, 2, 6). d pixel by the image's rotation vector (left) and the cone; rad,
+    # mm. The tip moves the images as the cone does, turned: `by_tip_and_cone`.
     jacobian: FloatArray
 
     @property
@@ -223,16 +201,11 @@ class Linearised:
 
 @dataclass(frozen=True, eq=False)
 class ContactModel:
-    """Images of a pen whose tip rests in the cone.
-
-    Attributes
-    ----------
-    pixels : (N, C, L, 2) array
-        Observed ellipse centres, px; NaN where an LED was not seen.
-    """
+    """Images of a pen whose tip rests in the cone."""
 
     rig: Rig
     pen: Pen
+    # (N, C, L, 2), observed ellipse centres, px; NaN where an LED was not seen.
     pixels: FloatArray
 
     @classmethod

@@ -17,27 +17,17 @@ MIN_SEEN = 6  # images, to speak of a displacement
 
 @dataclass(frozen=True, eq=False)
 class LedQuality:
-    """Quality of the fit of each LED.
+    """Quality of the fit of each LED."""
 
-    Attributes
-    ----------
-    n_seen, n_used : (L,) array of int
-        Images in which the LED was seen, and was used.
-    rms : (L,) array
-        Root mean square residual of the images that use the LED, px; NaN if none.
-    mean : (L, 2) array
-        Mean residual of these, px; NaN if none.
-    displacement : (L, 3) array
-        How far the LED sits off its place in the file, pen frame, mm.
-    displaced : tuple of int
-        Numbers of the LEDs, from 1, that stand out by their displacement.
-    """
-
+    # `n_seen` and `n_used`: (L,), images in which the LED was seen, and was used.
     n_seen: IntArray
     n_used: IntArray
+    # (L,), root mean square residual of the images that use the LED, px; NaN if none.
     rms: FloatArray
-    mean: FloatArray
+    mean: FloatArray  # (L, 2), mean residual of these, px; NaN if none
+    # (L, 3), how far the LED sits off its place in the file, pen frame, mm
     displacement: FloatArray
+    # Numbers of the LEDs, from 1, that stand out by their displacement.
     displaced: tuple[int, ...]
 
 

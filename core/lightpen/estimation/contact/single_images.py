@@ -27,28 +27,15 @@ TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 @dataclass(frozen=True, eq=False)
 class PosedImages:
-    """The images of one camera, each alone.
+    """The images of one camera, each alone."""
 
-    Attributes
-    ----------
-    reasons : (N,) array of Reason
-        Why an image is left out.
-    posed : (M,) array of int
-        Images that have a pose.
-    fitted : (F,) array of int
-        Images whose pose most LEDs agree with; ``pivot`` is of these.
-    kept : (K,) array of int
-        Those among the M whose tip is where most have it.
-    pivot : PivotFit
-        Tip and cone, from poses of which most are ``kept``.
-    """
-
-    reasons: npt.NDArray[np.object_]
-    posed: IntArray
+    reasons: npt.NDArray[np.object_]  # (N,), why an image is left out
+    posed: IntArray  # (M,), images that have a pose
     poses: Poses
+    # (F,), images whose pose most LEDs agree with; ``pivot`` is of these.
     fitted: IntArray
-    kept: IntArray
-    pivot: PivotFit
+    kept: IntArray  # (K,), those among the M whose tip is where most have it
+    pivot: PivotFit  # tip and cone, from poses of which most are ``kept``
 
     @property
     def chosen(self) -> IntArray:

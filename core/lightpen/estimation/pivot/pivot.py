@@ -34,30 +34,18 @@ TINY = 1e-12  # mm; exact poses have no scatter
 
 @dataclass(frozen=True, eq=False)
 class PivotFit:
-    """Tip of a pen, and the point that it pivots about.
+    """Tip of a pen, and the point that it pivots about."""
 
-    Attributes
-    ----------
-    tip_pen : (3,) array
-        Tip in the pen frame, mm.
-    pivot_cam : (3,) array
-        Point the tip rested on, in the camera frame, mm.
-    covariance : (6, 6) array
-        Of (tip_pen, pivot_cam), mm^2, by noise that is independent from pose to pose.
-    residuals : (N, 3) array
-        Where each pose puts the tip, minus ``pivot_cam``, camera frame, mm.
-    distances : (N,) array
-        Length of the residuals in standard deviations, 1.73 on average.
-    used : (N,) array of bool
-        Poses that agree with the pivot; the others were left out.
-    """
-
-    tip_pen: FloatArray
-    pivot_cam: FloatArray
+    tip_pen: FloatArray  # (3,), tip in the pen frame, mm
+    pivot_cam: FloatArray  # (3,), point the tip rested on, in the camera frame, mm
+    # (6, 6), of (tip_pen, pivot_cam), mm^2, by noise that is independent from pose to
+    # pose.
     covariance: FloatArray
+    # (N, 3), where each pose puts the tip, minus ``pivot_cam``, camera frame, mm
     residuals: FloatArray
+    # (N,), length of the residuals in standard deviations, 1.73 on average.
     distances: FloatArray
-    used: BoolArray
+    used: BoolArray  # (N,), poses that agree with the pivot; the others were left out
 
     @property
     def rms(self) -> float:

@@ -40,22 +40,15 @@ MAX_LOOKED_AT = 500  # poses, to begin with
 
 @dataclass(frozen=True, eq=False)
 class PoseGroups:
-    """Two groups of poses that do not share tip and pivot.
+    """Two groups of poses that do not share tip and pivot."""
 
-    Attributes
-    ----------
-    group : (N,) array
-        1 for the larger group, or the first of two equal ones, 2 for the other, 0 for
-        poses of neither.
-    tips_pen, pivots_cam : (2, 3) array
-        Of both groups, mm.
-    has_two_tips : bool
-        Whether it is the tip that differs most plainly; else it is the pivot.
-    """
-
+    # (N,), 1 for the larger group, or the first of two equal ones, 2 for the other, 0
+    # for poses of neither.
     group: IntArray
+    # `tips_pen` and `pivots_cam`: (2, 3), of both groups, mm
     tips_pen: FloatArray
     pivots_cam: FloatArray
+    # Whether it is the tip that differs most plainly; else it is the pivot.
     has_two_tips: bool
 
     @property

@@ -31,33 +31,16 @@ TINY = 1e-12  # mm; a shorter distance has no direction
 
 @dataclass(frozen=True, eq=False)
 class TwoStageFit:
-    """Tip and cone by the paper's method, with the record of its convergence.
+    """Tip and cone by the paper's method, with the record of its convergence."""
 
-    Attributes
-    ----------
-    tip_pen : (3,) array
-        (x0, y0, z0), mm.
-    cone_cam : (3,) array
-        (u0, v0, w0), mm.
-    residuals : (N, 3) array
-        Where each pose puts the tip, minus ``cone_cam``, mm.
-    iterates : (K + 1, 6) array
-        X(k), the linear start first, mm.
-    objectives : (K + 1,) array
-        Sum of the squared distances at X(k), mm^2.
-    step_lengths : (K,) array
-        alpha_k.
-    increments : (K,) array
-        ``|alpha_k dX(k)|``, mm.
-    """
-
-    tip_pen: FloatArray
-    cone_cam: FloatArray
+    tip_pen: FloatArray  # (3,), (x0, y0, z0), mm
+    cone_cam: FloatArray  # (3,), (u0, v0, w0), mm
+    # (N, 3), where each pose puts the tip, minus ``cone_cam``, mm
     residuals: FloatArray
-    iterates: FloatArray
-    objectives: FloatArray
-    step_lengths: FloatArray
-    increments: FloatArray
+    iterates: FloatArray  # (K + 1, 6), X(k), the linear start first, mm
+    objectives: FloatArray  # (K + 1,), sum of the squared distances at X(k), mm^2
+    step_lengths: FloatArray  # (K,), alpha_k
+    increments: FloatArray  # (K,), ``|alpha_k dX(k)|``, mm
 
     @property
     def rms(self) -> float:

@@ -23,20 +23,12 @@ from lightpen.model.rigid import vector_from_rotation
 
 @dataclass(frozen=True, eq=False)
 class InitialExtrinsics:
-    """The extrinsics of a rig by the images.
+    """The extrinsics of a rig by the images."""
 
-    Attributes
-    ----------
-    rig : Rig
-        With the file's cameras, without a covariance.
-    lags : tuple of TimeLag or None
-        Time lag of each camera but the first; None if the images do not determine it.
-    apart : (N, C) array of bool
-        Images that are of other moments than those of the cameras before.
-    """
-
-    rig: Rig
+    rig: Rig  # with the file's cameras, without a covariance
+    # Time lag of each camera but the first; None if the images do not determine it.
     lags: tuple[TimeLag | None, ...]
+    # (N, C), images that are of other moments than those of the cameras before.
     apart: BoolArray
 
     def deviations(self, file: Rig) -> FloatArray:

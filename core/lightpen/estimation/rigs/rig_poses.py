@@ -12,14 +12,9 @@ from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 
 
 class RigPoses(NamedTuple):
-    """Poses rig_from_pen at N moments; NaN where no camera has one.
+    """Poses rig_from_pen at N moments; NaN where no camera has one."""
 
-    Attributes
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        mm.
-    """
-
+    # `rotations` and `translations`: (N, 3, 3) and (N, 3), mm
     rotations: FloatArray
     translations: FloatArray
 

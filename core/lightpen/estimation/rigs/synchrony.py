@@ -32,20 +32,11 @@ NOTICEABLE = 2e-4  # rad: 0.04 mm at the far end of a pen
 
 @dataclass(frozen=True, eq=False)
 class PenRotations:
-    """Rotations of the pen at N moments, as one camera or several saw them.
+    """Rotations of the pen at N moments, as one camera or several saw them."""
 
-    Attributes
-    ----------
-    rotations : (N, 3, 3) array
-    variances : (N,) array
-        Of the three axes of each together, rad^2.
-    known : (N,) array of bool
-        Where there is one.
-    """
-
-    rotations: FloatArray
-    variances: FloatArray
-    known: BoolArray
+    rotations: FloatArray  # (N, 3, 3)
+    variances: FloatArray  # (N,), of the three axes of each together, rad^2
+    known: BoolArray  # (N,), where there is one
 
     @classmethod
     def of(cls, images: PosedImages) -> "PenRotations":
@@ -82,24 +73,13 @@ class PenRotations:
 
 @dataclass(frozen=True, eq=False)
 class RelativeRotation:
-    """Relative rotation of two cameras at P common moments.
+    """Relative rotation of two cameras at P common moments."""
 
-    Attributes
-    ----------
-    rotation : (3, 3) array
-        From the one to the other.
-    pairs : (P,) array of int
-        The moments.
-    off : (P, 3) array
-        Turns by which each lies off it, in the frame of the one, rad.
-    usual : float
-        Length of such turns by what the poses are uncertain by, rad.
-    """
-
-    rotation: FloatArray
-    pairs: IntArray
+    rotation: FloatArray  # (3, 3), from the one to the other
+    pairs: IntArray  # (P,), the moments
+    # (P, 3), turns by which each lies off it, in the frame of the one, rad
     off: FloatArray
-    usual: float
+    usual: float  # length of such turns by what the poses are uncertain by, rad
 
     @property
     def scatter(self) -> float:
@@ -115,19 +95,12 @@ class RelativeRotation:
 
 @dataclass(frozen=True)
 class TimeLag:
-    """Time lag of a camera.
+    """Time lag of a camera."""
 
-    Attributes
-    ----------
-    value, sigma : float
-        Lag in image intervals, and its standard deviation.
-    turn : float
-        That it makes of the usual motion, rad.
-    """
-
+    # `value` and `sigma`: lag in image intervals, and its standard deviation.
     value: float
     sigma: float
-    turn: float
+    turn: float  # that it makes of the usual motion, rad
 
     @property
     def is_noticeable(self) -> bool:

@@ -38,22 +38,13 @@ LEAST_FREE = 4.0  # degrees of freedom; fewer leave a variance without a mean
 
 
 class Component(NamedTuple):
-    """A variance component: the standard deviation of errors of one kind.
+    """A variance component: the standard deviation of errors of one kind."""
 
-    Attributes
-    ----------
-    sigma : float
-        Of maximum likelihood, mm.
-    gain : float
-        Twice the logarithm of the likelihood ratio to no errors, or to the standard
-        deviation that a file states.
-    expected_sigma : float
-        Root of the expected variance, equation (6), mm.
-    """
-
-    sigma: float
+    sigma: float  # of maximum likelihood, mm
+    # Twice the logarithm of the likelihood ratio to no errors, or to the standard
+    # deviation that a file states.
     gain: float
-    expected_sigma: float = 0.0
+    expected_sigma: float = 0.0  # root of the expected variance, equation (6), mm
 
     def exceeds(self, chance: float) -> bool:
         """Return whether chance alone makes such a gain less often."""
@@ -125,17 +116,10 @@ def _expected_sigma(sigmas: FloatArray, costs: FloatArray) -> float:
 
 
 class RandomEffect(NamedTuple):
-    """Estimate of a random vector, independent from image to image.
+    """Estimate of a random vector, independent from image to image."""
 
-    Attributes
-    ----------
-    covariance : (3, 3) array or None
-        mm^2; None where it is not significant.
-    expected_sigma : float
-        Root of the expected variance along each axis, equation (6), mm.
-    """
-
-    covariance: FloatArray | None
+    covariance: FloatArray | None  # (3, 3), mm^2; None where it is not significant
+    # Root of the expected variance along each axis, equation (6), mm
     expected_sigma: float
 
 

@@ -122,18 +122,11 @@ IMAGES_SHRINK = (
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyContribution:
-    """One part of the uncertainty.
-
-    Attributes
-    ----------
-    covariance : (6, 6) array
-        Of (tip_pen, cone_cam), mm^2.
-    assumed : bool
-        Whether it rests on an assumption, as a file does not state it.
-    """
+    """One part of the uncertainty."""
 
     name: ContributionName
-    covariance: FloatArray
+    covariance: FloatArray  # (6, 6), of (tip_pen, cone_cam), mm^2
+    # Whether it rests on an assumption, as a file does not state it.
     assumed: bool = False
 
     @property
@@ -144,33 +137,22 @@ class UncertaintyContribution:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """Uncertainty budget of (tip_pen, cone_cam).
+    """Uncertainty budget of (tip_pen, cone_cam)."""
 
-    Attributes
-    ----------
-    shares : tuple of UncertaintyContribution
-        They add up to the covariance; negligible ones are left out.
-    independent_noise : (6, 6) array
-        From image noise as if it were independent between images, mm^2.
-    blocks : (6, 6) array or None
-        From the scatter between blocks of consecutive images, all but tip and cone
-        held, mm^2; None with too few images.
-    block_ratio : float
-        Variance between blocks over that of independent noise, and of a jitter of the
-        seat where there is one; 1 on average.
-    autocorrelation : float
-        Correlation of one coordinate's errors between successive images; 0 if not
-        significant.
-    correlation_factor : float
-        Factor on the covariance of independent noise.
-    """
-
+    # They add up to the covariance; negligible ones are left out.
     shares: tuple[UncertaintyContribution, ...]
+    # (6, 6), from image noise as if it were independent between images, mm^2.
     independent_noise: FloatArray
+    # (6, 6), from the scatter between blocks of consecutive images, all but tip and
+    # cone held, mm^2; None with too few images.
     blocks: FloatArray | None
+    # Variance between blocks over that of independent noise, and of a jitter of the
+    # seat where there is one; 1 on average.
     block_ratio: float
+    # Correlation of one coordinate's errors between successive images; 0 if not
+    # significant.
     autocorrelation: float
-    correlation_factor: float
+    correlation_factor: float  # factor on the covariance of independent noise
 
     @property
     def covariance(self) -> FloatArray:
@@ -209,17 +191,10 @@ class Budget:
 
 @dataclass(frozen=True, eq=False)
 class SplitHalfCheck:
-    """Tip from the odd images against tip from the even ones.
+    """Tip from the odd images against tip from the even ones."""
 
-    Attributes
-    ----------
-    difference : (3,) array
-        Odd minus even, pen frame, mm.
-    expanded_uncertainty : (3,) array
-        U (k = 2) of the difference from image noise, mm.
-    """
-
-    difference: FloatArray
+    difference: FloatArray  # (3,), odd minus even, pen frame, mm
+    # (3,), U (k = 2) of the difference from image noise, mm
     expanded_uncertainty: FloatArray
 
 

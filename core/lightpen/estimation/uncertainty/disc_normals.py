@@ -28,17 +28,10 @@ TURN = 1e-3  # rad, of a difference
 
 
 class NormalEffect(NamedTuple):
-    """Effect of a rotation of all normals on a bundle with fixed normals.
+    """Effect of a rotation of all normals on a bundle with fixed normals."""
 
-    Attributes
-    ----------
-    gain : (p, 2) array
-        Change of the unknowns by the turn, a rad.
-    information : (2, 2) array
-        What the images show of the turn, all else unknown, 1/rad^2.
-    """
-
-    gain: FloatArray
+    gain: FloatArray  # (p, 2), change of the unknowns by the turn, a rad
+    # (2, 2), what the images show of the turn, all else unknown, 1/rad^2.
     information: FloatArray
 
     def covariance(self, of_turn: FloatArray) -> FloatArray:

@@ -27,19 +27,11 @@ from lightpen.model.rig import Rig
 
 
 class Parameters(NamedTuple):
-    """Indices of each kind of parameter in the covariance of an instrument.
-
-    Attributes
-    ----------
-    cameras : tuple of slice
-        Intrinsics of each camera.
-    extrinsics : slice
-        Extrinsics of all cameras but the first, as in `Rig.covariance`.
-    """
+    """Indices of each kind of parameter in the covariance of an instrument."""
 
     tip: slice
-    cameras: tuple[slice, ...]
-    extrinsics: slice
+    cameras: tuple[slice, ...]  # intrinsics of each camera
+    extrinsics: slice  # extrinsics of all cameras but the first, as in `Rig.covariance`
     diameter: slice
     leds: slice
 
@@ -62,23 +54,14 @@ def parameters_of(rig: Rig, pen: Pen) -> Parameters:
 
 @dataclass(frozen=True, eq=False)
 class Instrument:
-    """A camera, or several of a rig, and a pen with its tip.
-
-    Attributes
-    ----------
-    tip_pen : (3,) array
-        mm.
-    covariance : (q, q) array
-        Of tip, cameras, diameter and LEDs, as `parameters` has them.
-    sigma : float
-        Noise of one image coordinate during the calibration, px.
-    """
+    """A camera, or several of a rig, and a pen with its tip."""
 
     rig: Rig
     pen: Pen
-    tip_pen: FloatArray
+    tip_pen: FloatArray  # (3,), mm
+    # (q, q), of tip, cameras, diameter and LEDs, as `parameters` has them.
     covariance: FloatArray
-    sigma: float
+    sigma: float  # noise of one image coordinate during the calibration, px
 
     @property
     def camera(self) -> Camera:

@@ -55,18 +55,12 @@ ENDLESS = 100.0  # times the images, more than anyone takes
 
 @dataclass(frozen=True)
 class PredictedUncertainty:
-    """U of a tip now, and with endless images.
+    """U of a tip now, and with endless images."""
 
-    Attributes
-    ----------
-    uncertainty : float
-        U (k = 2) along the weakest direction, mm; infinite until it is known.
-    floor : float
-        The same with endless images of this kind, mm: by files, form error, and errors
-        of centres that repeat with the posture.
-    """
-
+    # U (k = 2) along the weakest direction, mm; infinite until it is known.
     uncertainty: float = float("inf")
+    # The same with endless images of this kind, mm: by files, form error, and errors of
+    # centres that repeat with the posture.
     floor: float = 0.0
 
 
@@ -75,29 +69,15 @@ UNKNOWN_UNCERTAINTY = PredictedUncertainty()
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyPrediction:
-    """Normal equations of the images of a swing.
+    """Normal equations of the images of a swing."""
 
-    Attributes
-    ----------
-    state : BundleState
-        About which the equations are, with the rotation of each image.
-    equations : NormalEquations
-        For a noise of 1 px.
-    n_whole : int
-        Images that were linearised together.
-    mechanics : tuple of Effect
-        With their columns in these images.
-    effects : tuple of SearchedEffect
-        What these images leave open of lens and timing.
-    lasting : tuple of UncertaintyContribution
-        What endless images of this kind leave open, errors of centres apart.
-    """
-
-    state: BundleState
-    equations: NormalEquations
-    n_whole: int
-    mechanics: tuple[Effect, ...]
+    state: BundleState  # about which the equations are, with the rotation of each image
+    equations: NormalEquations  # for a noise of 1 px
+    n_whole: int  # images that were linearised together
+    mechanics: tuple[Effect, ...]  # with their columns in these images
+    # What these images leave open of lens and timing.
     effects: tuple[SearchedEffect, ...] = ()
+    # What endless images of this kind leave open, errors of centres apart.
     lasting: tuple[UncertaintyContribution, ...] = ()
 
     @property

@@ -34,22 +34,12 @@ class SecondSwing:
 
 @dataclass(frozen=True, eq=False)
 class SecondImages:
-    """The images of a second swing that agree on a tip, and their fit.
-
-    Attributes
-    ----------
-    reasons : tuple of Reason
-        Why an image of the swing is not among the M.
-    pixels : (M, L, 2) array
-        px.
-    sigmas : (M, L) array
-        Of the centres by their detector, px.
-    """
+    """The images of a second swing that agree on a tip, and their fit."""
 
     swing: SecondSwing
-    reasons: tuple[Reason, ...]
-    pixels: FloatArray
-    sigmas: FloatArray
+    reasons: tuple[Reason, ...]  # why an image of the swing is not among the M
+    pixels: FloatArray  # (M, L, 2), px
+    sigmas: FloatArray  # (M, L), of the centres by their detector, px
     joint: JointFit
 
     def joined(
@@ -99,29 +89,18 @@ def second_images(camera: Camera, pen: Pen, swing: SecondSwing) -> SecondImages:
 
 @dataclass(frozen=True, eq=False)
 class SecondCone:
-    """Effect of a second swing on the tip.
+    """Effect of a second swing on the tip."""
 
-    Attributes
-    ----------
-    cone_cam : (3,) array
-        Cone point in the camera frame, mm.
-    reasons : tuple of Reason
-        Why an image of the second swing was left out; `Reason.NONE` for the used ones.
-    rms : (N,) array
-        Root mean square residual of each image, px; NaN of those left out.
-    leds_used : (N, L) array of bool
-    distance : float
-        Of the cones as they were adjusted, mm.
-    uncertainty_without, uncertainty_with : (3,) array
-        U (k = 2) of the tip by both swings without the distance, and with it, mm.
-    """
-
-    cone_cam: FloatArray
+    cone_cam: FloatArray  # (3,), cone point in the camera frame, mm
     swing: SecondSwing
+    # Why an image of the second swing was left out; `Reason.NONE` for the used ones.
     reasons: tuple[Reason, ...]
+    # (N,), root mean square residual of each image, px; NaN of those left out.
     rms: FloatArray
-    leds_used: BoolArray
-    distance: float
+    leds_used: BoolArray  # (N, L)
+    distance: float  # of the cones as they were adjusted, mm
+    # `uncertainty_without` and `uncertainty_with`: (3,), U (k = 2) of the tip by both
+    # swings without the distance, and with it, mm
     uncertainty_without: FloatArray
     uncertainty_with: FloatArray
 
