@@ -25,9 +25,9 @@ from PySide6.QtWidgets import QApplication
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable
 from lightpen.live.sources import SourceEnvironment
 from lightpen.logs import end_log, write_log_to
+from lightpen.messages import printable
 from lightpen.record.library.signing.keys import KEYS
 from lightpen.simulator.camera import SERIAL
 from lightpen.streaming.server import StreamPlace

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from lightpen.errors import FileError, UsageError
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import write_whole
 from lightpen.formats.system_reasons import strerror
 from lightpen_resources import RESOURCES
 
@@ -110,9 +110,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _refused(path: Path, error: OSError) -> FileError:
-    return FileError(
-        "desktop-entry.refused", path=printable(str(path)), reason=strerror(error)
-    )
+    return FileError("desktop-entry.refused", path=path, reason=strerror(error))
 
 
 def _refresh(data: Path) -> None:

@@ -1,6 +1,8 @@
 """Errors that the user can correct; any other exception is a bug and not caught."""
 
-from lightpen.messages import Message, Value
+from pathlib import Path
+
+from lightpen.messages import Message, Value, shown
 
 
 class LightpenError(Exception):
@@ -10,12 +12,14 @@ class LightpenError(Exception):
     ----------
     content : Message or str
         Message or its code: what was found, what is needed, what to do.
-    **values : Value
+    **values : Value or Path
         Of a message given by its code.
     """
 
-    def __init__(self, content: Message | str, /, **values: Value) -> None:
-        self.message = Message(content, values) if isinstance(content, str) else content
+    def __init__(self, content: Message | str, /, **values: Value | Path) -> None:
+        self.message = (
+            Message(content, shown(values)) if isinstance(content, str) else content
+        )
         super().__init__(self.message)
 
 

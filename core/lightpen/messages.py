@@ -9,6 +9,7 @@ code. Stored messages keep code and values, so that they print in any language l
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeAlias, Union
 
 from lightpen.catalogue import (
@@ -102,9 +103,30 @@ class Message:
         return self.text()
 
 
-def message(code: str, /, **values: Value) -> Message:
-    """Return a message of the catalogue; its code is a literal, for tools to find."""
-    return Message(code, values)
+def printable(text: str) -> str:
+    """Return a text with unprintable characters escaped."""
+    if text.isprintable():
+        return text
+    return "".join(
+        character if character.isprintable() else ascii(character)[1:-1]
+        for character in text
+    )
+
+
+def message(code: str, /, **values: Value | Path) -> Message:
+    """Return a message of the catalogue; its code is a literal, for tools to find.
+
+    Unprintable characters of paths are escaped.
+    """
+    return Message(code, shown(values))
+
+
+def shown(values: Mapping[str, Value | Path]) -> dict[str, Value]:
+    """Return the values of a message, with paths as text."""
+    return {
+        name: printable(str(value)) if isinstance(value, Path) else value
+        for name, value in values.items()
+    }
 
 
 class Number(float):

@@ -13,18 +13,12 @@ from typing import Any, TypeAlias
 
 from lightpen.errors import FileError
 from lightpen.formats.file_locks import folder_locked
-from lightpen.formats.files import (
-    MEGABYTE,
-    printable,
-    read_bytes,
-    sync_folder,
-    write_whole,
-)
+from lightpen.formats.files import MEGABYTE, read_bytes, sync_folder, write_whole
 from lightpen.formats.machine_settings import MachineSettings, machine_settings
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.part_files import sweep_parts
 from lightpen.formats.system_reasons import strerror
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 
 WHAT = message("file.settings")
 LIMIT = 4 * MEGABYTE
@@ -97,16 +91,12 @@ def _set_aside(file: Path) -> Message:
     aside = file.with_name(f"{file.name}.damaged")
     with suppress(OSError):  # it is reported all the same
         file.replace(aside)
-    return message(
-        "settings.damaged", file=printable(str(file)), aside=printable(aside.name)
-    )
+    return message("settings.damaged", file=file, aside=printable(aside.name))
 
 
 def _held(file: Path) -> Message:
-    return message("settings.held", file=printable(str(file)), seconds=PATIENCE)
+    return message("settings.held", file=file, seconds=PATIENCE)
 
 
 def _cannot_be_saved(file: Path, error: OSError) -> FileError:
-    return FileError(
-        "settings.unwritable", file=printable(str(file)), reason=strerror(error)
-    )
+    return FileError("settings.unwritable", file=file, reason=strerror(error))

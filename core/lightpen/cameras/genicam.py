@@ -24,7 +24,6 @@ from lightpen.cameras.device_errors import busy, in_sentences, not_found
 from lightpen.cameras.genapi_features import GenapiFeatures, refusals
 from lightpen.cameras.protocol import DeviceNotFound
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
-from lightpen.formats.files import printable
 from lightpen.messages import Message, message
 
 PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
@@ -184,9 +183,7 @@ def _harvester(producer: str) -> Any:
             harvester.add_file(str(file))
     if not harvester.files:
         raise DeviceNotFound(
-            "genicam.does-not-load",
-            file=printable(str(files[0])),
-            why=refusals[0] or "",
+            "genicam.does-not-load", file=files[0], why=refusals[0] or ""
         )
     harvester.update()
     return harvester

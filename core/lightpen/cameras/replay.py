@@ -27,9 +27,8 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.source import Source, SourceNeeds, SourcePlace
 from lightpen.errors import FileError
 from lightpen.formats.decoding import bits_of
-from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0

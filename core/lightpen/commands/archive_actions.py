@@ -34,8 +34,8 @@ from lightpen.archive.store.database import Database, look_into, open_file
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable
 from lightpen.local_time import local_now, local_time
+from lightpen.messages import printable
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.supervision_changes import renew_station_key
 

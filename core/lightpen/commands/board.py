@@ -5,9 +5,10 @@ from pathlib import Path
 
 from lightpen.commands.console import printing, shown
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import write_whole
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.page import PAPERS, board_page
+from lightpen.messages import printable
 
 
 def add_board(parser: argparse.ArgumentParser) -> None:

@@ -146,7 +146,7 @@ def _require_none_given(options: argparse.Namespace, record: Path) -> None:
     ]
     if given:
         raise UsageError(
-            "cli.record-brings-its-own", folder=str(record), options=", ".join(given)
+            "cli.record-brings-its-own", folder=record, options=", ".join(given)
         )
 
 

@@ -14,8 +14,9 @@ from msgspec import Struct
 
 from lightpen.errors import UsageError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.files import A_FILE, printable, unreadable, write_whole
+from lightpen.formats.files import A_FILE, unreadable, write_whole
 from lightpen.formats.json_records import record_bytes
+from lightpen.messages import printable
 
 DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK = 0, 1, 2, 3, 4
 LINE_INTERVAL = 15.0  # s, of lines of progress
@@ -74,7 +75,7 @@ def require_other_file(record: Path | None, *inputs: Path | None) -> None:
         return
     for path in inputs:
         if path is not None and are_same(path, record):
-            raise UsageError("cli.json-over-input", record=str(record))
+            raise UsageError("cli.json-over-input", record=record)
 
 
 def write_record(path: Path, record: Mapping[str, Any] | Struct) -> None:

@@ -7,7 +7,6 @@ from typing import Protocol
 
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable
 
 
 class Desktop(Protocol):
@@ -97,7 +96,7 @@ def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
 
 def _report(desktop: Desktop, options: argparse.Namespace) -> None:
     if options.out is not None and are_same(options.result, options.out):
-        raise UsageError("cli.report-over-result", out=str(options.out))
+        raise UsageError("cli.report-over-result", out=options.out)
     path = desktop.write_paper(options.result, options.out, options.language)
     print(shown(f"The record is in {path}."))
 
@@ -116,7 +115,7 @@ def _start(desktop: Desktop, options: argparse.Namespace) -> int:
 
 def _open(desktop: Desktop, swing: Path | None) -> int:
     if swing is not None and is_absent(swing):
-        raise UsageError("cli.no-such-file", path=printable(str(swing)))
+        raise UsageError("cli.no-such-file", path=swing)
     return desktop.show_window(swing)
 
 

@@ -264,7 +264,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
             continue
         require_folder_of(path)
         if any(are_same(path, other) for other in (*inputs, *seen)):
-            raise UsageError("cli.discover-output-twice", file=str(path))
+            raise UsageError("cli.discover-output-twice", file=path)
         seen.append(path)
     for path, suffixes in (
         (options.out_pen, (".json",)),
@@ -273,7 +273,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
     ):
         if path is not None and path.suffix.lower() not in suffixes:
             raise UsageError(
-                "cli.discover-suffix", file=str(path), suffix=" or ".join(suffixes)
+                "cli.discover-suffix", file=path, suffix=" or ".join(suffixes)
             )
 
 
@@ -296,7 +296,7 @@ def _sightings(
     if camera is not None and camera.image_size != sightings.size:
         raise UsageError(
             "cli.camera-of-other-size",
-            file=str(options.camera),
+            file=options.camera,
             width=camera.width,
             height=camera.height,
             seen_width=sightings.size[0],

@@ -7,9 +7,10 @@ from pathlib import Path
 from lightpen.archive.logbook.result_entry import with_entry
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import write_whole
 from lightpen.formats.machine_settings import machine_settings
 from lightpen.local_time import local_now
+from lightpen.messages import printable
 from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.export_status import with_status
@@ -90,7 +91,7 @@ def _laboratory(options: argparse.Namespace) -> Laboratory:
 @printing
 def _export(options: argparse.Namespace) -> None:
     if are_same(options.result, options.out):
-        raise UsageError("cli.export-over-result", out=str(options.out))
+        raise UsageError("cli.export-over-result", out=options.out)
     written = BY_NAME[options.format]
     laboratory = _laboratory(options) if written.needs_laboratory else None
     file = with_entry(with_status(read_calibration(options.result), local_now()))

@@ -20,7 +20,6 @@ from lightpen.commands.console import (
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import CameraForm, write_camera
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
-from lightpen.formats.files import printable
 from lightpen.formats.images import find_images
 from lightpen.formats.json_records import plain
 from lightpen.formats.pairing import pair_images
@@ -38,6 +37,7 @@ from lightpen.intrinsics.report import (
 from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.local_time import local_now
+from lightpen.messages import printable
 
 USUAL = BoardTolerances()
 SIDES = ("left", "right")
@@ -247,7 +247,7 @@ def _extrinsics(options: argparse.Namespace) -> None:
         if camera.image_size != size:
             raise UsageError(
                 "cli.camera-of-other-size",
-                file=printable(str(file)),
+                file=file,
                 width=camera.width,
                 height=camera.height,
                 seen_width=size[0],
@@ -297,7 +297,7 @@ def _require_names(names: tuple[str, str]) -> None:
 def _require_new_file(out: Path, *inputs: Path) -> None:
     """Refuse to write over one of the files that it is made from."""
     if any(are_same(path, out) for path in inputs):
-        raise UsageError("cli.cameras-over-input", out=printable(str(out)))
+        raise UsageError("cli.cameras-over-input", out=out)
 
 
 def _require_known(left_out: list[str], names: tuple[str, ...]) -> None:

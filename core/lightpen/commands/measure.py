@@ -128,7 +128,7 @@ def _export_of(path: Path) -> FileFormat:
         if path.suffix.lower() == export.suffix:
             return export
     suffixes = ", ".join(each.suffix for each in EXPORTS)
-    raise UsageError("measuring.no-format", file=str(path), suffixes=suffixes)
+    raise UsageError("measuring.no-format", file=path, suffixes=suffixes)
 
 
 def _is_csv(place: str) -> bool:

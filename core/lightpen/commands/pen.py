@@ -22,7 +22,7 @@ def add_pen(parser: argparse.ArgumentParser) -> None:
 @printing
 def _pen(options: argparse.Namespace) -> None:
     if are_same(options.raw, options.out):
-        raise UsageError("cli.pen-over-raw", out=str(options.out))
+        raise UsageError("cli.pen-over-raw", out=options.out)
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
     print(shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))

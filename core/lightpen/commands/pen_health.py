@@ -103,7 +103,7 @@ def _improve_pen(options: argparse.Namespace) -> None:
     for path in (*options.results, options.camera, options.pen, options.length):
         for out in (options.out, options.out_camera):
             if path is not None and out is not None and are_same(path, out):
-                raise UsageError("cli.out-over-input", out=str(out))
+                raise UsageError("cli.out-over-input", out=out)
     swings = _swings(options)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     camera = read_camera(options.camera)
@@ -126,8 +126,8 @@ def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
         if each.pen_sha256 != pen_sha256:
             raise UsageError(
                 "cli.swing-of-another-pen",
-                result=str(each.path),
+                result=each.path,
                 its_pen=each.calibration.inputs.pen.file,
-                pen=str(options.pen),
+                pen=options.pen,
             )
     return swings

@@ -21,7 +21,7 @@ from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
 from lightpen.estimation.statistics.workers import Map, cluster_workers, local_workers
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import printable, sha256
+from lightpen.formats.files import sha256
 from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
@@ -141,9 +141,9 @@ def _require_files(files: list[CalibrationFile], options: argparse.Namespace) ->
         if (file.camera_sha256, file.pen_sha256) != given:
             raise UsageError(
                 "cli.result-of-other-files",
-                result=printable(str(file.path)),
-                camera=str(options.camera),
-                pen=str(options.pen),
+                result=file.path,
+                camera=options.camera,
+                pen=options.pen,
             )
 
 

@@ -28,11 +28,11 @@ from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.methods import result_of
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import printable
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
+from lightpen.messages import printable
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.pen_health import require_one_pen
@@ -165,7 +165,7 @@ def _tips(
         if each.names.tip != calibrations[0].names.tip:
             raise UsageError(
                 "cli.another-tip",
-                other=str(each.path),
+                other=each.path,
                 its=printable(each.names.tip),
                 first=str(calibrations[0].path),
                 tip=printable(calibrations[0].names.tip),

@@ -11,7 +11,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import write_whole
+from lightpen.messages import printable
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import LensField
 from lightpen.model.self_calibration import MARK_DIGITS, FoundCamera

@@ -55,8 +55,8 @@ from lightpen.formats.camera_checks import (
 )
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
-from lightpen.formats.files import MEGABYTE, printable, quoted, read_text
-from lightpen.messages import Message, message
+from lightpen.formats.files import MEGABYTE, quoted, read_text
+from lightpen.messages import Message, message, printable
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import MOST, LensField
 from lightpen.model.self_calibration import FoundCamera

@@ -7,9 +7,9 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.documents import Tree
-from lightpen.formats.files import printable, quoted
+from lightpen.formats.files import quoted
 from lightpen.formats.tables import number_flaw, too_large_number
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 
 MAX_NUMBERS = 10_000  # of one entry; a covariance has 324
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it

@@ -15,7 +15,7 @@ from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.file_locks import folder_locked
 from lightpen.formats.part_files import part_of, renamed, sweep_parts
 from lightpen.formats.system_reasons import strerror
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 
 MEGABYTE = 1_000_000  # bytes
 LARGEST_RECORD = 32 * MEGABYTE  # of the own files; 5000 images of 4 cameras take 26
@@ -60,44 +60,30 @@ def read_bytes(path: Path, what: Message, limit: int) -> bytes:
 @contextlib.contextmanager
 def opened(path: Path, what: Message, limit: int) -> Iterator[BinaryIO]:
     """Check a file and open it for reading; see `read_bytes`."""
-    shown = printable(str(path))
     try:
-        _check_readable(_status(path, what), what, shown, limit)
+        _check_readable(_status(path, what), what, path, limit)
         with path.open("rb") as stream:
-            _check_readable(os.fstat(stream.fileno()), what, shown, limit)
-            _logger.debug("read: %s", shown)
+            _check_readable(os.fstat(stream.fileno()), what, path, limit)
+            _logger.debug("read: %s", path)
             yield stream
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise FileError("read.missing", what=what, path=shown) from error
+        raise FileError("read.missing", what=what, path=path) from error
     except OSError as error:
         raise unreadable(path, what, error) from error
 
 
 def read_text(path: Path, what: Message, limit: int) -> str:
-    r"""Return the content of a text file, with ``\n`` at the line ends.
+    r"""Return a text file as `read_bytes`, with ``\n`` at the line ends.
 
     UTF-8 with or without byte order mark, UTF-16 with one, and Windows-1252, which
     old instruments write in comments.
-
-    Parameters
-    ----------
-    what : Message
-        File type for messages.
-    limit : int
-        Largest size, bytes.
-
-    Raises
-    ------
-    FileError
-        As `read_bytes`, or the file is not text.
     """
     data = read_bytes(path, what, limit)
-    shown = printable(str(path))
     try:
         text = _decode(data)
     except UnicodeDecodeError as error:
         raise FileError(
-            "read.no-known-encoding", what=what, path=shown, byte=error.start + 1
+            "read.no-known-encoding", what=what, path=path, byte=error.start + 1
         ) from error
     control = re.search(_CONTROL, text)
     if control:
@@ -105,12 +91,12 @@ def read_text(path: Path, what: Message, limit: int) -> str:
         raise FileError(
             "read.control-character",
             what=what,
-            path=shown,
+            path=path,
             line=line,
             character=ord(control[0]),
         )
     if not text.strip():
-        raise FileError("read.blank", what=what, path=shown)
+        raise FileError("read.blank", what=what, path=path)
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -129,7 +115,7 @@ def write_whole(path: Path, data: bytes) -> None:
             _replace(Path(os.path.realpath(path)), data)
         _logger.debug("written: %s", path)
     except IsADirectoryError as error:
-        raise FileError("write.onto-folder", path=printable(str(path))) from error
+        raise FileError("write.onto-folder", path=path) from error
     except OSError as error:
         raise _unwritten(path, error) from error
 
@@ -173,7 +159,7 @@ def is_reserved(name: str) -> bool:
 def _require_file(path: Path) -> None:
     """Refuse the name of a device on Windows, where all that is written is lost."""
     if os.name == "nt" and is_reserved(path.name):
-        raise FileError("write.reserved", path=printable(str(path)))
+        raise FileError("write.reserved", path=path)
 
 
 def sync_folder(folder: Path) -> None:
@@ -189,9 +175,7 @@ def sync_folder(folder: Path) -> None:
 
 def unreadable(path: Path, what: Message, error: OSError) -> FileError:
     """Return the error of an unreadable file or folder of the kind ``what``."""
-    return FileError(
-        "read.failed", what=what, path=printable(str(path)), reason=strerror(error)
-    )
+    return FileError("read.failed", what=what, path=path, reason=strerror(error))
 
 
 def sha256(path: Path) -> str:
@@ -209,7 +193,7 @@ def start_sha256(path: Path, n_bytes: int | None) -> str:
     digest = hashlib.sha256()
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise FileError("read.device", what=A_FILE, path=printable(str(path)))
+            raise FileError("read.device", what=A_FILE, path=path)
         with path.open("rb") as stream:
             left = n_bytes
             while part := stream.read(
@@ -218,20 +202,8 @@ def start_sha256(path: Path, n_bytes: int | None) -> str:
                 digest.update(part)
                 left = None if left is None else left - len(part)
     except OSError as error:
-        raise FileError(
-            "hash.failed", path=printable(str(path)), reason=strerror(error)
-        ) from error
+        raise FileError("hash.failed", path=path, reason=strerror(error)) from error
     return digest.hexdigest()
-
-
-def printable(text: str) -> str:
-    """Return a text with unprintable characters escaped."""
-    if text.isprintable():
-        return text
-    return "".join(
-        character if character.isprintable() else ascii(character)[1:-1]
-        for character in text
-    )
 
 
 def quoted(text: str) -> str:
@@ -250,11 +222,11 @@ def _status(path: Path, what: Message) -> os.stat_result:
     try:
         return path.stat()
     except ValueError as error:  # null character or lone surrogate
-        raise FileError("read.no-name", what=what, path=printable(str(path))) from error
+        raise FileError("read.no-name", what=what, path=path) from error
 
 
 def _check_readable(
-    status: os.stat_result, what: Message, path: str, limit: int
+    status: os.stat_result, what: Message, path: Path, limit: int
 ) -> None:
     if stat.S_ISDIR(status.st_mode):
         raise FileError("read.folder", what=what, path=path)
@@ -263,17 +235,13 @@ def _check_readable(
     if status.st_size == 0:
         raise FileError("read.empty", what=what, path=path)
     if status.st_size > limit:
-        raise _too_large(what, path, status.st_size, limit)
-
-
-def _too_large(what: Message, path: str, size: int, limit: int) -> FileError:
-    return FileError(
-        "read.too-large",
-        what=what,
-        path=path,
-        size=size / MEGABYTE,
-        limit=limit / MEGABYTE,
-    )
+        raise FileError(
+            "read.too-large",
+            what=what,
+            path=path,
+            size=status.st_size / MEGABYTE,
+            limit=limit / MEGABYTE,
+        )
 
 
 def _decode(data: bytes) -> str:
@@ -324,6 +292,4 @@ def _rename_anew(part: Path, target: Path) -> None:
 
 
 def _unwritten(path: Path, error: OSError) -> FileError:
-    return FileError(
-        "write.failed", path=printable(str(path)), reason=why_unwritten(error)
-    )
+    return FileError("write.failed", path=path, reason=why_unwritten(error))

@@ -16,9 +16,9 @@ from typing import TypeVar
 from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import keep_freed_memory, read_image
-from lightpen.formats.files import printable, unreadable
+from lightpen.formats.files import unreadable
 from lightpen.formats.video_process import count_frames, frame_loaders
-from lightpen.messages import message
+from lightpen.messages import message, printable
 
 
 class MemoryRoom:

@@ -12,7 +12,7 @@ import platformdirs
 
 from lightpen import __version__
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.own_json import DamagedError, in_shape, parse_own_json
 from lightpen.messages import message
 from lightpen.model.laboratory import PLACES, Laboratory, is_country
@@ -71,8 +71,7 @@ def read_update(file: Path) -> Update | None:
         update = parse_own_json(data, Update)
         is_newer = _numbers(update.version) > _numbers(__version__)
     except ValueError as error:
-        path = printable(str(file))
-        raise FileError("machine-settings.no-version", file=path) from error
+        raise FileError("machine-settings.no-version", file=file) from error
     return update if is_newer else None
 
 
@@ -108,8 +107,7 @@ def machine_settings() -> MachineSettings:
         settings.station_limits()
         _require_laboratory(entries.get("laboratory"), settings.laboratory)
     except ValueError as error:
-        path = printable(str(file))
-        raise FileError("machine-settings.wrong", file=path, why=str(error)) from error
+        raise FileError("machine-settings.wrong", file=file, why=str(error)) from error
     return settings
 
 

@@ -46,12 +46,12 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import parse_json
-from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.formats.files import MEGABYTE, quoted, read_text, write_whole
 from lightpen.formats.pen_content import LARGEST_DIAMETER, UNITS, PenContent
 from lightpen.formats.pen_json import from_json, json_text
 from lightpen.formats.pen_tables import csv_text, from_table
 from lightpen.formats.tables import parse_table
-from lightpen.messages import message
+from lightpen.messages import message, printable
 from lightpen.model.pen import DISC_DIAMETER, Pen, check_frame, check_leds, in_pen_frame
 
 PEN_FILE = message("file.pen")

@@ -8,7 +8,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.documents import Tree
 from lightpen.formats.entries import Entries
-from lightpen.formats.files import printable, quoted
+from lightpen.formats.files import quoted
 from lightpen.formats.pen_content import (
     LENGTHS,
     RANGES,
@@ -21,7 +21,7 @@ from lightpen.formats.pen_content import (
     stated_numbers,
     unit_normal,
 )
-from lightpen.messages import message
+from lightpen.messages import message, printable
 from lightpen.model.pen import Pen
 from lightpen.model.self_calibration import MARK_DIGITS, FoundPen
 

@@ -36,9 +36,9 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, is_covariance
-from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.formats.files import MEGABYTE, quoted, read_text, write_whole
 from lightpen.formats.simulated_files import is_simulated
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig
 from lightpen.model.rigid import nearest_rotation

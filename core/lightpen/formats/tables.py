@@ -11,8 +11,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import printable, quoted, read_text
-from lightpen.messages import Message, message
+from lightpen.formats.files import quoted, read_text
+from lightpen.messages import Message, message, printable
 
 MAX_LINES = 300_000  # 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters

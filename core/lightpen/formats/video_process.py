@@ -21,7 +21,6 @@ from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats import videos
 from lightpen.formats.decoding import keep_freed_memory
-from lightpen.formats.files import printable
 
 
 def limit_memory(more: int) -> None:
@@ -208,8 +207,4 @@ def _loaded(frame: Image | FileError) -> Image:
 
 
 def _too_much(path: Path) -> FileError:
-    return FileError(
-        "video.too-much-memory",
-        path=printable(str(path)),
-        most=MAX_DECODER_MEMORY / 1e6,
-    )
+    return FileError("video.too-much-memory", path=path, most=MAX_DECODER_MEMORY / 1e6)

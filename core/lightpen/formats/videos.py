@@ -10,9 +10,9 @@ import cv2
 from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import grey_image
-from lightpen.formats.files import printable, quoted
+from lightpen.formats.files import quoted
 from lightpen.formats.image_headers import check_pixels, read_image_header
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 
 MAX_VIDEO_FRAMES = 30_000
 MAX_VIDEO_PIXELS = 20_000_000  # of a frame, of which a decoder keeps several
@@ -43,9 +43,7 @@ def count_frames_in_process(path: Path) -> int:
         )
         codec = _codec(stream)
         if stream.isOpened() and codec not in CODECS:
-            raise FileError(
-                "video.codec", path=printable(str(path)), codec=quoted(codec)
-            )
+            raise FileError("video.codec", path=path, codec=quoted(codec))
         n_frames = 0
         while n_frames <= MAX_VIDEO_FRAMES and stream.grab():
             n_frames += 1
@@ -54,13 +52,11 @@ def count_frames_in_process(path: Path) -> int:
     finally:
         stream.release()
     if n_frames == 0 and not _has_ffmpeg():
-        raise FileError("video.motion-jpeg-only", path=printable(str(path)))
+        raise FileError("video.motion-jpeg-only", path=path)
     if n_frames == 0:
-        raise FileError("image.video", path=printable(str(path)))
+        raise FileError("image.video", path=path)
     if n_frames > MAX_VIDEO_FRAMES:
-        raise FileError(
-            "video.too-many-frames", path=printable(str(path)), most=MAX_VIDEO_FRAMES
-        )
+        raise FileError("video.too-many-frames", path=path, most=MAX_VIDEO_FRAMES)
     return n_frames
 
 
@@ -83,7 +79,7 @@ def _opened_video(path: Path, *parameters: int) -> cv2.VideoCapture:
         name = str(path)
         name.encode()
     except UnicodeEncodeError as error:  # OpenCV would crash
-        raise FileError("video.path", path=printable(str(path))) from error
+        raise FileError("video.path", path=path) from error
     # Other backends than these two take a name for a pattern, or for a description of a
     # pipeline.
     if not _has_ffmpeg():

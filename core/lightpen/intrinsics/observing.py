@@ -9,13 +9,12 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import CalibrationError, FileError
-from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.pairing import NONE, Pairing
 from lightpen.intrinsics.boards import Board, BoardKind
 from lightpen.intrinsics.sightings import count_corners, find_points, for_search
 from lightpen.intrinsics.views import Views
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 
 MEMORY_A_PIXEL = 5  # bytes: 16 bits, its 8, and what is made of them
 EXAMINED = 3  # images in which a board is looked for that is another

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.errors import UsageError
-from lightpen.formats.files import printable
 from lightpen.intrinsics.boards import Board
+from lightpen.messages import printable
 
 COVERAGE_FACTOR = 2.0
 PIXEL = 1.0  # length of a screen that its pixel pitch measures

@@ -13,13 +13,12 @@ import numpy as np
 
 from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.file_format import FileFormat
-from lightpen.formats.files import printable
 from lightpen.local_time import local_now
 from lightpen.measuring.characteristics import IS_ANGLE, Measured
 from lightpen.measuring.drawing import outline_of
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.qif import qif_text
-from lightpen.messages import message
+from lightpen.messages import message, printable
 
 N_DECIMALS = 6
 ENDS = ("10", "20", "30", "11", "21", "31")  # codes of x, y, z of a line in DXF

@@ -21,10 +21,10 @@ from msgspec import Meta, Struct, structs
 
 from lightpen.errors import FileError
 from lightpen.formats.documents import parse_document
-from lightpen.formats.files import printable, read_text, write_whole
+from lightpen.formats.files import read_text, write_whole
 from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.measuring.zones import Criterion
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.decision_rules import DecisionRule
 
 PLAN = message("measuring.plan")

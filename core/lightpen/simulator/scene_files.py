@@ -230,11 +230,11 @@ def _make_folders(folder: Path, *below: Path) -> None:
     except OSError as error:
         raise _no_folder(folder, error) from error
     if others:
-        raise FileError("scene.not-empty", folder=str(folder), example=min(others))
+        raise FileError("scene.not-empty", folder=folder, example=min(others))
 
 
 def _no_folder(folder: Path, error: OSError) -> FileError:
-    return FileError("scene.no-folder", folder=str(folder), reason=why_unwritten(error))
+    return FileError("scene.no-folder", folder=folder, reason=why_unwritten(error))
 
 
 def _in_order(

@@ -22,9 +22,8 @@ from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import StreamError
-from lightpen.formats.files import printable
 from lightpen.formats.system_reasons import strerror
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.streaming.messages import StreamedTip, pose_messages
 from lightpen.streaming.points import NamedPoint, points_message
 

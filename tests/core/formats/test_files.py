@@ -19,7 +19,6 @@ from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.file_locks import locked, unlock
 from lightpen.formats.files import (
     create_whole,
-    printable,
     quoted,
     read_bytes,
     read_text,
@@ -27,6 +26,7 @@ from lightpen.formats.files import (
     write_whole,
 )
 from lightpen.formats.pen_files import PEN_FILE
+from lightpen.messages import printable
 
 LIMIT = 1000
 

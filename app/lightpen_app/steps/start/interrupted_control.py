@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from lightpen.formats.files import printable
+from lightpen.messages import printable
 from lightpen.record.results.acceptance import conclude_accepted
 from lightpen.record.results.opening import swing_folder
 from lightpen.record.swings.interrupted import (

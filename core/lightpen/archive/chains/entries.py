@@ -17,7 +17,6 @@ from typing import Annotated, TypeAlias
 from msgspec import Meta, Struct, to_builtins
 
 from lightpen import __version__
-from lightpen.formats.files import printable
 from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
     DamagedError,
@@ -28,7 +27,7 @@ from lightpen.formats.own_json import (
     require_usual,
 )
 from lightpen.formats.stored_messages import StoredMessage
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.results.results import TipChange

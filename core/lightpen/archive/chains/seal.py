@@ -18,7 +18,7 @@ from lightpen.archive.chains.entries import Chain, ChainHead
 from lightpen.archive.store.database import Database, is_open
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, write_whole
+from lightpen.formats.files import MEGABYTE, read_bytes, sha256, write_whole
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import DamagedError, Digest, parse_checked, with_checksum
 from lightpen.messages import message
@@ -71,7 +71,7 @@ def read_seal(archive: Path) -> Seal | None:
     try:
         return parse_checked(data, Seal)
     except DamagedError as error:
-        raise FileError("archive.seal-damaged", file=printable(str(path))) from error
+        raise FileError("archive.seal-damaged", file=path) from error
 
 
 def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:

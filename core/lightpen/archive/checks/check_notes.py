@@ -24,9 +24,8 @@ from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys
 from lightpen.archive.events.station_events import station_files
 from lightpen.archive.store.database import Database, is_open
 from lightpen.errors import FileError
-from lightpen.formats.files import printable
 from lightpen.formats.own_json import DamagedError, ZonedTime, parse_own_json
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive
 
@@ -60,7 +59,7 @@ def _missing_seal(database: Database) -> Iterator[Message]:
     if file is None or not has_entries or is_open(file):
         return
     if not seal_of(file).exists():
-        yield message("archive.no-seal", file=printable(str(seal_of(file))))
+        yield message("archive.no-seal", file=seal_of(file))
 
 
 def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from lightpen.archive.chains.entries import Entry, FileHash, StoredEntry
 from lightpen.errors import FileError
-from lightpen.formats.files import printable, start_sha256
-from lightpen.messages import Message, message
+from lightpen.formats.files import start_sha256
+from lightpen.messages import Message, message, printable
 from lightpen.record.swings.journal import (
     JOURNAL,
     ImageLine,

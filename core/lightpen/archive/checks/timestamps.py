@@ -28,9 +28,9 @@ from lightpen.archive.checks.check import ArchiveCheckResult
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError, FileError, LightpenError
-from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
+from lightpen.formats.files import MEGABYTE, create_whole, read_bytes
 from lightpen.formats.machine_settings import machine_settings
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.record.library.numbered_files import make_folder
 
 if TYPE_CHECKING:
@@ -256,7 +256,7 @@ def _is_for_stamping(certificate: "Certificate") -> bool:
 
 
 def _no_root(file: Path) -> FileError:
-    return FileError("timestamp.no-root", file=printable(str(file)))
+    return FileError("timestamp.no-root", file=file)
 
 
 def _answer(address: str, query: bytes) -> bytes:

@@ -54,10 +54,10 @@ from lightpen.archive.logbook.shared_library import newer_elsewhere, take_over
 from lightpen.archive.replication.replication import Replicator
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import AcceptanceError, ArchiveError, FileError, UsageError
-from lightpen.formats.files import FOLDER, printable, unreadable
+from lightpen.formats.files import FOLDER, unreadable
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.numbered_files import number_of, numbered_files

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpen.errors import FileError, NoArchiveError
-from lightpen.formats.files import printable
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.folder.verifications import data_folder_of_verification
 from lightpen.record.results.opening import data_folder_of
@@ -59,5 +58,5 @@ def entry_of_file(result: Path, sha256: str) -> ArchivePlace | None:
         return None
     entered = found.entry.event.result
     if entered is None or entered.sha256 != sha256:
-        raise FileError("archive.another-result", file=printable(str(result)))
+        raise FileError("archive.another-result", file=result)
     return ArchivePlace(found.entry.number, found.sha256, found.entry.previous)

@@ -21,10 +21,9 @@ from lightpen.archive.chains.entries import Kind, StoredEntry, read_entry, text_
 from lightpen.archive.chains.signatures import ChainKeys
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES
-from lightpen.formats.files import printable
 from lightpen.formats.own_json import DamagedError
 from lightpen.local_time import local_time
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.record.library.library_changes import adopt_change
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import (

@@ -33,7 +33,7 @@ from lightpen.archive.chains.entries import StoredEntry, read_entry
 from lightpen.archive.replication.comparison import require_continued
 from lightpen.archive.store.database import Database
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import MEGABYTE, opened, printable
+from lightpen.formats.files import MEGABYTE, opened
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.system_reasons import strerror
 from lightpen.messages import message
@@ -92,12 +92,10 @@ def export_entries(database: Database, path: Path) -> int:
             stream.flush()
             os.fsync(stream.fileno())
     except FileExistsError as error:
-        raise NameTakenError(
-            "archive.export-exists", file=printable(str(path))
-        ) from error
+        raise NameTakenError("archive.export-exists", file=path) from error
     except OSError as error:
         raise FileError(
-            "archive.not-exported", file=printable(str(path)), reason=strerror(error)
+            "archive.not-exported", file=path, reason=strerror(error)
         ) from error
     return n_entries
 
@@ -190,6 +188,4 @@ def _read(path: Path) -> Iterator[tuple[StoredEntry, str | None]]:
                 n_read += 1
             raise DamagedError("Its end is missing.")
         except DamagedError as error:
-            raise FileError(
-                "archive.no-export", file=printable(str(path)), line=n_read + 2
-            ) from error
+            raise FileError("archive.no-export", file=path, line=n_read + 2) from error

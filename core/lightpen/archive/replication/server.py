@@ -13,7 +13,7 @@ from sqlalchemy.exc import ArgumentError
 
 from lightpen.archive.store.database import Database, known_version, update_tables
 from lightpen.errors import ArchiveError
-from lightpen.formats.files import printable
+from lightpen.messages import printable
 
 TLS = "verify-full"  # as libpq has it: encrypted, by a certificate for this name
 _CALLING: Mapping[str, Any] = {

@@ -42,7 +42,8 @@ from sqlalchemy.pool import QueuePool
 from lightpen.archive.store.tables import METADATA
 from lightpen.archive.store.uses import UseCount
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
-from lightpen.formats.files import A_FILE, printable, unreadable
+from lightpen.formats.files import A_FILE, unreadable
+from lightpen.messages import printable
 from lightpen.record.library.numbered_files import make_folder
 
 VERSION = "1"  # of the tables, as the last of the migrations says

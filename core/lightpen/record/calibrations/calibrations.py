@@ -20,10 +20,10 @@ from lightpen.estimation.reports.calibration_record import (
     FrameRecord,
 )
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.files import LARGEST_RECORD, printable, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.formats.own_json import DamagedError, has_checksum, parse_checked
 from lightpen.formats.stored_messages import StoredMessage
-from lightpen.messages import message
+from lightpen.messages import message, printable
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.supervision import read_supervision
@@ -264,12 +264,11 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
 
 
 def _parse_record(data: bytes, path: Path) -> CalibrationRecord:
-    name = printable(str(path))
     try:
         has_checksum(data)
     except DamagedError as error:
-        raise FileError("calibration-file.changed", path=name) from error
+        raise FileError("calibration-file.changed", path=path) from error
     try:
         return parse_checked(data, CalibrationRecord)
     except DamagedError as error:
-        raise UsageError("calibration-file.other", path=name) from error
+        raise UsageError("calibration-file.other", path=path) from error

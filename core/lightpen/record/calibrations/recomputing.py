@@ -27,7 +27,6 @@ from lightpen.estimation.reports.calibration_record import (
 from lightpen.estimation.reports.methods import Method
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile, Inputs, RigInputs
 from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
@@ -70,14 +69,14 @@ def recompute(path: Path) -> Recomputed:
     """
     record = read_calibration(path).calibration
     if record.second_cone is not None and not record.second_cone.frames:
-        raise UsageError("recompute.two-cones", path=printable(str(path)))
+        raise UsageError("recompute.two-cones", path=path)
     found, limits = record.inputs, record.verdict.limits
     try:
         kept_pen = _kept(found.pen)
         kept_rig = None if found.rig is None else _kept(found.rig)
         kept_cameras = tuple(map(_kept, found.cameras or (found.camera,)))
     except DamagedError as error:
-        raise UsageError("recompute.not-enough", path=printable(str(path))) from error
+        raise UsageError("recompute.not-enough", path=path) from error
     nominal = None if record.nominal_tip_mm is None else floats(record.nominal_tip_mm)
     with TemporaryDirectory(prefix="lightpen-record-") as folder:
         cameras = [

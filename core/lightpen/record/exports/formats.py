@@ -18,10 +18,9 @@ import yaml
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.file_format import FileFormat
-from lightpen.formats.files import printable
 from lightpen.formats.json_records import record_bytes
 from lightpen.local_time import local_time
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.export_status import status_of

@@ -8,7 +8,6 @@ from pathlib import Path
 from msgspec import Struct
 
 from lightpen.errors import FileError
-from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import (
     ProgramName,
@@ -104,9 +103,7 @@ def read_camera_trial(content: bytes, file: Path) -> StoredTrial:
     try:
         return parse_checked(content, StoredTrial)
     except DamagedError as error:
-        raise FileError(
-            "camera-calibration.damaged", file=printable(str(file))
-        ) from error
+        raise FileError("camera-calibration.damaged", file=file) from error
 
 
 def _entry(name: str, sha256: str) -> dict[str, str]:

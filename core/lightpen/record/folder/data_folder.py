@@ -9,7 +9,7 @@ from uuid import uuid4
 
 from lightpen.errors import FileError
 from lightpen.formats.file_locks import locked
-from lightpen.formats.files import printable, why_unwritten
+from lightpen.formats.files import why_unwritten
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.folder.verifications import UNDER_WAY, VERIFICATIONS
 from lightpen.record.results.result_folder import RECORDS, RESULTS, SIMULATED
@@ -29,9 +29,7 @@ def check_writable(data: Path) -> None:
             os.fsync(file.fileno())
     except OSError as error:
         raise FileError(
-            "data-folder.unwritable",
-            folder=printable(str(data)),
-            reason=why_unwritten(error),
+            "data-folder.unwritable", folder=data, reason=why_unwritten(error)
         ) from error
 
 

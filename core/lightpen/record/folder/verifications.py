@@ -7,7 +7,6 @@ from typing import Any
 from msgspec import Struct, field
 
 from lightpen.errors import FileError
-from lightpen.formats.files import printable
 from lightpen.formats.json_records import ProgramName
 from lightpen.formats.own_json import (
     DamagedError,
@@ -114,7 +113,7 @@ def read_verification(content: bytes, file: Path) -> StoredVerification:
     try:
         done = parse_checked(content, StoredVerification)
     except DamagedError as error:
-        raise FileError("verification.damaged", file=printable(str(file))) from error
+        raise FileError("verification.damaged", file=file) from error
     data = data_folder_of_verification(file)
     if data is not None:
         read_supervision(data).require_signed(

@@ -17,7 +17,7 @@ from msgspec import Meta, Struct
 
 from lightpen.errors import FileError
 from lightpen.formats import upgrades
-from lightpen.formats.files import MEGABYTE, create_whole, printable
+from lightpen.formats.files import MEGABYTE, create_whole
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
@@ -112,9 +112,9 @@ def read_limits_change(content: bytes, file: Path) -> LimitsChange:
     try:
         return parse_upgraded(content, LimitsChange, upgrades.LIMITS)
     except LaterFormatError as error:
-        raise FileError("limits.later-version", file=printable(str(file))) from error
+        raise FileError("limits.later-version", file=file) from error
     except DamagedError as error:
-        raise FileError("limits.damaged", file=printable(str(file))) from error
+        raise FileError("limits.damaged", file=file) from error
 
 
 def write_limits_change(

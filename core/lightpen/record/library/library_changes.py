@@ -13,12 +13,12 @@ from msgspec import structs
 
 from lightpen.errors import FileError, NameTakenError, UsageError
 from lightpen.formats import upgrades
-from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
+from lightpen.formats.files import MEGABYTE, create_whole, read_bytes
 from lightpen.formats.image_headers import read_image_header
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.upgrades import newest_format
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
 from lightpen.record.library.numbered_files import (
     make_folder,
@@ -168,7 +168,7 @@ def read_kept_picture(data: Path, picture: Picture) -> bytes:
     file = data / picture.place
     content = read_picture(file)
     if sha256(content).hexdigest() != picture.sha256:
-        raise FileError("library.other-picture", path=printable(str(file)))
+        raise FileError("library.other-picture", path=file)
     return content
 
 

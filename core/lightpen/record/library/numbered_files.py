@@ -11,13 +11,7 @@ from itertools import count
 from pathlib import Path
 
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import (
-    FOLDER,
-    create_whole,
-    printable,
-    sync_folder,
-    unreadable,
-)
+from lightpen.formats.files import FOLDER, create_whole, sync_folder, unreadable
 from lightpen.formats.system_reasons import strerror
 
 MISSING = ".missing"
@@ -57,7 +51,7 @@ def make_folder(folder: Path) -> None:
             sync_folder(each.parent)
     except OSError as error:
         raise FileError(
-            "results.no-folder", folder=printable(str(folder)), reason=strerror(error)
+            "results.no-folder", folder=folder, reason=strerror(error)
         ) from error
 
 

@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from lightpen.errors import AcceptanceError, FileError
-from lightpen.formats.files import printable, read_bytes
+from lightpen.formats.files import read_bytes
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.guard_files import (
     LIMIT,
@@ -122,7 +122,7 @@ class Supervision:
             not has_supervisor or found.is_by_supervisor(self.password.key)
         )
         if not is_signed_so:
-            raise FileError("signing.unsigned-file", file=printable(str(file)))
+            raise FileError("signing.unsigned-file", file=file)
 
 
 def folded_name(station: str) -> str:
@@ -141,7 +141,7 @@ def read_supervision(data: Path) -> Supervision:
     guard = Supervision()
     for number, file in enumerate(reversed(numbered_files(folder)), start=1):
         if number_of(file) != number:
-            raise FileError("limits.missing", folder=printable(str(folder)))
+            raise FileError("limits.missing", folder=folder)
         content = read_bytes(file, WHAT, LIMIT)
         guard = _followed(guard, data, file, content)
     before = remembered(data)
@@ -149,9 +149,7 @@ def read_supervision(data: Path) -> Supervision:
         there = guard.hashes[before.n_changes - 1 : before.n_changes]
         if there != (before.sha256,):
             raise FileError(
-                "limits.rolled-back",
-                folder=printable(str(folder)),
-                memory=printable(str(memory_file(data))),
+                "limits.rolled-back", folder=folder, memory=memory_file(data)
             )
     return guard
 
@@ -220,7 +218,7 @@ def _followed(
             and change.known is None
         )
     if not is_sound:
-        raise FileError("limits.unsigned", file=printable(str(file)))
+        raise FileError("limits.unsigned", file=file)
     return Supervision(
         password,
         _with_limits(guard.limits, change),

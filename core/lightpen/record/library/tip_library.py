@@ -20,7 +20,7 @@ from msgspec import Meta, Struct, to_builtins
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats import upgrades
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
     DamagedError,
@@ -356,9 +356,9 @@ def read_change(file: Path, supervision: Supervision | None = None) -> LibraryCh
     try:
         change = parse_change(text)
     except LaterFormatError as error:
-        raise FileError("library.later-version", file=printable(str(file))) from error
+        raise FileError("library.later-version", file=file) from error
     except DamagedError as error:
-        raise FileError("library.damaged", file=printable(str(file))) from error
+        raise FileError("library.damaged", file=file) from error
     supervision.require_signed(data, file, text, has_supervisor=True)
     return change
 

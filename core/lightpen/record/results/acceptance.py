@@ -19,8 +19,8 @@ from datetime import datetime
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade, Verdict
-from lightpen.formats.files import printable
 from lightpen.formats.stored_messages import StoredMessage
+from lightpen.messages import printable
 from lightpen.record.library.signing.keys import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
@@ -204,4 +204,4 @@ def _images_of(record: Record) -> tuple[int, ...]:
 def _require_same_images(record: Record, solution: Solution) -> None:
     is_same = record.all_numbers.tolist() == solution.numbers.tolist()
     if not is_same or set(record.taken_out) != set(solution.taken_out):
-        raise FileError("acceptance.changed", folder=printable(str(record.folder)))
+        raise FileError("acceptance.changed", folder=record.folder)

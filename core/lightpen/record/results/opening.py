@@ -7,7 +7,6 @@ each lies a small file whose name does. A result leads to the swing that it come
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import printable
 from lightpen.record.results.result_folder import RESULTS, SIMULATED, FolderArchive
 from lightpen.record.swings.reading import is_record
 
@@ -26,12 +25,8 @@ def swing_folder(path: Path) -> Path:
         recorded = FolderArchive(data).read(place).record
         if is_record(recorded):
             return recorded
-        raise FileError(
-            "opening.swing-moved",
-            file=printable(str(path)),
-            folder=printable(str(recorded)),
-        )
-    raise FileError("opening.no-swing", path=printable(str(path)))
+        raise FileError("opening.swing-moved", file=path, folder=recorded)
+    raise FileError("opening.no-swing", path=path)
 
 
 def data_folder_of(result: Path) -> Path | None:

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import LARGEST_RECORD, opened, printable, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, opened, read_bytes
 from lightpen.messages import message
 from lightpen.record.library.numbered_files import add_numbered, numbered_files
 from lightpen.record.library.signing.keys import SigningKey
@@ -219,9 +219,7 @@ class FolderArchive:
             if heading.record == place and _is_same(self.read(file), result):
                 return file
         names = result.names
-        raise FileError(
-            "results.gone", tip=names.tip, pen=names.pen, folder=printable(str(root))
-        )
+        raise FileError("results.gone", tip=names.tip, pen=names.pen, folder=root)
 
     def _root(self, is_simulated: bool) -> Path:
         return (self._data / SIMULATED if is_simulated else self._data) / RESULTS

@@ -23,7 +23,6 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.verdict import Change, Grade
-from lightpen.formats.files import printable
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
@@ -369,13 +368,10 @@ def _require_digest(rest: bytes, digest: str | None) -> None:
 
 
 def _damaged(file: Path) -> FileError:
-    return FileError("results.damaged", file=printable(str(file)))
+    return FileError("results.damaged", file=file)
 
 
 def _of_later_version(file: Path, number: int, kind: str) -> FileError:
     return FileError(
-        "results.later-version",
-        file=printable(str(file)),
-        number=number,
-        known=newest_format(kind),
+        "results.later-version", file=file, number=number, known=newest_format(kind)
     )

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
     DamagedError,
@@ -188,7 +188,7 @@ def read_header(folder: Path) -> Header:
         stem = name.partition(".")[0].partition("-")[0]
         data = read_bytes(folder / name, COPIES[stem], COPY_LIMIT)
         if sha256(data).hexdigest() != copy.sha256:
-            raise FileError("record.file-changed", path=printable(str(folder / name)))
+            raise FileError("record.file-changed", path=folder / name)
     return header
 
 
@@ -214,15 +214,12 @@ def camera_stem(c: int) -> str:
 
 def damaged_file(path: Path) -> FileError:
     """Return the error of a file of a record, other than an image or a copy."""
-    return FileError("record.damaged", path=printable(str(path)))
+    return FileError("record.damaged", path=path)
 
 
 def _of_later_version(path: Path, number: int) -> FileError:
     return FileError(
-        "record.later-version",
-        path=printable(str(path)),
-        number=number,
-        known=newest_format(SWING),
+        "record.later-version", path=path, number=number, known=newest_format(SWING)
     )
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import printable
 from lightpen.formats.system_reasons import strerror
 from lightpen.messages import Message, message
 from lightpen.record.swings.header import HEADER
@@ -62,9 +61,7 @@ def find_unfinished(root: Path) -> InterruptedSwings:
         folders = list(root.iterdir()) if root.is_dir() else []
     except OSError as error:
         raise FileError(
-            "unfinished.folder-unreadable",
-            folder=printable(str(root)),
-            reason=strerror(error),
+            "unfinished.folder-unreadable", folder=root, reason=strerror(error)
         ) from error
     interrupted, under_way, damaged = [], [], []
     for folder in sorted(folders, reverse=True):
@@ -78,9 +75,7 @@ def find_unfinished(root: Path) -> InterruptedSwings:
                 interrupted.append(record)
         except OSError as error:
             unreadable = message(
-                "unfinished.swing-unreadable",
-                folder=printable(str(folder)),
-                reason=strerror(error),
+                "unfinished.swing-unreadable", folder=folder, reason=strerror(error)
             )
             damaged.append(DamagedSwing(folder, unreadable))
         except FileError as error:
@@ -120,17 +115,11 @@ def _read_unfinished(folder: Path) -> Record | None:
         return None
     for name in (HEADER, JOURNAL):
         if not (folder / name).exists():
-            raise FileError(
-                "unfinished.file-missing", folder=printable(str(folder)), name=name
-            )
+            raise FileError("unfinished.file-missing", folder=folder, name=name)
     record = open_record(folder)
     # A crash leaves no more than one image without a line.
     if not record.images and n_images > 1:
-        raise FileError(
-            "unfinished.unknown-images",
-            journal=printable(str(journal)),
-            n_images=n_images,
-        )
+        raise FileError("unfinished.unknown-images", journal=journal, n_images=n_images)
     is_over = record.verdict is not None or is_press_test(record)
     return record if record.images and not is_over else None
 

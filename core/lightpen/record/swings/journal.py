@@ -14,7 +14,7 @@ from msgspec import Meta, Struct, to_builtins
 
 from lightpen.cameras.protocol import Count, Stats
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
@@ -129,9 +129,7 @@ def parse_lines(lines: list[bytes], folder: Path) -> list[Line]:
 
 def damaged_line(folder: Path, number: int) -> FileError:
     """Return the error of a line of the journal in a folder."""
-    return FileError(
-        "record.damaged-line", line=number, file=printable(str(folder / JOURNAL))
-    )
+    return FileError("record.damaged-line", line=number, file=folder / JOURNAL)
 
 
 def length_of(lines: list[bytes]) -> int:

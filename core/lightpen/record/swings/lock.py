@@ -11,7 +11,6 @@ from typing import IO
 
 from lightpen.errors import FileError
 from lightpen.formats.file_locks import NO_LOCKS, locked, unlock
-from lightpen.formats.files import printable
 
 PATIENCE = 0.5  # s, wait for a reader or a closing process to release the lock
 
@@ -22,7 +21,7 @@ def lock_journal(journal: IO[bytes], folder: Path) -> None:
     Raises `FileError` if another program writes to the record.
     """
     if not _is_taken_over(journal.fileno(), shared=False):
-        raise FileError("record.locked", folder=printable(str(folder)))
+        raise FileError("record.locked", folder=folder)
 
 
 def unlock_journal(journal: IO[bytes]) -> None:

@@ -18,7 +18,7 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.protocol import Stats
 from lightpen.errors import FileError
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.files import printable, sync_folder, why_unwritten, write_whole
+from lightpen.formats.files import sync_folder, why_unwritten, write_whole
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.swings.header import HEADER, Header, header_bytes, header_copies
 from lightpen.record.swings.journal import (
@@ -85,7 +85,7 @@ class RecordWriter:
         The file manager opens a swing, not touches, with the program.
         """
         if folder.is_dir() and any(folder.iterdir()):
-            raise FileError("record.not-empty", folder=printable(str(folder)))
+            raise FileError("record.not-empty", folder=folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             (folder / JOURNAL).touch(exist_ok=False)
@@ -305,9 +305,7 @@ def _own_journal(folder: Path, length: int) -> FileIO:
             journal = stack.enter_context(path.open("ab", buffering=0))
             lock_journal(journal, folder)
             if sound_length(folder) != length:
-                raise FileError(
-                    "record.changed-meanwhile", folder=printable(str(folder))
-                )
+                raise FileError("record.changed-meanwhile", folder=folder)
         except OSError as error:
             raise _unwritable(path, error) from error
         stack.pop_all()
@@ -319,9 +317,7 @@ def _point(point: FloatArray) -> tuple[float, float] | None:
 
 
 def _unwritable(path: Path, error: OSError) -> FileError:
-    return FileError(
-        "record.unwritable", path=printable(str(path)), reason=why_unwritten(error)
-    )
+    return FileError("record.unwritable", path=path, reason=why_unwritten(error))
 
 
 def _sync_folder(folder: Path) -> None:

@@ -26,7 +26,6 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.camera_motion import steadied
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.formats.files import printable
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
@@ -81,7 +80,7 @@ def calibrate_again(
 ) -> Calibration:
     """Calibrate again from the LED centres of a calibration by one camera."""
     if calibration.is_of_rig:
-        raise UsageError("led-file.of-rig", path=printable(str(calibration.path)))
+        raise UsageError("led-file.of-rig", path=calibration.path)
     shown = shown_images(calibration.calibration)
     numbers = np.arange(1, len(shown.pixels) + 1)
     centers = Centers(numbers, shown.pixels, calibration.path)

@@ -20,7 +20,6 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.formats.files import printable
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
@@ -130,9 +129,7 @@ def require_one_pen(calibrations: Sequence[CalibrationFile]) -> None:
     for each in calibrations[1:]:
         if each.pen_sha256 != calibrations[0].pen_sha256:
             raise UsageError(
-                "pen-health.another-pen",
-                other=printable(str(each.path)),
-                first=printable(str(calibrations[0].path)),
+                "pen-health.another-pen", other=each.path, first=calibrations[0].path
             )
 
 

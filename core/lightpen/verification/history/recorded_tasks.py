@@ -95,4 +95,4 @@ def _read(path: Path, shape: type[T], what: Message) -> T:
         has_checksum(data)
         return parse_own_json(data, shape)
     except DamagedError as error:
-        raise FileError("verification.other-file", path=str(path), what=what) from error
+        raise FileError("verification.other-file", path=path, what=what) from error

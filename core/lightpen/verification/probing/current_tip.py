@@ -8,8 +8,8 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile, hashed
+from lightpen.messages import printable
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.results.result_folder import FolderArchive

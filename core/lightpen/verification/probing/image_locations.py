@@ -10,10 +10,11 @@ from pathlib import Path
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import FOLDER, printable, unreadable
+from lightpen.formats.files import FOLDER, unreadable
 from lightpen.formats.hashes import InputFile, all_hashed
 from lightpen.formats.images import ImageSource, find_images, natural_order
 from lightpen.formats.rig_files import RigFile, read_rig
+from lightpen.messages import printable
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen

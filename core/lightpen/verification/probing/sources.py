@@ -21,9 +21,9 @@ from lightpen.estimation.uncertainty.instrument import (
     instrument_of_files,
     with_rig,
 )
-from lightpen.formats.files import printable, sha256
+from lightpen.formats.files import sha256
 from lightpen.formats.pairing import pair_images
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.camera import Camera
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
@@ -90,9 +90,9 @@ def instrument_of(
     if sha256(pen_file) != calibration.pen_sha256 or pen.n_leds != len(record.leds):
         raise UsageError(
             "verification.another-pen",
-            tip=printable(str(calibration.path)),
+            tip=calibration.path,
             its_pen=printable(record.inputs.pen.file),
-            pen=printable(str(pen_file)),
+            pen=pen_file,
         )
     if record.method != "joint":
         return instrument_of_files(

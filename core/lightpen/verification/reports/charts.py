@@ -8,7 +8,8 @@ from typing_extensions import override
 
 from lightpen.errors import UsageError
 from lightpen.formats.csv_cells import csv_table
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import write_whole
+from lightpen.messages import printable
 from lightpen.verification.tasks.repeatability import Repeatability
 
 WIDTH, HEIGHT, MARGIN = 720, 200, 60  # px, of the chart of one coordinate

@@ -21,7 +21,6 @@ from lightpen.formats.file_locks import NO_LOCKS, locked
 from lightpen.formats.files import (
     LARGEST_RECORD,
     MEGABYTE,
-    printable,
     read_bytes,
     sync_folder,
     unreadable,
@@ -36,7 +35,7 @@ from lightpen.formats.own_json import (
     require_usual,
     with_checksum,
 )
-from lightpen.messages import Message, message
+from lightpen.messages import Message, message, printable
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import CONCLUSION, UNDER_WAY, VERIFICATIONS
 from lightpen.record.library.numbered_files import make_folder, numbered_files
@@ -291,5 +290,5 @@ def _read(path: Path) -> InterruptedVerification:
     except FileError as error:
         return InterruptedVerification(path, None, error.message)
     except DamagedError:
-        why = message("under-way.damaged", file=printable(str(path)))
+        why = message("under-way.damaged", file=path)
         return InterruptedVerification(path, None, why)

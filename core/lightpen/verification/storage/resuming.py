@@ -11,8 +11,8 @@ from datetime import datetime
 from pathlib import Path
 
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile, hashed
+from lightpen.messages import printable
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import TOUCHES

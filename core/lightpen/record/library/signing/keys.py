@@ -28,7 +28,7 @@ import platformdirs
 from msgspec import Meta
 
 from lightpen.errors import FileError
-from lightpen.formats.files import create_whole, printable, read_bytes
+from lightpen.formats.files import create_whole, read_bytes
 from lightpen.formats.system_reasons import strerror
 from lightpen.messages import message
 
@@ -105,9 +105,7 @@ def make_station_key() -> SigningKey:
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     except OSError as error:
         raise FileError(
-            "results.no-folder",
-            folder=printable(str(file.parent)),
-            reason=strerror(error),
+            "results.no-folder", folder=file.parent, reason=strerror(error)
         ) from error
     create_whole(file, key.private_bytes().hex().encode(), PRIVATE)
     return key
@@ -122,9 +120,9 @@ def station_key(name: str) -> SigningKey | None:
     try:
         key = _kept_key(content)
     except ValueError as error:
-        raise FileError("signing.key-damaged", file=printable(str(file))) from error
+        raise FileError("signing.key-damaged", file=file) from error
     if chain_of(key.public) != name:
-        raise FileError("signing.key-damaged", file=printable(str(file)))
+        raise FileError("signing.key-damaged", file=file)
     return key
 
 

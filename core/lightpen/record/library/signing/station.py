@@ -16,13 +16,7 @@ from pathlib import Path
 from msgspec import Struct
 
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import (
-    MEGABYTE,
-    create_whole,
-    printable,
-    read_bytes,
-    write_whole,
-)
+from lightpen.formats.files import MEGABYTE, create_whole, read_bytes, write_whole
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import DamagedError, Digest, parse_own_json
 from lightpen.messages import message
@@ -68,7 +62,7 @@ def station_name(data: Path) -> str:
     try:
         found = parse_own_json(read_bytes(file, WHAT, MEGABYTE), _StationFile)
     except DamagedError as error:
-        raise FileError("signing.key-damaged", file=printable(str(file))) from error
+        raise FileError("signing.key-damaged", file=file) from error
     return chain_of(found.station_key)
 
 
@@ -80,7 +74,7 @@ def remembered(data: Path) -> RememberedFolder | None:
     try:
         return parse_own_json(read_bytes(file, WHAT, MEGABYTE), RememberedFolder)
     except DamagedError as error:
-        raise FileError("signing.key-damaged", file=printable(str(file))) from error
+        raise FileError("signing.key-damaged", file=file) from error
 
 
 def remember(data: Path, n_changes: int, digest: str) -> None:
