@@ -34,15 +34,7 @@ TITLE, COLUMN = 30, 13  # characters
 
 @dataclass(frozen=True, eq=False)
 class Recalculated:
-    """A calibration solved again from its LED centres.
-
-    Attributes
-    ----------
-    tip_pen : (3,) array or None
-        mm; None where there is no tip any more.
-    fault : str
-        Why not.
-    """
+    """A calibration solved again: tip (3,) and its change, mm; or why there is none."""
 
     name: str
     tip_pen: FloatArray | None

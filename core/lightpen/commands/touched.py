@@ -76,14 +76,9 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredRuns:
-    """The points of all runs, and the instrument.
+    """The points of all runs, with the drift of fixed lamps in view.
 
-    Attributes
-    ----------
-    origin : Origin
-        Of the images or centres; simulated if some of them are.
-    lamp_drift : LampDrift or None
-        The drift of fixed lamps in view.
+    The origin of images or centres is simulated if some of them are.
     """
 
     calibration: CalibrationFile

@@ -10,14 +10,8 @@ from lightpen.messages import Message
 class FileFormat:
     """A format of exported files.
 
-    Attributes
-    ----------
-    name : str
-        Name on the command line.
-    suffix : str
-        End of the names of its files.
-    text : callable
-        Returns the content of a file.
+    The name is that on the command line, ``text`` returns the content of a file,
+    and the suffix is the end of its name.
     """
 
     name: str

@@ -19,10 +19,8 @@ LIMIT = 16 * MEGABYTE  # of a file that is kept in the record
 class InputFile:
     """An input file of a calibration.
 
-    Attributes
-    ----------
-    content : bytes or None
-        Stored in the record, so that the calibration can be recomputed from it alone.
+    With its content in the record, the calibration can be recomputed from that
+    alone.
     """
 
     path: Path
@@ -44,14 +42,8 @@ class Inputs:
 
     Attributes
     ----------
-    camera : InputFile
-        File of the first camera.
     observations : tuple of InputFile
         The images, the video or the file of LED centres.
-    nominal_tip : (3,) array or None
-        Nominal tip centre, pen frame, mm.
-    origin : Origin or None
-        Origin of the images; None if unknown.
     units : str or None
         Units of a pen file that states none.
     led_diameter : float or None

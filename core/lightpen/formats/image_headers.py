@@ -37,17 +37,7 @@ _TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackB
 
 @dataclass(frozen=True)
 class ImageHeader:
-    """Size of an image and memory needed to decode it.
-
-    Attributes
-    ----------
-    width, height : int
-        px.
-    decoded : int
-        Size of the decoded image, bytes.
-    working : int
-        Memory that its decoder takes besides, bytes.
-    """
+    """Size of an image, px; memory of it decoded, and besides for that, bytes."""
 
     width: int
     height: int

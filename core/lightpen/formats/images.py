@@ -22,14 +22,9 @@ from lightpen.messages import message, printable
 
 
 class MemoryRoom:
-    """Limits the threads that decode at once by the memory they need.
+    """Limits the threads that decode at once by the memory they need, bytes.
 
     One thread is always admitted.
-
-    Parameters
-    ----------
-    budget : int
-        bytes that all of them may take.
     """
 
     def __init__(self, budget: int) -> None:

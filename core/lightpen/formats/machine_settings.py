@@ -23,24 +23,10 @@ WHAT = message("file.machine-settings")
 
 @dataclass(frozen=True)
 class MachineSettings:
-    """Default settings of the machine.
+    """Default settings of the machine; an empty text is none.
 
-    Attributes
-    ----------
-    language : str
-        As of the preferences; empty for that of the system.
-    archive_server : str
-        Address of the archive's server; empty for none.
-    update_file : str
-        File that names the newest version; empty to tell of none.
-    timestamp_authority : str
-        Address of a time stamping authority; empty for none.
-    timestamp_certificate : str
-        File with its certificate.
-    limits : mapping of str to float
-        Limits of new stations, by `lightpen.model.limits.Limit.key`.
-    laboratory : Laboratory or None
-        For certificates and reports.
+    The limits are those of new stations, by `lightpen.model.limits.Limit.key`;
+    ``update_file`` names the newest version.
     """
 
     language: str = ""

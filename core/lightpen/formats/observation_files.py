@@ -42,17 +42,7 @@ _COVARIANCE = tuple((f"c{i}{j}",) for i in "123456" for j in "123456")
 
 @dataclass(frozen=True, eq=False)
 class Centers:
-    """Images of the LEDs in a series of frames.
-
-    Attributes
-    ----------
-    frames : (F,) array
-        Numbers of the frames, ascending.
-    pixels : (F, L, 2) array
-        Image of each LED, px; NaN where it was not seen.
-    path : Path
-        The file they are from.
-    """
+    """LED centres (F, L, 2), px, NaN if not seen, in frames of ascending numbers."""
 
     frames: IntArray
     pixels: FloatArray
@@ -70,8 +60,6 @@ class UnlabelledCenters:
         without a centre.
     centers : tuple of (S, 2) array
         Those of each frame, in any order, px.
-    path : Path
-        The file they are from.
     """
 
     frames: IntArray
@@ -91,8 +79,6 @@ class PoseTable:
     covariances : (N, 6, 6) array or None
         Of the rotation vector w, with true rotation ``exp([w]x) R``, and of the
         translation; rad and mm.
-    path : Path
-        The file they are from.
     """
 
     rotations: FloatArray

@@ -17,15 +17,7 @@ from lightpen.model.pen import Pen
 
 @dataclass(frozen=True, eq=False)
 class CameraFile:
-    """An intrinsics file that was read.
-
-    Attributes
-    ----------
-    is_simulated : bool
-        Whether it is of a simulated camera.
-    sha256 : str
-        Hash of the content that was read.
-    """
+    """An intrinsics file that was read, with the hash of its content."""
 
     path: Path
     camera: Camera
@@ -40,16 +32,10 @@ class CameraFile:
 
 @dataclass(frozen=True, eq=False)
 class PenFile:
-    """An LED geometry file that was read.
+    """An LED geometry file that was read, with the hash of its content.
 
-    Attributes
-    ----------
-    units : str or None
-        Given for a file that states none.
-    is_simulated : bool
-        Whether it is of a simulated pen.
-    sha256 : str
-        Hash of the content that was read; empty for a pen that is in no file yet.
+    The units were given for a file that states none; the hash is empty for a pen
+    that is in no file yet.
     """
 
     path: Path
@@ -67,13 +53,7 @@ class PenFile:
 
 @dataclass(frozen=True, eq=False)
 class OpenedFiles:
-    """The readable files of a station, and the errors of the others.
-
-    Attributes
-    ----------
-    faults : tuple of Message
-        Why a file must be chosen again.
-    """
+    """The readable files of a station, and why others must be chosen again."""
 
     camera_file: CameraFile | None = None
     pen_file: PenFile | None = None

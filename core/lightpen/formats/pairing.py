@@ -20,14 +20,9 @@ Key: TypeAlias = str | int
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """The images of C cameras at N moments.
+    """Indices (N, C) of the images of C cameras at N moments, from 0; -1 for none.
 
-    Attributes
-    ----------
-    images : (N, C) array of int
-        Index of the image of each camera, from 0; -1 if it has none.
-    by_order : bool
-        Whether they were paired by order, as the names do not match.
+    They are paired by order where the names do not match.
     """
 
     images: IntArray

@@ -66,22 +66,11 @@ def read_pen(
 ) -> Pen:
     """Read a pen with LEDs in the pen frame; the module describes the layouts.
 
-    Parameters
-    ----------
-    units : {"mm", "cm", "m", "um", "inch"} or None
-        Unit of the file's lengths; needed if the file does not state it.
-    diameter : float or None
-        Diameter of the LED discs, mm, in place of the file's.
-    nominal_tip : (3,) array or None
-        Nominal tip in the pen frame, mm, in place of the file's.
-
-    Raises
-    ------
-    FileError
-        The file cannot be read, is not a complete pen, or a pen of the paper's layout
-        is not in the paper's frame.
-    UsageError
-        The units are neither in the file nor given, or both and different.
+    The unit of lengths is one of `UNITS`, needed if the file does not state it.
+    Disc diameter, mm, and nominal tip (3,), pen frame, mm, replace those of the
+    file. Raises `FileError` unless it is a complete pen, one of the paper's layout
+    in the paper's frame, and `UsageError` if the units are neither in the file nor
+    given, or both and different.
     """
     pen = _pen(_read(path, units), diameter, nominal_tip)
     try:

@@ -65,15 +65,7 @@ _CAMERA_KEYS = (_NAME, _INTRINSICS, _ROTATION, _TRANSLATION, *_UNCERTAINTIES)
 
 @dataclass(frozen=True, eq=False)
 class RigFile:
-    """A rig file that was read, and the camera files that it names.
-
-    Attributes
-    ----------
-    camera_files : tuple of Path
-        One a camera.
-    is_simulated : bool
-        Whether it is of simulated cameras.
-    """
+    """A rig file that was read, and the camera file of each camera."""
 
     path: Path
     camera_files: tuple[Path, ...]

@@ -38,18 +38,10 @@ _CUT_SHORT_ROWS = 20  # fewer rows are typed by hand and may end in a shorter nu
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The cells of a table, as text.
+    """The cells of a table, as text without surrounding blanks.
 
-    Attributes
-    ----------
-    name : str
-        Name of the file, for messages.
-    header : tuple of str
-        Column names in lower case; empty if the file has none.
-    rows : list of list of str
-        Cells without surrounding blanks; all rows are equally long.
-    lines : list of int
-        Line of the file that each row stands on, from 1.
+    All rows are equally long. The header has the column names in lower case, or
+    none; ``lines`` are the lines of the file that the rows stand on, from 1.
     """
 
     name: str
@@ -63,21 +55,10 @@ class Table:
         return len(self.rows[0])
 
     def columns(self, names: Sequence[Sequence[str]], what: Message) -> list[int]:
-        """Return the indices of columns.
+        """Return the indices of columns by the accepted names of each, the best first.
 
-        A table without header has its columns in the order of `names`.
-
-        Parameters
-        ----------
-        names : sequence of sequences of str
-            Accepted names of each column, the preferred one first.
-        what : Message
-            Content of the table for messages.
-
-        Raises
-        ------
-        FileError
-            A column is missing.
+        A table without header has its columns in the order of `names`. ``what``
+        is the content of the table for messages.
         """
         wanted = ",".join(alternatives[0] for alternatives in names)
         if not self.header:

@@ -26,13 +26,9 @@ from lightpen.verification.workflow import VerificationWorkflow
 class VerificationRunner:
     """Verifies the current tip, by live images and by recorded ones.
 
-    Every method returns at once, but for `take` and `await_end`. A command that cannot
-    be carried out in the state that the verification is in by then does nothing.
-
-    Parameters
-    ----------
-    data : Path
-        Data folder, in which results are kept.
+    Every method returns at once, but for `take` and `await_end`. A command that
+    cannot be carried out in the state that the verification is in by then does
+    nothing.
     """
 
     def __init__(

@@ -84,13 +84,7 @@ class Cause(Enum):
 
 
 class VerificationWorkflow:
-    """Successive verifications of the current tip.
-
-    Parameters
-    ----------
-    data : Path
-        Data folder, in which results are kept.
-    """
+    """Successive verifications of the current tip, with results in a data folder."""
 
     def __init__(
         self,

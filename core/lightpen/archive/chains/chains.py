@@ -58,13 +58,7 @@ BATCH = 200  # entries that are copied in one transaction
 
 @dataclass(frozen=True)
 class CopyResult:
-    """Result of copying entries.
-
-    Attributes
-    ----------
-    n_new : int
-        Number of new entries.
-    """
+    """Numbers of new and of known entries when entries are copied."""
 
     n_new: int
     n_known: int
@@ -264,12 +258,8 @@ def entries_of_limits(database: Database, chain: str) -> tuple[StoredEntry, ...]
 class ArchivedFiles:
     """The paths of the result files and swings in a chain.
 
-    What was read once is kept, so that of a long chain only its new entries are.
-
-    Parameters
-    ----------
-    chain : str
-        Chain of the data folder; its entries are never changed.
+    What was read once is kept, so that of a long chain only its new entries are:
+    they are never changed.
     """
 
     def __init__(self, database: Database, chain: str) -> None:

@@ -63,12 +63,8 @@ IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
 class FileHash(Struct, frozen=True):
     """A file that an entry refers to.
 
-    Attributes
-    ----------
-    place : str
-        Path relative to the data folder, or absolute if outside of it.
-    n_bytes : int or None
-        Length of the hashed beginning; None for the whole file.
+    The place is its path from the data folder, or absolute if outside of it;
+    ``n_bytes`` the length of the hashed beginning, None for the whole file.
     """
 
     place: str
@@ -81,20 +77,10 @@ class Event(Struct, frozen=True):
 
     Attributes
     ----------
-    at : datetime
-        Time of the station's clock.
-    program : str
-        Name and version.
     grade : str
         Verdict on a calibration; empty of anything else, and where there was none.
-    why : StoredMessage or None
-        Reason of the grade.
     reason : str
         Reason given by the operator; of a comment, its text.
-    change : TipChange or None
-        Since the tip as found, which was in force before.
-    outcome : TrialOutcome or None
-        Outcome of a verification or a camera calibration.
     swing : str
         Folder of the swing that it is of, as `FileHash.place`; may be empty.
     settings : mapping
@@ -143,19 +129,10 @@ class Event(Struct, frozen=True):
 
 
 class Entry(Struct, frozen=True):
-    """An event in its place.
+    """An event in its place: its number in the chain, from 1.
 
-    Attributes
-    ----------
-    chain : str
-        Identifier of the data folder's chain.
-    number : int
-        Number in the chain, from 1.
-    previous : str
-        Hash of the entry before.
-    since : datetime
-        When it was, but never before the entry before it, whatever a clock says: by it
-        the entries of several stations stand in one order.
+    ``since`` is its time, but never before the entry before it, whatever a clock
+    says: by it the entries of several stations stand in one order.
     """
 
     chain: Chain
@@ -169,12 +146,8 @@ class Entry(Struct, frozen=True):
 class StoredEntry:
     """An entry as stored.
 
-    Attributes
-    ----------
-    text : str
-        Canonical JSON: names sorted, no blanks, ASCII.
-    signature : str
-        See `lightpen.archive.chains.signatures`; empty until it is entered.
+    The text is canonical JSON: names sorted, no blanks, ASCII. For the signature,
+    empty until it is entered, see `lightpen.archive.chains.signatures`.
     """
 
     entry: Entry
@@ -185,16 +158,9 @@ class StoredEntry:
 
 @dataclass(frozen=True)
 class ChainHead:
-    """Last entry of a chain.
+    """Last entry of a chain: number, hash, time, and the public key that signed it.
 
-    Attributes
-    ----------
-    number : int
-        Number of the last entry; 0 for an empty chain.
-    since : datetime or None
-        Time of the last entry.
-    key : str
-        Public key that signed it; empty for an empty chain.
+    An empty chain has the number 0, no time and no key.
     """
 
     chain: str

@@ -54,15 +54,9 @@ def key_in(signature: str) -> str:
 
 
 class ChainKeys:
-    """The key that may sign a chain, as far as its entries were followed.
+    """The key that may sign a chain, by its earlier entries of limits in their order.
 
     Once another key is introduced, the one before signs nothing more.
-
-    Parameters
-    ----------
-    chain : str
-    entries : iterable of StoredEntry
-        Earlier entries of limits, in their order.
     """
 
     def __init__(self, chain: str, entries: Iterable[StoredEntry] = ()) -> None:

@@ -33,20 +33,11 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True)
 class ArchiveCheckResult:
-    """Result of a check.
+    """Numbers of what was checked, images included, and the findings.
 
-    Attributes
-    ----------
-    n_files : int
-        Number of files checked, images included.
-    findings : tuple of Message
-        Differences from the entries; empty if there are none.
-    notes : tuple of Message
-        Observations that prove no change, see `lightpen.archive.checks.check_notes`.
-    n_tips : int
-        Tips recomputed, see `lightpen.archive.checks.recompute_check`.
-    n_timestamps : int
-        Valid timestamps, see `lightpen.archive.checks.timestamps`.
+    The notes prove no change, see `lightpen.archive.checks.check_notes`; for the
+    tips see `lightpen.archive.checks.recompute_check`, for valid timestamps
+    `lightpen.archive.checks.timestamps`.
     """
 
     n_entries: int

@@ -24,17 +24,9 @@ from lightpen.record.swings.reading import image_name, open_record
 
 
 class FilesCheck:
-    """Reads each file once, however many entries refer to it.
+    """Reads each file once, however many entries refer to it, and counts them.
 
-    Parameters
-    ----------
-    data : Path or None
-        Data folder; without one there are no files to be read.
-
-    Attributes
-    ----------
-    n_files : int
-        Number of files read so far.
+    Without a data folder there are no files to be read.
     """
 
     def __init__(self, data: Path | None) -> None:

@@ -52,8 +52,6 @@ class Authority:
 
     Attributes
     ----------
-    address : str
-        ``http://`` or ``https://``; empty if none is to be asked.
     certificate : Path or None
         PEM file with its root. If it also has certificates for time stamping, one of
         these must have signed.
@@ -146,13 +144,7 @@ def with_timestamps(
 
 
 class _Client:
-    """Functions of the package rfc3161-client.
-
-    Raises
-    ------
-    ArchiveError
-        The package is not installed.
-    """
+    """Functions of rfc3161-client; `ArchiveError` if it is not installed."""
 
     def __init__(self, certificate: Path | None) -> None:
         try:

@@ -24,20 +24,11 @@ SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
 
 @dataclass(frozen=True)
 class DueTip:
-    """A tip in force.
+    """A tip in force, by the entry of its acceptance.
 
-    Attributes
-    ----------
-    entry : StoredEntry
-        Entry of the acceptance.
-    calibrated : datetime
-        Date of the calibration, also if the result was reinstated later.
-    due : datetime
-        Due date by age.
-    n_swings : int
-        Swings of the pen since the calibration.
-    n_left : int or None
-        Swings until it is due by their count; None if any number may be made.
+    ``calibrated`` is the date of the calibration, also if the result was reinstated
+    later, ``due`` the due date by age. ``n_swings`` of the pen were made since; it
+    is due by their count after ``n_left`` more, None if any number may be made.
     """
 
     entry: StoredEntry

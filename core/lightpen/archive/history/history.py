@@ -34,12 +34,8 @@ class TipState(StrEnum):
 class Line:
     """An entry and its later events.
 
-    Attributes
-    ----------
-    entry : StoredEntry or None
-        None if it was changed since it was entered.
-    is_foreign : bool
-        Whether it is a copy from another station.
+    The entry is None if it was changed since it was entered, and foreign if it is a
+    copy from another station.
     """
 
     chain: str
@@ -51,13 +47,7 @@ class Line:
 
 @dataclass(frozen=True)
 class KnownNames:
-    """Names to filter entries by.
-
-    Attributes
-    ----------
-    tips : tuple of pairs
-        Pen and tip.
-    """
+    """Pairs of pen and tip, and stations, to filter entries by."""
 
     tips: tuple[tuple[str, str], ...] = ()
     stations: tuple[str, ...] = ()

@@ -37,8 +37,6 @@ class EntryFilter:
     ----------
     begin, end : datetime or None
         Entries since the one, and before the other, each by its own clock.
-    is_simulated : bool or None
-        Whether of simulated pens.
     """
 
     pen: str = ""

@@ -27,13 +27,7 @@ def server_address() -> str:
 
 
 class LazyLogbook:
-    """Logbook that is opened at its first use, so that the program starts sooner.
-
-    Parameters
-    ----------
-    data, server
-        As of `lightpen.archive.logbook.logbook.Logbook`.
-    """
+    """Logbook that is opened at its first use, so that the program starts sooner."""
 
     def __init__(self, data: Path, server: str = "") -> None:
         self._data, self._server = data, server

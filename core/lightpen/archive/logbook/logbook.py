@@ -86,14 +86,9 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ReplicationState:
-    """Progress of the replication to a server.
+    """Entries that wait for a server, and why the last attempt failed.
 
-    Attributes
-    ----------
-    n_waiting : int or None
-        Entries that it does not have; None as long as it did not answer.
-    fault : Message or None
-        Why the last attempt failed.
+    Their number is None as long as it did not answer.
     """
 
     n_waiting: int | None
@@ -103,26 +98,10 @@ class ReplicationState:
 class Logbook:
     """Enters the events of a data folder in its archive; thread-safe.
 
-    Several programs may have one of the same folder.
-
-    Parameters
-    ----------
-    data : Path
-        Folder of the records, the results and the archive; it need not exist.
-    server : str
-        Address of the server that all is delivered to, as soon as it answers; none if
-        empty.
-
-    Attributes
-    ----------
-    shared : tuple of Message
-        What was taken over from the libraries of other stations since the start, and
-        what waits for a supervisor.
-
-    Raises
-    ------
-    ArchiveError
-        The archive is not of this program, or cannot be used.
+    Several programs may have one of the same folder, which need not exist. All is
+    delivered to the server at an address, if there is one, as soon as it answers.
+    ``shared`` are messages on what was taken over from the libraries of other
+    stations since the start, and on what waits for a supervisor.
     """
 
     def __init__(self, data: Path, server: str = "") -> None:

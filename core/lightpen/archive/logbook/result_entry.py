@@ -13,15 +13,7 @@ from lightpen.record.results.result_folder import FolderArchive
 
 @dataclass(frozen=True)
 class ArchivePlace:
-    """Entry of a calibration in an archive.
-
-    Attributes
-    ----------
-    number : int
-        Number in its chain, from 1.
-    sha256, previous : str
-        Hashes of the entry and of its predecessor.
-    """
+    """Entry of a calibration: number in its chain, from 1, and hashes."""
 
     number: int
     sha256: str

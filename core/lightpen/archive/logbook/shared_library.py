@@ -46,13 +46,7 @@ _SHARED = text(  # see `lightpen.archive.replication.server_setup`
 
 @dataclass(frozen=True)
 class TakenOver:
-    """A change of another station that counts here from now on.
-
-    Attributes
-    ----------
-    replaced : LibraryChange or None
-        The change of the same item that counted here before.
-    """
+    """A change of another station that counts here, and the one that counted before."""
 
     change: LibraryChange
     replaced: LibraryChange | None

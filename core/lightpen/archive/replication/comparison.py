@@ -34,17 +34,7 @@ GROUP BY block""")
 
 @dataclass(frozen=True)
 class ServerCheckResult:
-    """Result of a comparison with a server.
-
-    Attributes
-    ----------
-    n_entries : int
-        On the server, each of which was examined.
-    n_waiting : int
-        Entries of this station that were not delivered yet.
-    findings : tuple of Message
-        Discrepancies on either side; empty if there are none.
-    """
+    """Entries on a server, all examined, those not delivered yet, and discrepancies."""
 
     n_entries: int
     n_waiting: int

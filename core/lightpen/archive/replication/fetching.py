@@ -32,14 +32,9 @@ _UNSAFE = {"..", "."}
 
 @dataclass(frozen=True)
 class FetchResult:
-    """Result of fetching.
+    """Numbers of entries and files that were restored.
 
-    Attributes
-    ----------
-    n_files : int
-        That were missing here and are as they were entered.
-    lost : tuple of str
-        Files of entries that are neither here nor on the server.
+    ``lost`` are files of entries that are neither here nor on the server.
     """
 
     n_entries: int

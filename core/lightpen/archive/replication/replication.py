@@ -26,23 +26,12 @@ LOOK_S = 300.0  # at what other stations have shared
 
 
 class Replicator:
-    """Replicates in its own thread until closed.
+    """Replicates the chain of a data folder to a server in its own thread.
 
-    Parameters
-    ----------
-    chain : str
-        Chain of the data folder.
-    address : str
-        Address of the server; see `lightpen.archive.store.database.open_server`.
-    share : callable, optional
-        Takes over from a server what other stations share with this one.
-
-    Attributes
-    ----------
-    n_delivered : int or None
-        Entries that the server has; None until it answered first.
-    fault : Message or None
-        Why the last attempt failed.
+    For the address see `lightpen.archive.replication.server.open_server`; ``share``
+    takes over what other stations share with this one. The server has
+    ``n_delivered`` entries, None until it answered first; the fault is why the last
+    attempt failed.
     """
 
     def __init__(

@@ -69,12 +69,8 @@ _VERSION = Table(
 class Database:
     """An archive that is open.
 
-    Attributes
-    ----------
-    name : str
-        File or address without the password, fit to be shown.
-    file : Path or None
-        None of a server.
+    The name, fit to be shown, is its file, or the address of a server, without the
+    password.
     """
 
     engine: Engine

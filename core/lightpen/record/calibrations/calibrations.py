@@ -44,16 +44,8 @@ class CalibrationFile:
     ----------
     sha256 : str
         Checksum of the whole file.
-    calibration : CalibrationRecord
-        The record.
     grade : Grade
         Verdict on it when it was accepted, else by itself.
-    why : StoredMessage
-        Reason of the grade.
-    doubts : tuple of StoredMessage
-        Further warnings.
-    origin : Origin or None
-        None where it does not say.
     names : Names
         Empty of a record that nobody accepted.
     accepted : datetime or None
@@ -61,8 +53,6 @@ class CalibrationFile:
     reason : str
         Why it was accepted though it was to be checked, or reinstated, in the
         words of who did.
-    change : TipChange or None
-        Since the tip that was in force before.
     restores : str or None
         Hash of the entry of the archive whose tip is in force again by it.
     swing : Path or None

@@ -47,13 +47,7 @@ from lightpen.record.calibrations.calibrations import (
 
 @dataclass(frozen=True, eq=False)
 class Recomputed:
-    """A calibration computed again.
-
-    Attributes
-    ----------
-    method : str
-        Estimator of the recorded tip.
-    """
+    """A calibration computed again, with the estimator of the recorded tip."""
 
     calibration: Calibration
     inputs: Inputs

@@ -13,13 +13,7 @@ CERTIFIED, IN_MM = "certified_", "_mm"  # of the names of such values in its rec
 
 @dataclass(frozen=True)
 class TracedItem:
-    """An item that a result was measured with.
-
-    Attributes
-    ----------
-    item : item or None
-        None where it is not in the library.
-    """
+    """An item that a result was measured with; None if it is not in the library."""
 
     kind: ItemKind
     id: str

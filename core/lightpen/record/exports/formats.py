@@ -35,12 +35,8 @@ PEN_FRAME, TIP_FRAME = "pen", "tip"
 class ExportFormat(FileFormat):
     """A format of exported calibrations; its `text` takes a `CalibrationFile`.
 
-    Attributes
-    ----------
-    needs_laboratory : bool
-        Whether `text` takes a `Laboratory`, too.
-    has_status : bool
-        Whether its files state what the library says of pen and tip.
+    Where it ``needs_laboratory``, it takes a `Laboratory`, too; ``has_status`` if
+    its files state what the library says of pen and tip.
     """
 
     description: Message

@@ -38,16 +38,10 @@ WHAT = message("file.camera-calibration")
 class CameraTrial:
     """An attempt to calibrate a camera by a board.
 
-    Attributes
-    ----------
-    serial : str
-        Serial number of the camera; empty for images from a folder.
-    images : mapping of str to str
-        SHA-256 of each view by its name: of its file, or of the pixels of a live image.
-    found : CameraCalibration or None
-        None of one that was abandoned.
-    camera_file : InputFile or None
-        Camera file that was written; None if the calibration was not accepted.
+    The serial number is empty for images from a folder; ``images`` has the SHA-256
+    of each view by its name: of its file, or of the pixels of a live image. One
+    that was abandoned found nothing, and one that was not accepted has no camera
+    file.
     """
 
     outcome: TrialOutcome

@@ -38,13 +38,7 @@ SUFFIX = ".lock"
 
 
 class Presence:
-    """Tells other windows that this one uses a data folder, and counts them.
-
-    Parameters
-    ----------
-    data : Path
-        The data folder; it need not exist.
-    """
+    """Tells other windows that this one uses a data folder, and counts them."""
 
     def __init__(self, data: Path) -> None:
         self._folder = data / WINDOWS

@@ -22,16 +22,7 @@ class TipStatus(StrEnum):
 
 @dataclass(frozen=True)
 class CurrentResult:
-    """A tip in force.
-
-    Attributes
-    ----------
-    calibrated, due : datetime
-        Since when, and until when by its age.
-    uncertainty : float or None
-        Largest U (k = 2) of its coordinates, mm; None where it is not known.
-    grade : Grade or None
-    """
+    """A tip in force: since when, until when by its age, largest U (k = 2), mm."""
 
     calibrated: datetime
     due: datetime
@@ -42,14 +33,9 @@ class CurrentResult:
 
 @dataclass(frozen=True)
 class StationStatus:
-    """Status of all tips, pens and cones of a station.
+    """Status of pens, cones and real tips of a station, these by pen and tip.
 
-    Attributes
-    ----------
-    in_force : mapping of (pen, tip) to CurrentResult
-        Tips of real pens in force at the station.
-    now : datetime or None
-        When they stand so; None where nothing was read yet.
+    It is that of the time ``now``; None where nothing was read yet.
     """
 
     library: Library = field(default_factory=Library)

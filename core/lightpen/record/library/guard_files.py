@@ -48,13 +48,7 @@ _Signed: TypeAlias = Annotated[str, Meta(pattern="^([0-9a-f]{128})?$")]
 
 
 class PasswordVerifier(Struct, frozen=True):
-    """Verifier of a password: the supervisor's public key derived from it.
-
-    Attributes
-    ----------
-    salt : str
-        Hexadecimal digits.
-    """
+    """Verifier of a password: salt, hexadecimal, and the public key by both."""
 
     salt: Annotated[str, Meta(pattern=f"^[0-9a-f]{{{2 * SALT_LENGTH}}}$")]
     key: PublicKey
@@ -74,8 +68,6 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
         None where the password stays.
     limits : mapping of str to float or None
         By `Limit.key`; None where they stay.
-    previous : str
-        Hash of the file before.
     chain : str
         Of the archive; in the first file.
     station_key : str

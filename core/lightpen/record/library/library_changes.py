@@ -57,14 +57,9 @@ PICTURE = message("file.picture")
 
 @dataclass(frozen=True)
 class Author:
-    """Author of a change of the library.
+    """Author of a change of the library, with the reason in own words.
 
-    Attributes
-    ----------
-    reason : str
-        Reason in the author's words; may be empty.
-    signature : Signature or None
-        Signature of a supervisor, needed if a password is set.
+    The signature of a supervisor is needed if a password is set.
     """
 
     station: str = ""

@@ -156,13 +156,7 @@ class ListedCamera(Item, frozen=True, kw_only=True, tag="camera"):
 
 
 class ListedReference(Item, frozen=True, kw_only=True, tag="reference"):
-    """A ring, length bar, sphere or plate of a certified value.
-
-    Attributes
-    ----------
-    certified_mm : float or None
-        Certified value, as entered in a verification; reports find the item by it.
-    """
+    """A ring, length bar, sphere or plate, found by its certified value."""
 
     kind: ClassVar[ItemKind] = ItemKind.REFERENCE
 
@@ -174,14 +168,10 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
 
     Attributes
     ----------
-    ball_diameter_mm : float or None
-        None where it is not known.
     nominal_tip_mm : triple of float or None
         Its centre by design, pen frame; None leaves that of the LED file in force.
     stylus_axis : triple of float or None
         Direction from the ball along its stylus into the pen, pen frame, of length 1.
-    axis_origin : AxisOrigin or None
-        None without an axis.
     max_change_mm : float or None
         Distance from the current tip before that a calibration may find; None for no
         limit but the uncertainty of the change.
@@ -222,15 +212,7 @@ MADE: Mapping[ItemKind, Callable[..., AnyItem]] = {
 
 
 class LibraryChange(Struct, frozen=True, kw_only=True):
-    """One change, as its file holds it.
-
-    Attributes
-    ----------
-    supervisor : str
-        Supervisor who signed the change; empty if none was needed.
-    reason : str
-        Reason in the operator's words; may be empty.
-    """
+    """One change, as its file holds it, with the supervisor who signed, if any."""
 
     format: int
     at: ZonedTime
@@ -246,13 +228,7 @@ class LibraryChange(Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Library:
-    """The present state of all items, retired ones included.
-
-    Attributes
-    ----------
-    pens, tips, cones, cameras, references : mapping of str to item
-        Items by id, in order of creation.
-    """
+    """The present state of all items, retired ones too, by id in order of creation."""
 
     pens: Mapping[str, ListedPen] = field(default_factory=dict)
     tips: Mapping[str, ListedTip] = field(default_factory=dict)

@@ -48,14 +48,10 @@ class SwingAssessment:
     ----------
     last : Result or None
         Current result of this pen and tip; None if there is none or it cannot be read.
-    change : Change or None
-        Since that.
     max_change : float or None
         Limit of the tip for the distance from that, mm; None if it has none.
     doubts : tuple of Message
         Warnings besides the reason of the verdict, the most important first.
-    limits : SwingLimits
-        By which it was judged.
     """
 
     verdict: Verdict

@@ -13,15 +13,7 @@ MOST = 4  # tips that a pen has in use, as a rule
 
 @dataclass(frozen=True, eq=False)
 class NextTip:
-    """A tip to be calibrated next.
-
-    Attributes
-    ----------
-    last : Result or None
-        In force for it; None where it was never calibrated with the pen.
-    listed : ListedTip or None
-        What the tip library says of it, if anything.
-    """
+    """A tip to be calibrated next: its last result with the pen, its entry, if any."""
 
     pen: str
     tip: str

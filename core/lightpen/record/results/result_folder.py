@@ -51,17 +51,12 @@ class FolderArchive:
     """Keeps every result that was accepted; the newest of a pen and tip is in force.
 
     Results are added and never changed or removed: one that is revoked is kept, and
-    the one before is in force again. Those of a simulated pen are kept apart, and none
-    of them is in force for a real one. All methods may take as long as a disk or a
-    network does, and may be called from any thread. Of a result of another pen, tip or
-    swing only the first entries are read, so that thousands of them cost little.
-
-    Parameters
-    ----------
-    data : Path
-        Folder of the records and the results; it need not exist.
-    confirm : callable, optional
-        Raises an `AcceptanceError` where the limits are not those of the archive.
+    the one before is in force again. Those of a simulated pen are kept apart, and
+    none of them is in force for a real one. All methods may take as long as a disk
+    or a network does, and may be called from any thread. Of a result of another
+    pen, tip or swing only the first entries are read, so that thousands of them
+    cost little. ``confirm`` raises an `AcceptanceError` where the limits are not
+    those of the archive.
     """
 
     def __init__(

@@ -59,8 +59,6 @@ class ResultHeading(Struct):
     ----------
     pen, tip, record : str or None
         None where a later version does not say; else as `Names` and `Result`.
-    origin : str or None
-        Origin of the images; None if not stated.
     takes_back : str or None
         Name of the result's file, without suffix, that is revoked; None of a result.
     """
@@ -78,19 +76,7 @@ class ResultHeading(Struct):
 
 
 class Withdrawal(Struct, frozen=True):
-    """Revocation of a result.
-
-    Attributes
-    ----------
-    takes_back : str
-        Name of the result's file, without suffix.
-    operator : str
-        Operator who revokes it.
-    reason : str
-        In the words of the operator.
-    supervisor : str
-        Who approved it; empty where nobody had to.
-    """
+    """Revocation of a result, by its file without suffix, and who approved it."""
 
     takes_back: str
     at: ZonedTime
@@ -194,8 +180,6 @@ class Result:
 
     Attributes
     ----------
-    grade : Grade
-        Verdict at acceptance.
     record : Path
         Folder of the swing that it comes from.
     images : tuple of int or None
@@ -207,10 +191,6 @@ class Result:
         Why it was accepted though its grade is no pass, in the words of who did.
     supervisor : str
         Supervisor who approved a result outside the limits; empty if none was needed.
-    why : StoredMessage or None
-        Reason of the grade.
-    doubts : tuple of StoredMessage
-        Further warnings.
     change : TipChange or None
         Since the result that was in force; None if there was none.
     restores : str or None

@@ -50,13 +50,7 @@ COPIES = {CAMERA_STEM: CAMERA_FILE, PEN_STEM: PEN_FILE, RIG_STEM: RIG_FILE}
 
 
 class FileCopy(Struct, frozen=True, omit_defaults=True):
-    """A file that a record has a copy of.
-
-    Attributes
-    ----------
-    data : bytes
-        Content for a new record; not stored in the header.
-    """
+    """A file that a record has a copy of, with the content only for a new record."""
 
     name: str
     sha256: Digest
@@ -73,14 +67,9 @@ class FileCopy(Struct, frozen=True, omit_defaults=True):
 
 
 class RigCopies(Struct, frozen=True):
-    """Copies of the rig's files besides the first camera's.
+    """Copies of the files of rig and other cameras, with the masks of these cameras.
 
-    Attributes
-    ----------
-    camera_files : tuple of FileCopy
-        The files of the other cameras.
-    masks_px : tuple of tuples
-        Stray light in the images of each of them, as `Header.mask_px`.
+    The masks are as `Header.mask_px`.
     """
 
     rig_file: FileCopy
@@ -97,8 +86,6 @@ class Header(Struct, frozen=True, kw_only=True):
 
     Attributes
     ----------
-    program : str
-        Name and version.
     units : str or None
         Units given for a pen file without units.
     led_diameter_mm, nominal_tip_mm : float, triple of float or None
@@ -107,8 +94,6 @@ class Header(Struct, frozen=True, kw_only=True):
         Circles of stray light: centre x, y and radius.
     settings : mapping
         Additional settings: exposure, limits, camera serial number.
-    rig : RigCopies or None
-        Copies for a swing with several cameras.
     """
 
     format: int = field(default_factory=partial(newest_format, SWING))

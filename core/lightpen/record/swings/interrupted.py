@@ -21,13 +21,7 @@ from lightpen.record.swings.writing import RecordWriter
 
 @dataclass(frozen=True)
 class DamagedSwing:
-    """A swing without a verdict that cannot be read.
-
-    Attributes
-    ----------
-    message : Message
-        Damage found, and the remedy.
-    """
+    """A swing without a verdict that cannot be read: the damage, and the remedy."""
 
     folder: Path
     message: Message
@@ -37,12 +31,8 @@ class DamagedSwing:
 class InterruptedSwings:
     """The swings in a folder that have no verdict, each kind the newest first.
 
-    Attributes
-    ----------
-    interrupted : tuple of Record
-        Interrupted swings with images, which can be resumed.
-    under_way : tuple of Record
-        Swings that another process is recording.
+    Interrupted ones can be resumed; those under way are recorded by another
+    process.
     """
 
     interrupted: tuple[Record, ...] = ()

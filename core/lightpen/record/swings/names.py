@@ -12,15 +12,7 @@ LONGEST_WORD = 24  # characters; of up to 4 bytes, of the 255 that a name may ha
 
 @dataclass(frozen=True)
 class Names:
-    """Station, operator and items under calibration.
-
-    Attributes
-    ----------
-    station, operator, pen, tip, cone : str
-        ``pen`` is its serial number.
-    ball_diameter : float or None
-        Of the tip, mm; None when it is not known.
-    """
+    """Station, operator, serial number of the pen, tip, cone and ball diameter, mm."""
 
     station: str = ""
     operator: str = ""

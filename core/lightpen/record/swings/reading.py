@@ -75,8 +75,6 @@ class RecordedImage:
     ----------
     time : float
         s, by the clock of the session that took it.
-    device_time_ns : int or None
-        Time stamp of the camera, ns.
     pixels : (L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     rotation, translation : (3, 3) and (3,) array

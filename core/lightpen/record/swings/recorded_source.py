@@ -39,14 +39,8 @@ class RecordSource:
     images : ImageSource
         All images, in the order of capture; a damaged one raises `FileError` when
         loaded.
-    other_images : tuple of ImageSource
-        Simultaneous images of the other cameras of a rig.
     masks : tuple of (M, 3) array
         Circles of stray light before each camera: centre x, y and radius, px.
-    assumptions : Assumptions
-        Default uncertainties where the files state none.
-    origin : Origin or None
-        Origin of the images; None if not recorded.
     units, led_diameter
         As of `Header`.
     """

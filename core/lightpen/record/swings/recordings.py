@@ -18,13 +18,7 @@ PEN_FILES = ("leds.csv", "pen.json", "leds.json", "pen.csv")
 
 @dataclass(frozen=True)
 class FilesBeside:
-    """Files beside recorded images that probably belong to them.
-
-    Attributes
-    ----------
-    camera, pen : Path or None
-        None where there is none.
-    """
+    """Files beside recorded images that probably belong to them, if any."""
 
     camera: Path | None = None
     pen: Path | None = None

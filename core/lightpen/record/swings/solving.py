@@ -43,8 +43,6 @@ class Solution:
         Of the images, in the record.
     observations : Observations
         Detections in all N images, accepted or not.
-    others : tuple of Observations
-        Simultaneous detections of the other cameras of a rig.
     taken_out : mapping of int to str
         Numbers of images that do not take part, and why.
     residuals : (N, C, L, 2) array

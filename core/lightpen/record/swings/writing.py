@@ -48,17 +48,7 @@ OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
 
 @dataclass(frozen=True, eq=False)
 class SecondaryView:
-    """Simultaneous image of another camera of a rig.
-
-    Attributes
-    ----------
-    image : (H, W) array
-        Grey image, 8 or 16 bit.
-    pixels : (L, 2) array
-        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-    device_time_ns : int or None
-        Time stamp of the camera, ns.
-    """
+    """Simultaneous image of another camera, as `RecordWriter.append` takes it."""
 
     image: Image
     pixels: FloatArray
@@ -158,38 +148,12 @@ class RecordWriter:
         touch: int = 0,
         approach: FloatArray | None = None,
     ) -> int:
-        """Record an image, or simultaneous images.
+        """Record an image (H, W), or simultaneous ones, and return its number.
 
-        Parameters
-        ----------
-        image : (H, W) array
-            Grey image, 8 or 16 bit.
-        pixels : (L, 2) array
-            Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-        rotation, translation : (3, 3) and (3,) array
-            cam_from_pen, mm.
-        time : float
-            s.
-        device_time_ns : int, optional
-            Time stamp of the camera, ns.
-        stats : Stats, optional
-            What became of the camera's images since the swing began.
-        others : sequence of SecondaryView, optional
-            Images of the other cameras of a rig, in their order.
-        touch : int
-            Number of the touch in a verification, from 1.
-        approach : (3,) array, optional
-            Unit vector along which the tip came to it.
-
-        Returns
-        -------
-        int
-            Number of the image: the acknowledgement that it is on the disk.
-
-        Raises
-        ------
-        FileError
-            The image could not be written. All images before it are safe.
+        That acknowledges that it is on the disk, as are all before it if
+        `FileError` is raised. See
+        `lightpen.record.swings.reading.RecordedImage` for what is recorded of
+        it; the others are those of the other cameras of a rig, in their order.
         """
         number = self._next_number
         digest = self._write_image(image, number, 0)

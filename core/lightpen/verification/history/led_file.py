@@ -52,10 +52,6 @@ class ImprovedPen:
 
     Attributes
     ----------
-    pen : Pen
-        Pen with the covariance of its LEDs.
-    camera : Camera
-        The camera of all swings, with its covariance.
     moves : (L, 3) array
         New less old places of the LEDs, mm.
     pooled : tuple of str

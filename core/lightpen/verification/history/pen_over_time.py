@@ -32,16 +32,10 @@ Tell = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class PenOverTime:
-    """A pen over its accepted swings with the LED file that is chosen.
+    """A pen over its accepted swings, the oldest first, with the LED file chosen.
 
-    Attributes
-    ----------
-    swings : tuple of CalibrationFile
-        The oldest first.
-    n_left_out : int
-        Accepted swings of the pen with another LED file, or that cannot be read.
-    health : PenHealth or None
-        None of fewer than two swings.
+    Swings with another LED file, or that cannot be read, are left out; fewer than
+    two tell no health.
     """
 
     names: Names

@@ -39,14 +39,10 @@ class Trend:
 
     Attributes
     ----------
-    pen, tip : str
-        Empty where there is none.
     entries : tuple of StoredEntry
         The oldest first.
     max_uncertainty : float or None
         Limit of U (k = 2) at the newest, mm.
-    touched : RepeatedPoint or None
-        The fixed point that was touched last with the tip.
     """
 
     pen: str = ""
@@ -65,15 +61,7 @@ class Trend:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two calibrations side by side.
-
-    Attributes
-    ----------
-    change : Change
-        From the earlier to the later calibration.
-    is_same_tip : bool
-        Whether both are of the same pen and tip.
-    """
+    """Change from the earlier to the later of two calibrations."""
 
     earlier: StoredEntry
     later: StoredEntry

@@ -30,8 +30,6 @@ class CurrentTip:
 
     Attributes
     ----------
-    origin : Origin
-        Origin of the images of the verification.
     nominal_tip, cone_cam : (3,) array or None
         mm; the cone of the calibration is not known before another camera.
     masks : tuple of (M, 3) array

@@ -39,12 +39,8 @@ MIN_BLOCKS, MAX_BLOCKS = 3, 10  # before, during and after; larger ones are less
 class LampImages:
     """Lamps in images of touches, in order of time.
 
-    Attributes
-    ----------
-    lights : tuple of array
-        What shines in each image and is no LED, masked or not, (S, 2), px.
-    distances : tuple of float
-        Of the pen along the view in each, mm.
+    ``lights`` are what shines in each image and is no LED, masked or not, (S, 2),
+    px; the distances are those of the pen along the view in each, mm.
     """
 
     lights: tuple[FloatArray, ...] = ()
@@ -59,13 +55,7 @@ class LampImages:
 
 @dataclass(frozen=True, eq=False)
 class LampObservations:
-    """Lamps in the images of each camera.
-
-    Attributes
-    ----------
-    cameras : tuple of LampImages
-        Empty before the first image.
-    """
+    """Lamps in the images of each camera; empty before the first image."""
 
     cameras: tuple[LampImages, ...] = ()
 

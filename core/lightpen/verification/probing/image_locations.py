@@ -33,10 +33,7 @@ from lightpen.record.swings.recordings import is_simulated_recording
 class PenCameras:
     """The cameras that observe the pen, one or a rig.
 
-    Attributes
-    ----------
-    files : tuple of InputFile
-        The camera file; or the rig file, and those of all its cameras.
+    The files are the camera file; or the rig file, and those of all its cameras.
     """
 
     rig: Rig
@@ -64,8 +61,6 @@ class ImageLocation:
     ----------
     masks : tuple of (M, 3) array or None
         Circles of stray light before each camera: centre x, y and radius, px.
-    touches : tuple of RecordedTouch or None
-        Which touch each image is of. None for images without numbers.
     """
 
     name: str

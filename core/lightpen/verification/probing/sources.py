@@ -52,15 +52,7 @@ MAX_RMS = 1.0  # px; LED errors of 0.3 mm make this
 
 @dataclass(frozen=True, eq=False)
 class ProbingRun:
-    """The touches of one run.
-
-    Attributes
-    ----------
-    rejected : tuple of RejectedFrame
-        Images that belong to no touch, and why.
-    lamps : LampObservations
-        Fixed lamps in the images.
-    """
+    """The touches of one run, images that belong to none, and all their lamps."""
 
     name: str
     touches: tuple[ProbedPoint, ...]

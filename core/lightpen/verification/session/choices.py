@@ -21,16 +21,9 @@ from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 @dataclass(frozen=True)
 class VerificationChoices:
-    """Selected tasks and their options.
+    """Selected tasks in their order, and images of a point.
 
-    Attributes
-    ----------
-    kinds : tuple of str
-        Selected tasks in their order.
-    options : tuple of TaskOptions
-        Options that differ from the defaults, of selected tasks or not.
-    n_frames : int
-        Images of a point.
+    Options are those that differ from the defaults, of selected tasks or not.
     """
 
     kinds: tuple[TaskKind, ...] = (FIXED_POINT.kind,)

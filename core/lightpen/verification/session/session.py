@@ -50,13 +50,7 @@ BROKEN_OFF = message("session.broken-off")
 
 @dataclass(frozen=True, eq=False)
 class SessionTransition:
-    """A verification after one more image.
-
-    Attributes
-    ----------
-    finished : VerificationTask or None
-        A task that this image ended.
-    """
+    """A verification after one more image, with the task that this image ended."""
 
     state: SessionState
     events: tuple[ProbingEvent, ...] = ()

@@ -70,14 +70,9 @@ def with_drift(
 class RunsOfTask:
     """Points of a task that is done, to be measured again.
 
-    Attributes
-    ----------
-    setup : SessionSetup or None
-        By which they were measured; None where it is the session's.
-    lamps : LampDrift or None
-        The drift of fixed lamps in recorded images.
-    drift : Drift or None
-        Between the visits of the drift reference around it.
+    The setup is that by which they were measured, None where it is the session's;
+    the lamps are those of recorded images; the drift is that between the visits of
+    the drift reference around the task.
     """
 
     task: AnyTask
@@ -93,8 +88,6 @@ class SessionState:
 
     Attributes
     ----------
-    touches : tuple of ProbedPoint
-        Measured for it.
     runs : tuple of tuple of ProbedPoint
         Runs of the task at hand that are done.
     fault : Message or None

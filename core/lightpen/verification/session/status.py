@@ -45,24 +45,10 @@ class SessionEventKind(StrEnum):
 class VerificationStatus:
     """A verification from the current tip to its verdict; nothing of it is changed.
 
-    Attributes
-    ----------
-    setup, state
-        None until the tip is read.
-    region : RegionOfInterest or None
-        Region searched in the images of the verification.
-    began : datetime or None
-        When its first image came.
-    files : tuple of Path
-        Result files.
-    lamp_drift : LampDrift or None
-        The drift of fixed lamps in view, up to the last finished task.
-    is_here : bool
-        Whether an operator is present.
-    accepted_by : str
-        Supervisor who accepted the tip despite findings.
-    refusal : Message or None
-        Why nothing can be verified.
+    Setup and state are None until the tip is read. It ``began`` with its first
+    image; ``files`` are its results; lamps drifted up to the last finished task. A
+    supervisor may have accepted the tip despite findings; a refusal is why nothing
+    can be verified.
     """
 
     tip: CurrentTip | None = None

@@ -49,14 +49,9 @@ WHAT = message("file.under-way")
 
 
 class CountingRun(Struct, frozen=True):
-    """A run of live touches that counts.
+    """A run of live touches that counts; its task may have ended with it.
 
-    Attributes
-    ----------
-    folder : str
-        Name of its record, in the folder of touches.
-    is_last : bool
-        Whether its task ended with it.
+    ``folder`` is the name of its record in the folder of touches.
     """
 
     task: TaskKind
@@ -75,20 +70,9 @@ class ReadImages(Struct, frozen=True):
 class VerificationCheckpoint(Struct, frozen=True):
     """A verification that began and is not concluded.
 
-    Attributes
-    ----------
-    tip_file : str
-        Name of the result that is verified.
-    tip_sha256, pen_sha256 : str
-        Checksums of the tip and of the pen file.
-    seen_by : tuple of str
-        Hashes of the camera files.
-    runs : tuple of CountingRun
-        Runs in order of time.
-    files : tuple of str
-        Names of the records that were written of it.
-    unwritten : tuple of str
-        Tasks that are done and have no record among them.
+    It names the result that is verified, its runs in order of time, and the records
+    that were written; ``unwritten`` tasks are done and have no record yet.
+    ``seen_by`` are the hashes of the camera files.
     """
 
     began: ZonedTime
@@ -116,15 +100,7 @@ class VerificationCheckpoint(Struct, frozen=True):
 
 @dataclass(frozen=True)
 class InterruptedVerification:
-    """A verification that no window holds.
-
-    Attributes
-    ----------
-    under_way : VerificationCheckpoint or None
-        None where its file is damaged.
-    fault : Message or None
-        Why it cannot be resumed.
-    """
+    """A verification that no window holds, or why it cannot be resumed."""
 
     path: Path
     under_way: VerificationCheckpoint | None
@@ -132,13 +108,7 @@ class InterruptedVerification:
 
 
 class CheckpointFile:
-    """Keeps the file of one verification, and holds it.
-
-    Parameters
-    ----------
-    path : Path
-        See `under_way_path`.
-    """
+    """Keeps the file of one verification, see `under_way_path`, and holds it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -217,15 +187,7 @@ def find_interrupted(data: Path) -> tuple[InterruptedVerification, ...]:
 
 @dataclass(frozen=True)
 class UnlistedRecords:
-    """Records of a verification that its file does not name: it was killed just then.
-
-    Attributes
-    ----------
-    files : tuple of str
-        The oldest first.
-    kinds : tuple of str
-        Task kind of each record.
-    """
+    """Records and their tasks that a checkpoint does not name, the oldest first."""
 
     files: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()

@@ -30,20 +30,10 @@ from lightpen.verification.tasks.assessment import VerificationAssessment
 
 @dataclass(frozen=True)
 class Conclusion:
-    """The end of a verification.
+    """The end of a verification that began at ``session``, with the worst finding.
 
-    Attributes
-    ----------
-    session : datetime
-        When it began.
-    found : VerificationAssessment or None
-        The worst of what was found; None before anything was.
-    reason : str
-        Why the tip is used though something was found against it; else empty.
-    supervisor : str
-        Supervisor who approved it; empty if none was needed.
-    supervisor_key : SigningKey or None
-        Key of that supervisor, which signs the record.
+    A reason is given where the tip is used though something was found against it;
+    the key of the supervisor who approved that signs the record.
     """
 
     outcome: TrialOutcome

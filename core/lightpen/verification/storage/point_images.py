@@ -57,13 +57,7 @@ NOT_COUNTED = "not counted"
 
 @dataclass(frozen=True)
 class PointRecord:
-    """Images of a run.
-
-    Attributes
-    ----------
-    journal : InputFile
-        Journal with the checksum of each image.
-    """
+    """Images of a run; the journal has the checksum of each."""
 
     folder: Path
     journal: InputFile
@@ -78,13 +72,7 @@ class NewRecord:
 
 
 class PointImages:
-    """Keeps the images of one run after another.
-
-    Parameters
-    ----------
-    begin : callable
-        Returns the header of a record that begins now, and makes its folder.
-    """
+    """Keeps the images of one run after another, each in a new record."""
 
     def __init__(self, begin: Callable[[], NewRecord]) -> None:
         self._begin = begin
@@ -236,13 +224,7 @@ def new_record(root: Path, names: Names, header: Header) -> NewRecord:
 
 
 class LivePoints:
-    """Takes the images of one verification after another.
-
-    Parameters
-    ----------
-    images : PointImages
-        Keeps those that count.
-    """
+    """Takes the images of one verification after another."""
 
     def __init__(self, images: PointImages) -> None:
         self._images = images

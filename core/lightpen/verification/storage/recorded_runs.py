@@ -32,10 +32,7 @@ class CompletedTask:
 class ReadRuns:
     """Results from recorded images.
 
-    Attributes
-    ----------
-    touched : RunsOfTask
-        Their touches, in which a drift reference that is read later may count.
+    In the touches a drift reference that is read later may count.
     """
 
     done: CompletedTask

@@ -61,18 +61,9 @@ from lightpen.verification.tasks.registry import task_of
 
 @dataclass(frozen=True, eq=False)
 class ResumedVerification:
-    """An interrupted verification, as it was when it was interrupted.
+    """A verification as it was when it was interrupted; see `VerificationCheckpoint`.
 
-    Attributes
-    ----------
-    files : tuple of Path
-        The records that are written of it.
-    unwritten : tuple of str
-        Tasks that are done and have no record yet.
-    lamps : LampObservations
-        Fixed lamps in the images of the touches.
-    read : tuple of CompletedTask
-        Results of recorded images, computed again.
+    The lamps are those in the images of touches; what was read is computed again.
     """
 
     under_way: VerificationCheckpoint

@@ -43,16 +43,9 @@ _logger = logging.getLogger(__name__)
 class PendingRecord:
     """A record to be written, after earlier ones of its session.
 
-    Attributes
-    ----------
-    record_of : callable
-        Returns it by the files of the session before it.
-    task : VerificationTask or None
-        Task of the record; None for a conclusion.
-    ends : CheckpointFile or None
-        Checkpoint file of the session that this record concludes.
-    supervisor : SigningKey or None
-        Key of the supervisor whom the record names.
+    ``record_of`` returns it by the files of the session before it. It is of a task,
+    or a conclusion, which ``ends`` a checkpoint and may name a supervisor, whose
+    key signs it.
     """
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]
@@ -63,13 +56,7 @@ class PendingRecord:
 
 
 class SessionRecords:
-    """Writes the records of one session after another.
-
-    Parameters
-    ----------
-    data : Path
-        Data folder, in which results are kept.
-    """
+    """Writes the records of one session after another."""
 
     def __init__(self, data: Path) -> None:
         self._data = data
@@ -140,20 +127,7 @@ def concluding(
 
 
 class SessionKeeping:
-    """Stores touches and results as soon as they are known.
-
-    Parameters
-    ----------
-    data : Path
-        Folder that it is kept in.
-    new_record : callable
-        Makes a record for the images of the run at hand.
-
-    Attributes
-    ----------
-    images : PointImages
-        Images of live touches.
-    """
+    """Stores touches and results in a data folder as soon as they are known."""
 
     def __init__(
         self,

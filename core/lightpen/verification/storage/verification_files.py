@@ -34,21 +34,9 @@ from lightpen.verification.tasks.task import Found
 
 @dataclass(frozen=True)
 class TaskImages:
-    """Source of the images of a task.
+    """Source of the images of a task, images that belong to no touch, drift of lamps.
 
-    Attributes
-    ----------
-    origin : Origin or None
-        Origin of the images; None if not recorded.
-    files : tuple of InputFile
-        Live camera: the images of each touch while the pen was still, with number and
-        hash of the pixels.
-    rejected : tuple of RejectedFrame
-        Images that belong to no touch, with the reason.
-    lamp_drift : LampDrift or None
-        The drift of fixed lamps in view so far.
-    records : tuple of PointRecord
-        Live camera: records of the images, run by run.
+    Of recorded images it is their files, of a live camera a record for each run.
     """
 
     origin: Origin | None

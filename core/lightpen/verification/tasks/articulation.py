@@ -99,8 +99,6 @@ class Articulation(Found):
         touches stay within it.
     expected : float
         Mean of these location errors, mm.
-    tip : TipEvidence
-        The evidence of the points on the tip.
     """
 
     names: tuple[str, ...]

@@ -103,8 +103,6 @@ class CircleRun:
         Off the ring: the pen was lifted.
     radius : float
         Of the ring, the ball compensated, mm.
-    uncertainty : float
-        U (k = 2) of it, mm.
     form_by_noise : float
         Largest form, mm, that an ideal ring shows by what is known of the points.
     """
@@ -125,16 +123,9 @@ class CircleRun:
 
 @dataclass(frozen=True, eq=False)
 class Circle(Found):
-    """Runs round a ring of certified radius.
+    """Runs round a ring of certified radius, mm.
 
-    Attributes
-    ----------
-    certified : float
-        mm.
-    uncertainty : float
-        U (k = 2) of the mean radius and the certified one together, mm.
-    tip : TipEvidence
-        The evidence of the points on the tip.
+    The uncertainty is U (k = 2) of mean and certified radius together, mm.
     """
 
     runs: tuple[CircleRun, ...]

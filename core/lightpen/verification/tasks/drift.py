@@ -64,15 +64,7 @@ USE_TOUCHES = message("drift.use-touches")
 
 @dataclass(frozen=True, eq=False)
 class Drift(Found):
-    """A drift reference visited several times.
-
-    Attributes
-    ----------
-    moves : (N, 3) array
-        Of the drift reference since the first visit, camera frame, mm.
-    uncertainties : (N, 3) array
-        U (k = 2) of each, mm.
-    """
+    """Moves (N, 3) of a drift reference since the first visit, and U (k = 2), mm."""
 
     names: tuple[str, ...]
     moves: FloatArray

@@ -74,12 +74,7 @@ UNUSUAL = 0.001  # chance that a coordinate scatters that much more than expecte
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """Coordinates of a point measured several times, mm.
-
-    Attributes
-    ----------
-    points : (N, 3) array
-    """
+    """Coordinates (N, 3) of a point measured several times, mm."""
 
     points: FloatArray
 
@@ -113,8 +108,6 @@ class FixedPoint(Found):
         U (k = 2) of the mean, mm.
     expected_deviation : (3,) array
         Standard deviation of the touches by all that is known of them, mm.
-    tip : TipEvidence
-        By which tip the points would scatter least, and what error they would show.
     moved : (3,) array or None
         Mean less the cone of the calibration, mm; None before another camera.
     """

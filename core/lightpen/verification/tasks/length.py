@@ -90,20 +90,11 @@ SIMULATED_STEP = np.array([0.0, 15.0, 0.0])  # from one place to the next
 
 @dataclass(frozen=True, eq=False)
 class LengthRun:
-    """A length measured at one place.
+    """A length measured at one place, mm.
 
-    Attributes
-    ----------
-    measured : float
-        mm.
-    certified : float
-        At the temperature of the artefact, mm.
-    uncertainty : float
-        U (k = 2) of the error, mm.
-    limit : float
-        Maximum permissible error, mm.
-    along_view : float
-        Cosine between the length and the line of sight, 0 to 1: 1 measures depth.
+    It is certified at the temperature of the artefact; the uncertainty is U (k = 2)
+    of the error, the limit the maximum permissible error. ``along_view`` is the
+    cosine between the length and the line of sight: 1 measures depth.
     """
 
     name: str
@@ -127,15 +118,7 @@ class LengthRun:
 
 @dataclass(frozen=True)
 class Scale:
-    """Factor for the coordinates of the pen file.
-
-    Attributes
-    ----------
-    uncertainty : float
-        U (k = 2) of it.
-    uncertainty_before : float
-        U (k = 2) without the length.
-    """
+    """Factor for the coordinates of the pen file; U (k = 2) with it and before."""
 
     factor: float
     uncertainty: float
@@ -146,12 +129,8 @@ class Scale:
 class Length(Found):
     """A certified length measured at one or several places.
 
-    Attributes
-    ----------
-    certified_uncertainties : (N,) array
-        U (k = 2) of the certified lengths, of their temperature and of the ball, mm.
-    tip : TipEvidence
-        The evidence of the lengths on the tip.
+    The uncertainties (N,), mm, are U (k = 2) of the certified lengths, of their
+    temperature and of the ball.
     """
 
     runs: tuple[LengthRun, ...]

@@ -61,16 +61,9 @@ MOST_NAMED = 5  # characteristics in a sentence
 
 @dataclass(frozen=True, eq=False)
 class Part(Found):
-    """A measured part.
+    """A measured part: feature and ball centre of each touch; features not probed.
 
-    Attributes
-    ----------
-    points : tuple of (str, ProbedPoint)
-        Feature and ball centre of each touch.
-    missing : tuple of str
-        Features of the plan that were not probed.
-    refinement : Refinement or None
-        By features of known form, if there are any.
+    The refinement is that by features of known form, if there are any.
     """
 
     part: MeasuredPart

@@ -139,16 +139,10 @@ def planned_at(options: PartOptions, run: int) -> PlannedFeature | None:
 
 @dataclass(frozen=True, eq=False)
 class FeatureSoFar:
-    """The current feature.
+    """The current feature, of the planned kind or the one recognised so far.
 
-    Attributes
-    ----------
-    kind : FeatureKind or None
-        As planned, or as recognised so far.
-    deviations : (N,) array
-        Distances of the touches from it, mm; NaN before it is determined.
-    next_touch : Place or None
-        The most informative one, frame of the camera.
+    The touches lie (N,) mm off it, NaN before it is determined; the most
+    informative next touch is in the frame of the camera.
     """
 
     planned: PlannedFeature

@@ -119,18 +119,9 @@ class PlaneFit:
 
 @dataclass(frozen=True, eq=False)
 class Flatness(Found):
-    """A plate.
+    """A plate of certified flatness, and U (k = 2) of the measured one, mm.
 
-    Attributes
-    ----------
-    left_out : tuple of ProbedPoint
-        Off the plane: the pen was lifted.
-    certified : float
-        Flatness of the plate, mm.
-    uncertainty : float
-        U (k = 2) of the measured flatness, mm.
-    tip : TipEvidence
-        The evidence of the points on the tip.
+    Points off the plane are left out: the pen was lifted.
     """
 
     points: tuple[ProbedPoint, ...]

@@ -69,10 +69,7 @@ class RejectedFrame:
 class StillFrames:
     """Images through which the pen was held still on one point.
 
-    Attributes
-    ----------
-    approach_cam : (3,) array or None
-        Unit vector along which the tip came to the point, camera frame.
+    The tip came to it along a unit vector (3,), camera frame, None if not known.
     """
 
     frames: tuple[ProbingFrame, ...]
@@ -265,15 +262,7 @@ def point_sensitivities(instrument: Instrument, poses: Poses) -> FloatArray:
 
 
 class _Derivatives(NamedTuple):
-    """Derivatives of the centres in the images of a camera by poses and parameters.
-
-    Attributes
-    ----------
-    by_pose : (N, L, 2, 6) array
-        By that of the pen in the rig.
-    by_parameters : (N, L, 2, q) array
-        By those of the instrument.
-    """
+    """Derivatives (N, L, 2, k) of the centres in a camera by pose and parameters."""
 
     by_pose: FloatArray
     by_parameters: FloatArray

@@ -46,15 +46,7 @@ USE_NEWEST = message("repeatability.use-newest")
 
 @dataclass(frozen=True, eq=False)
 class TipEstimate:
-    """A tip by one calibration.
-
-    Attributes
-    ----------
-    tip_pen, uncertainty : (3,) array
-        The tip and U (k = 2) of it, mm.
-    when : datetime or None
-        When it was calibrated.
-    """
+    """A tip by one calibration, and its U (k = 2), (3,), mm."""
 
     name: str
     tip_pen: FloatArray
@@ -64,16 +56,10 @@ class TipEstimate:
 
 @dataclass(frozen=True, eq=False)
 class RepeatedPoint:
-    """A fixed point touched several times with a tip.
+    """A fixed point (N, 3) touched several times with a tip, camera frame, mm.
 
-    Attributes
-    ----------
-    points : (N, 3) array
-        Camera frame, mm.
-    expected_deviation : (3,) array
-        Standard deviation of the touches by all that is known of them, mm.
-    when : datetime
-        When it was verified.
+    Of the touches (3,) mm are expected as standard deviation by all that is known
+    of them.
     """
 
     points: FloatArray
@@ -88,16 +74,10 @@ class RepeatedPoint:
 
 @dataclass(frozen=True, eq=False)
 class Capability:
-    """A type-1 gauge study, per coordinate.
+    """A type-1 gauge study, per coordinate (3,), by the width of the tolerance, mm.
 
-    Attributes
-    ----------
-    tolerance : float
-        Width of the tolerance of a coordinate, mm.
-    cg : (3,) array
-        A fifth of the tolerance over six standard deviations.
-    cgk : (3,) array or None
-        The same less the bias; None without a reference.
+    C_g is a fifth of the tolerance over six standard deviations, C_gk the same less
+    the bias, None without a reference.
     """
 
     tolerance: float
@@ -127,16 +107,9 @@ class ControlLimits:
 
 @dataclass(frozen=True, eq=False)
 class Repeatability:
-    """Calibrations of one tip.
+    """Calibrations of one tip; at least ten are needed for control limits.
 
-    Attributes
-    ----------
-    control : ControlLimits or None
-        None for fewer than ten calibrations.
-    touched : RepeatedPoint or None
-        A fixed point touched with the tip.
-    points_to : Message or None
-        What the scatter indicates, other than that of the fixed point.
+    Touches of a fixed point with it may show what the scatter ``points_to``.
     """
 
     tips: tuple[TipEstimate, ...]

@@ -101,14 +101,8 @@ SIMULATED_AXES = np.array(
 class SphereFit(NamedTuple):
     """A sphere of least squares.
 
-    Attributes
-    ----------
-    center_cam : (3,) array
-    radius : float
-    residuals : (N,) array
-        Distances of the points from it, outwards, mm.
-    spokes : (N, 3) array
-        Unit vectors from the centre to the points.
+    The residuals (N,) are the distances of the points from it, outwards, mm; the
+    spokes (N, 3) unit vectors from the centre to the points.
     """
 
     center_cam: FloatArray
@@ -128,13 +122,7 @@ class SphereFit(NamedTuple):
 
 
 class Size(NamedTuple):
-    """A diameter, the ball compensated, mm.
-
-    Attributes
-    ----------
-    uncertainty : float
-        U (k = 2) of measured and certified diameter together, mm.
-    """
+    """A diameter, the ball compensated, and U (k = 2) with the certified one, mm."""
 
     measured: float
     certified: float
@@ -148,16 +136,9 @@ class Size(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Found):
-    """A sphere.
+    """A sphere, with the largest form, mm, that noise makes of an ideal one.
 
-    Attributes
-    ----------
-    left_out : tuple of ProbedPoint
-        Off the sphere: the pen was lifted.
-    form_by_noise : float
-        Largest form, mm, that an ideal sphere shows by what is known of the points.
-    tip : TipEvidence
-        What the points tell of the tip.
+    Points off the sphere are left out: the pen was lifted.
     """
 
     points: tuple[ProbedPoint, ...]

@@ -87,17 +87,10 @@ class NumberOption:
 
 @dataclass(frozen=True)
 class SurfaceOption:
-    """Option for the probed surface of an artefact.
+    """Option for the probed surface of an artefact; labels in order of `Surface`.
 
-    Attributes
-    ----------
-    labels : tuple of Message
-        Labels in the order of `Surface`.
-    words : mapping of str to Surface
-        Values of the command-line option, the default first; they need the ball
-        diameter.
-    ball_help : str
-        Help of the option for the ball diameter.
+    The words of the command line, the default first, need the ball diameter, whose
+    option has the help ``ball_help``.
     """
 
     name: str
@@ -180,10 +173,7 @@ class Found:
 class ResultRow:
     """A row of a table: its name, and a value for each column or None for a blank.
 
-    Attributes
-    ----------
-    remark : Message or str
-        In the last column, which has a head of its own.
+    The remark is in the last column, which has a head of its own.
     """
 
     name: Message | str
@@ -203,13 +193,7 @@ class ResultRow:
 
 @dataclass(frozen=True, eq=False)
 class ResultTable:
-    """Figures of a task, for the screen and the window alike.
-
-    Attributes
-    ----------
-    notes : tuple of Message
-        Sentences below it.
-    """
+    """Figures of a task with sentences below, for the screen and the window alike."""
 
     title: Message
     columns: tuple[Message | str, ...] = ()
@@ -219,17 +203,7 @@ class ResultTable:
 
 @dataclass(frozen=True, eq=False)
 class TaskProgress:
-    """The current task.
-
-    Attributes
-    ----------
-    points : tuple of ProbedPoint
-        Points of the current run.
-    runs : tuple of tuple of ProbedPoint
-        Completed runs.
-    cones : tuple of array
-        Cones that were touched in tasks before, camera frame, mm.
-    """
+    """Points of the current run of a task, completed runs, cones probed before, mm."""
 
     points: Points = ()
     runs: tuple[Points, ...] = ()
@@ -321,8 +295,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         Needed in a run; of runs.
     fraction : callable
         Returns how much of the run at hand is done; it ends at 1.
-    instruction : callable
-        Returns a sentence on what to do now.
     count : callable
         Returns how much is probed of how much.
     screen : callable
@@ -345,8 +317,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         Whether U counts how far the camera moved.
     scans : callable
         Whether the pen slides along a surface in a run, from 0, after its first point.
-    compares_nominal_tip : bool
-        Whether the nominal tip is of use.
     shows_postures : bool
         Whether the window shows how the pen was held.
     """

@@ -50,13 +50,7 @@ PublicKey: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class SigningKey:
-    """A private key.
-
-    Attributes
-    ----------
-    public : str
-        Public key, 64 hexadecimal digits.
-    """
+    """A private key, and its public key as 64 hexadecimal digits."""
 
     def __init__(self, private: "Ed25519PrivateKey") -> None:
         self._private = private

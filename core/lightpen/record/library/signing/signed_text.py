@@ -19,13 +19,7 @@ _STATION = b', "station_signature": "'
 
 @dataclass(frozen=True)
 class Signers:
-    """The keys by which a file is signed.
-
-    Attributes
-    ----------
-    supervisor : SigningKey or None
-        None where no supervisor has to approve.
-    """
+    """The keys by which a file is signed; None where no supervisor has to approve."""
 
     station: SigningKey
     supervisor: SigningKey | None = None

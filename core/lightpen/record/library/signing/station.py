@@ -32,14 +32,9 @@ WHAT = message("file.station-key")
 
 
 class RememberedFolder(Struct, frozen=True):
-    """Memory of a user account about a data folder with a supervisor password.
+    """What a user account remembers of a data folder with a supervisor password.
 
-    Attributes
-    ----------
-    n_changes : int
-        Files of limits.
-    sha256 : str
-        Of the newest of them.
+    That is the number of files of limits, and the hash of the newest.
     """
 
     folder: str
