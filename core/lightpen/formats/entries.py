@@ -22,18 +22,10 @@ class Entries:
 
     Every method that takes several names takes them as spellings of one entry, of
     which the file may have one.
-
-    Attributes
-    ----------
-    name : str or Message
-        Name of the file, or of a place in it, for messages.
-    values : dict
-        Entry names without case and underscores; each maps to the name in the file and
-        the value.
     """
 
-    name: str | Message
-    values: dict[str, tuple[str, Tree]]
+    name: str | Message  # name of the file, or of a place in it, for messages
+    values: dict[str, tuple[str, Tree]]  # by plain name: name in the file, value
 
     @staticmethod
     def of(tree: dict[str, Tree], name: str | Message) -> "Entries":

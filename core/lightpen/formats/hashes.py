@@ -38,26 +38,16 @@ class RigInputs:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """The inputs of a calibration.
-
-    Attributes
-    ----------
-    observations : tuple of InputFile
-        The images, the video or the file of LED centres.
-    units : str or None
-        Units of a pen file that states none.
-    led_diameter : float or None
-        Of the LED discs, mm, where the pen file does not state it.
-    """
+    """The inputs of a calibration."""
 
     camera: InputFile
     pen: InputFile
-    observations: tuple[InputFile, ...]
+    observations: tuple[InputFile, ...]  # images, video, or file of LED centres
     nominal_tip: FloatArray | None
     rig: RigInputs | None = None
     origin: Origin | None = None
-    units: str | None = None
-    led_diameter: float | None = None
+    units: str | None = None  # units of a pen file that states none
+    led_diameter: float | None = None  # of the discs, mm, if the pen file has none
 
 
 def hashed(path: Path) -> InputFile:

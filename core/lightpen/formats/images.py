@@ -70,22 +70,11 @@ Seen = TypeVar("Seen")
 
 @dataclass(frozen=True)
 class ImageSource:
-    """Images to be decoded one by one.
+    """Images to be decoded one by one."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        File names, or ``frame 17`` of a video.
-    files : tuple of Path
-        Files to be hashed as the input: the images, or the video.
-    open : callable
-        Returns an iterator over loaders, one an image; a loader returns the grey
-        image or raises `FileError`.
-    """
-
-    names: tuple[str, ...]
-    files: tuple[Path, ...]
-    open: Callable[[], Iterator[Callable[[], Image]]]
+    names: tuple[str, ...]  # file names, or ``frame 17`` of a video
+    files: tuple[Path, ...]  # files to be hashed as the input: the images, or the video
+    open: Callable[[], Iterator[Callable[[], Image]]]  # one loader an image
 
 
 def look_at_all(

@@ -51,39 +51,20 @@ class Centers:
 
 @dataclass(frozen=True, eq=False)
 class UnlabelledCenters:
-    """Images of unknown LEDs in a series of frames.
+    """Images of unknown LEDs in a series of frames."""
 
-    Attributes
-    ----------
-    frames : (F,) array
-        Numbers of the frames, ascending: all from the first to the last, also those
-        without a centre.
-    centers : tuple of (S, 2) array
-        Those of each frame, in any order, px.
-    """
-
-    frames: IntArray
-    centers: tuple[FloatArray, ...]
+    frames: IntArray  # (F,), ascending, also those without a centre
+    centers: tuple[FloatArray, ...]  # (S, 2), those of each frame, in any order, px
     path: Path
 
 
 @dataclass(frozen=True, eq=False)
 class PoseTable:
-    """Poses of a pen, cam_from_pen.
+    """Poses of a pen, cam_from_pen."""
 
-    Attributes
-    ----------
-    rotations : (N, 3, 3) array
-    translations : (N, 3) array
-        mm.
-    covariances : (N, 6, 6) array or None
-        Of the rotation vector w, with true rotation ``exp([w]x) R``, and of the
-        translation; rad and mm.
-    """
-
-    rotations: FloatArray
-    translations: FloatArray
-    covariances: FloatArray | None
+    rotations: FloatArray  # (N, 3, 3)
+    translations: FloatArray  # (N, 3), mm
+    covariances: FloatArray | None  # (N, 6, 6), of w and t, rad and mm
     path: Path
 
 

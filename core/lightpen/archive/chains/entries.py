@@ -73,51 +73,26 @@ class FileHash(Struct, frozen=True):
 
 
 class Event(Struct, frozen=True):
-    """An event to be entered.
-
-    Attributes
-    ----------
-    grade : str
-        Verdict on a calibration; empty of anything else, and where there was none.
-    reason : str
-        Reason given by the operator; of a comment, its text.
-    swing : str
-        Folder of the swing that it is of, as `FileHash.place`; may be empty.
-    settings : mapping
-        Settings and limits of a swing, task of a verification, new values of limits or
-        of a library item.
-    result : FileHash or None
-        The file that put a tip in force, or revoked it; of what is no swing, the file
-        that states it.
-    files : tuple of FileHash
-        The record of the swing, whose journal names the images with their hashes; of
-        a verification the journals of its touches; of the library a picture.
-    record_sha256 : str or None
-        Checksum of the record: the file of ``result`` as a text, except of limits,
-        which may have the hash of a password; of a tip that was not accepted its
-        calibration.
-    concerns : str or None
-        Hash of the entry that it restores, takes back, or is a note on.
-    """
+    """An event to be entered."""
 
     kind: Kind
     at: ZonedTime
     names: Names
     program: str
     origin: Origin | None = None
-    grade: str = ""
+    grade: str = ""  # verdict on a calibration; else empty
     why: StoredMessage | None = None
-    reason: str = ""
+    reason: str = ""  # reason given by the operator; of a comment, its text
     outcome: TrialOutcome | None = None
     tip_pen_mm: Vector | None = None
     expanded_uncertainty_mm: Vector | None = None
     change: TipChange | None = None
-    swing: str = ""
-    settings: Mapping[str, Plain] = {}
-    result: FileHash | None = None
-    files: tuple[FileHash, ...] = ()
-    record_sha256: Digest | None = None
-    concerns: Digest | None = None
+    swing: str = ""  # folder of its swing, as `FileHash.place`; may be empty
+    settings: Mapping[str, Plain] = {}  # also a task, new limits or entries
+    result: FileHash | None = None  # put a tip in force, revoked it, or states this
+    files: tuple[FileHash, ...] = ()  # swing's record, touches' journals, picture
+    record_sha256: Digest | None = None  # of ``result`` as a text, or a calibration
+    concerns: Digest | None = None  # the entry that it restores, revokes or is on
 
     def __post_init__(self) -> None:
         require_usual(self.at)

@@ -48,17 +48,10 @@ _NAME = re.compile(r"([0-9a-f]{32})-([1-9][0-9]{0,11})\.tsr")
 
 @dataclass(frozen=True)
 class Authority:
-    """A time stamping authority.
-
-    Attributes
-    ----------
-    certificate : Path or None
-        PEM file with its root. If it also has certificates for time stamping, one of
-        these must have signed.
-    """
+    """A time stamping authority."""
 
     address: str = ""
-    certificate: Path | None = None
+    certificate: Path | None = None  # PEM with its root; also its own, if given
 
 
 @dataclass(frozen=True)

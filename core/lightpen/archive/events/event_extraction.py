@@ -46,20 +46,12 @@ from lightpen.record.swings.solving import Solution, record_inputs
 
 @dataclass(frozen=True)
 class ExtractedEvent:
-    """An event to be entered, with its files.
-
-    Attributes
-    ----------
-    record : str or None
-        the file that states it, from which the file can be made again; of a tip that
-        was not accepted its calibration record. The event has its hash.
-    takes_back : str
-        File of the result that is revoked, as `FileHash.place`; else empty.
-    """
+    """An event to be entered, with its files."""
 
     event: Event
+    # File from which the result can be made again, or a calibration record
     record: str | None = None
-    takes_back: str = ""
+    takes_back: str = ""  # file that is revoked, as `FileHash.place`
 
 
 def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:

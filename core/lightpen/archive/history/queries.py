@@ -31,20 +31,14 @@ _KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
 
 @dataclass(frozen=True)
 class EntryFilter:
-    """Filter for entries; an empty or None field matches all.
-
-    Attributes
-    ----------
-    begin, end : datetime or None
-        Entries since the one, and before the other, each by its own clock.
-    """
+    """Filter for entries; an empty or None field matches all."""
 
     pen: str = ""
     tip: str = ""
     station: str = ""
     kinds: tuple[Kind, ...] = ()
-    begin: datetime | None = None
-    end: datetime | None = None
+    begin: datetime | None = None  # by the clock of the entry
+    end: datetime | None = None  # before that, likewise
     is_simulated: bool | None = None
 
 

@@ -38,58 +38,27 @@ NOBODY = Names()
 
 @dataclass(frozen=True, eq=False)
 class CalibrationFile:
-    """A calibration read from a file.
-
-    Attributes
-    ----------
-    sha256 : str
-        Checksum of the whole file.
-    grade : Grade
-        Verdict on it when it was accepted, else by itself.
-    names : Names
-        Empty of a record that nobody accepted.
-    accepted : datetime or None
-        None of such a record, too.
-    reason : str
-        Why it was accepted though it was to be checked, or reinstated, in the
-        words of who did.
-    restores : str or None
-        Hash of the entry of the archive whose tip is in force again by it.
-    swing : Path or None
-        Folder of the swing as a result names it.
-    measured : datetime or None
-        When its swing began, where that was looked up.
-    library_status : tuple of str
-        Whether pen or tip are retired or overdue, where that was looked up.
-    due : date or None
-        Next due date of the tip by its age, likewise.
-    supervisor : str
-        Who signed it; empty where none was needed.
-    traced : tuple of TracedItem
-        What it was measured with, likewise.
-    is_entered : bool or None
-        Whether an accepted tip has an entry in the archive, likewise.
-    """
+    """A calibration read from a file."""
 
     path: Path
-    sha256: str
+    sha256: str  # checksum of the whole file
     calibration: CalibrationRecord
-    grade: Grade
+    grade: Grade  # verdict on it when it was accepted, else by itself
     why: StoredMessage
     doubts: tuple[StoredMessage, ...]
     origin: Origin | None
-    names: Names = NOBODY
-    accepted: datetime | None = None
-    reason: str = ""
+    names: Names = NOBODY  # empty of a record that nobody accepted
+    accepted: datetime | None = None  # None of such a record, too
+    reason: str = ""  # why, though it was to be checked, or was reinstated
     change: TipChange | None = None
-    restores: str | None = None
-    swing: Path | None = None
-    measured: datetime | None = None
-    library_status: tuple[str, ...] = ()
-    due: date | None = None
-    supervisor: str = ""
-    traced: tuple[TracedItem, ...] = ()
-    is_entered: bool | None = None
+    restores: str | None = None  # entry whose tip is in force again by it
+    swing: Path | None = None  # folder of the swing as a result names it
+    measured: datetime | None = None  # when its swing began, where that was looked up
+    library_status: tuple[str, ...] = ()  # retired, overdue, if looked up
+    due: date | None = None  # next due date of the tip by its age, likewise
+    supervisor: str = ""  # who signed it; empty where none was needed
+    traced: tuple[TracedItem, ...] = ()  # what it was measured with, likewise
+    is_entered: bool | None = None  # in the archive, likewise
 
     @property
     def when(self) -> datetime:
@@ -153,31 +122,14 @@ class CalibrationFile:
 
 @dataclass(frozen=True, eq=False)
 class ShownImages:
-    """Observations of a calibration.
+    """Observations of a calibration."""
 
-    Attributes
-    ----------
-    pixels : (N, L, 2) array
-        LED centres, px; NaN where not seen.
-    fit : (N, L) array of bool
-        Which of them were fit for use.
-    areas : (N, L) array
-        Of the LEDs, px^2; NaN where not known.
-    sigmas : (N, L) array
-        Standard deviation of a coordinate of each centre by detection, px; NaN where
-        not seen.
-    edge_widths : (N,) array
-        Of the edges of the LEDs, px; NaN where not known.
-    lamps : (N, K, 2) array
-        Fixed lamps, px; NaN where not seen.
-    """
-
-    pixels: FloatArray
-    fit: BoolArray
-    areas: FloatArray
-    sigmas: FloatArray
-    edge_widths: FloatArray
-    lamps: FloatArray
+    pixels: FloatArray  # (N, L, 2), LED centres, px; NaN where not seen
+    fit: BoolArray  # (N, L), which of them were fit for use
+    areas: FloatArray  # (N, L), of the LEDs, px^2; NaN where not known
+    sigmas: FloatArray  # (N, L), of a coordinate of each centre by detection, px
+    edge_widths: FloatArray  # (N,), of the edges of the LEDs, px; NaN where not known
+    lamps: FloatArray  # (N, K, 2), fixed lamps, px; NaN where not seen
 
 
 def shown_images(

@@ -28,29 +28,15 @@ N_COEFFICIENTS = (4, 5, 8)  # of distortion that a camera may have; 4 a fisheye
 
 @dataclass(frozen=True, eq=False)
 class ReestimatedPoses:
-    """What the images show that take part.
+    """What the images show that take part."""
 
-    Attributes
-    ----------
-    numbers : (M,) array of int
-        Images up to which a tip is known, counted among all from 1.
-    tips : (M, 3) array
-        The tip by the images up to there, mm.
-    uncertainties : (M, 3) array
-        U (k = 2) of it: noise by these images, all else as by all of them, mm.
-    tilts, directions : (N,) array
-        How the pen leant, as `lightpen.model.posture.Posture` has it, rad.
-    points, residuals : (K, 2) array
-        Where LEDs were seen, and what is left there, px.
-    """
-
-    numbers: IntArray
-    tips: FloatArray
-    uncertainties: FloatArray
-    tilts: FloatArray
-    directions: FloatArray
-    points: FloatArray
-    residuals: FloatArray
+    numbers: IntArray  # (M,), images up to which a tip is known, from 1
+    tips: FloatArray  # (M, 3), the tip by the images up to there, mm
+    uncertainties: FloatArray  # (M, 3), U (k = 2): noise by these images, mm
+    tilts: FloatArray  # (N,), as of `lightpen.model.posture.Posture`, rad
+    directions: FloatArray  # (N,), likewise
+    points: FloatArray  # (K, 2), where LEDs were seen, and what is left there, px
+    residuals: FloatArray  # (K, 2), where LEDs were seen, and what is left there, px
 
 
 def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:

@@ -45,35 +45,23 @@ class _Inputs(Struct, frozen=True):
 
 
 class StoredVerification(Struct, frozen=True):
-    """A verification in a data folder.
-
-    Attributes
-    ----------
-    verification : str
-        Kind of the task; "conclusion" for the end of the session.
-    temperature_c, humidity_percent : float or None
-        Of the pen and of the room; None if not measured.
-    camera_serials : tuple of str
-        Of the cameras that saw the pen.
-    reason, supervisor : str
-        Conclusion only: why a tip is used that did not pass, and who approved it.
-    """
+    """A verification in a data folder."""
 
     program: ProgramName
     created: ZonedTime
-    verification: str
+    verification: str  # kind of the task; "conclusion" for the end of the session
     station: str = ""
     operator: str = ""
     pen: str = ""
     tip: str = ""
     origin: Origin | None = None
-    temperature_c: float | None = None
-    humidity_percent: float | None = None
-    camera_serials: tuple[str, ...] = ()
+    temperature_c: float | None = None  # of the pen; None if not measured
+    humidity_percent: float | None = None  # of the room, likewise
+    camera_serials: tuple[str, ...] = ()  # of the cameras that saw the pen
     verdict: _Verdict | None = None
     ended: TrialOutcome | None = field(name="outcome", default=None)
-    reason: str = ""
-    supervisor: str = ""
+    reason: str = ""  # conclusion only: why a tip is used that did not pass
+    supervisor: str = ""  # conclusion only: who approved that
     inputs: _Inputs = _Inputs()
 
     def __post_init__(self) -> None:

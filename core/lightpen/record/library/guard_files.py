@@ -60,39 +60,23 @@ class PasswordVerifier(Struct, frozen=True):
 
 
 class LimitsChange(Struct, omit_defaults=True, kw_only=True):
-    """One setting: a password, limits of a station, or a station key.
-
-    Attributes
-    ----------
-    password : PasswordVerifier or None
-        None where the password stays.
-    limits : mapping of str to float or None
-        By `Limit.key`; None where they stay.
-    chain : str
-        Of the archive; in the first file.
-    station_key : str
-        Public key from then on; empty where it stays.
-    station_key_signature, key_approval : str
-        By the station key before, and by the supervisor, of
-        `lightpen.record.library.key_changes.key_change`.
-    known : mapping of str to str or None
-        Hashes of the files that count as they are, by their places, see
-        `lightpen.record.library.signing.signed_text.entries_sha256`; with each
-        password, and each station key that a supervisor introduces.
-    """
+    """One setting: a password, limits of a station, or a station key."""
 
     format: int
     at: ZonedTime
     supervisor: str
     station: str = ""
-    password: PasswordVerifier | None = None
+    password: PasswordVerifier | None = None  # None where the password stays
+    # By `Limit.key`.
     limits: dict[str, float] | None = None
     previous: Digest = NOTHING_BEFORE
+    # Of the archive; in the first file.
     chain: Annotated[str, Meta(pattern="^([0-9a-f]{32})?$")] = ""
+    # Public key from then on
     station_key: Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")] = ""
-    station_key_signature: _Signed = ""
-    key_approval: _Signed = ""
-    known: Mapping[str, Digest] | None = None
+    station_key_signature: _Signed = ""  # of `key_change` by the key before
+    key_approval: _Signed = ""  # and by the supervisor
+    known: Mapping[str, Digest] | None = None  # files that count as they are
 
     def __post_init__(self) -> None:
         require_usual(self.at)

@@ -52,31 +52,15 @@ class Signature:
 
 @dataclass(frozen=True)
 class Supervision:
-    """Limits and guard set by the supervisors of a data folder.
+    """Limits and guard set by the supervisors of a data folder."""
 
-    Attributes
-    ----------
-    password : PasswordVerifier or None
-        None where there is no password: then anybody may change limits.
-    limits : mapping of str to StationLimits
-        By the name of the station, as it was written last.
-    chain : str
-        Name of the first station key, and of the archive's chain; empty where there
-        are no files.
-    station_keys : tuple of str
-        Public keys whose signatures count, the present one last.
-    known : mapping of str to str
-        As of `LimitsChange`.
-    hashes : tuple of str
-        Of the files, the oldest first.
-    """
-
-    password: PasswordVerifier | None = None
+    password: PasswordVerifier | None = None  # without one, anybody may change limits
+    # By the name of the station, as it was written last
     limits: Mapping[str, StationLimits] = field(default_factory=dict)
-    chain: str = ""
-    station_keys: tuple[str, ...] = ()
-    known: Mapping[str, str] = field(default_factory=dict)
-    hashes: tuple[str, ...] = ()
+    chain: str = ""  # begun by the first station key; empty without files
+    station_keys: tuple[str, ...] = ()  # whose signatures count, the present last
+    known: Mapping[str, str] = field(default_factory=dict)  # as of `LimitsChange`
+    hashes: tuple[str, ...] = ()  # of the files, the oldest first
 
     @property
     def is_guarded(self) -> bool:

@@ -83,27 +83,14 @@ class Picture(Struct, frozen=True):
 
 
 class Item(Struct, frozen=True, kw_only=True):
-    """Common entries of all items.
-
-    Attributes
-    ----------
-    id : str
-        Unique identifier, printed as a barcode on the label.
-    due : date or None
-        Last day on which it may be used before it is looked after: of a pen, when its
-        LEDs are to be measured again, of a tip its ball, of a cone its seat.
-    certificate : str
-        Number of the certificate of that; empty where there is none.
-    certified : date or None
-        Date of the certificate.
-    """
+    """Common entries of all items."""
 
     kind: ClassVar[ItemKind]
 
-    id: Id
-    due: date | None = None
-    certificate: str = ""
-    certified: date | None = None
+    id: Id  # unique identifier, printed as a barcode on the label
+    due: date | None = None  # last day of use before it is looked after
+    certificate: str = ""  # its number; empty where there is none
+    certified: date | None = None  # date of the certificate
     note: str = ""
     is_retired: bool = False
 
@@ -126,20 +113,12 @@ class LedFile(Struct, frozen=True):
 
 
 class ListedPen(Item, frozen=True, kw_only=True, tag="pen"):
-    """A pen, by its serial number.
-
-    Attributes
-    ----------
-    led_file : LedFile or None
-        None until one was opened for the pen.
-    expansion : float or None
-        Of the pen, 1/K, where its LED file states none; None for the default
-        of the station.
-    """
+    """A pen, by its serial number."""
 
     kind: ClassVar[ItemKind] = ItemKind.PEN
 
-    led_file: LedFile | None = None
+    led_file: LedFile | None = None  # None until one was opened for the pen
+    # 1/K, where its LED file states none; None for the default of the station
     expansion: Annotated[float, Meta(ge=0, le=LARGEST_EXPANSION)] | None = None
 
 
@@ -164,28 +143,17 @@ class ListedReference(Item, frozen=True, kw_only=True, tag="reference"):
 
 
 class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
-    """A tip, on whatever pen.
-
-    Attributes
-    ----------
-    nominal_tip_mm : triple of float or None
-        Its centre by design, pen frame; None leaves that of the LED file in force.
-    stylus_axis : triple of float or None
-        Direction from the ball along its stylus into the pen, pen frame, of length 1.
-    max_change_mm : float or None
-        Distance from the current tip before that a calibration may find; None for no
-        limit but the uncertainty of the change.
-    max_days, max_swings : int or None
-        Its own `DueRule`; None for that of the station.
-    """
+    """A tip, on whatever pen."""
 
     kind: ClassVar[ItemKind] = ItemKind.TIP
 
     ball_diameter_mm: Annotated[float, Meta(gt=0, le=LARGEST_BALL)] | None = None
-    nominal_tip_mm: Vector | None = None
-    stylus_axis: Vector | None = None
+    nominal_tip_mm: Vector | None = None  # pen frame; None for that of the LEDs
+    stylus_axis: Vector | None = None  # from ball into pen, of length 1
     axis_origin: AxisOrigin | None = None
+    # Since the current tip; None for no limit but the uncertainty of the change
     max_change_mm: Annotated[float, Meta(gt=0, le=LARGEST_CHANGE)] | None = None
+    # `DueRule` of its own; None for that of the station
     max_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)] | None = None
     max_swings: Annotated[int, Meta(ge=1, le=MOST_SWINGS)] | None = None
     picture: Picture | None = None

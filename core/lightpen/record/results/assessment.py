@@ -42,23 +42,13 @@ from lightpen.swing_messages import Code, too_little_tilt
 
 @dataclass(frozen=True, eq=False)
 class SwingAssessment:
-    """Assessment of a solved swing.
-
-    Attributes
-    ----------
-    last : Result or None
-        Current result of this pen and tip; None if there is none or it cannot be read.
-    max_change : float or None
-        Limit of the tip for the distance from that, mm; None if it has none.
-    doubts : tuple of Message
-        Warnings besides the reason of the verdict, the most important first.
-    """
+    """Assessment of a solved swing."""
 
     verdict: Verdict
-    last: Result | None
+    last: Result | None  # of this pen and tip; None if none can be read
     change: Change | None
-    doubts: tuple[Message, ...]
-    max_change: float | None = None
+    doubts: tuple[Message, ...]  # besides the verdict, the worst first
+    max_change: float | None = None  # limit of the tip, mm, if it has one
     limits: SwingLimits = field(default_factory=SwingLimits)
 
 

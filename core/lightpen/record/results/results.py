@@ -53,21 +53,13 @@ END = b"\n}\n"
 
 
 class ResultHeading(Struct):
-    """The heading of a result, for look-ups.
-
-    Attributes
-    ----------
-    pen, tip, record : str or None
-        None where a later version does not say; else as `Names` and `Result`.
-    takes_back : str or None
-        Name of the result's file, without suffix, that is revoked; None of a result.
-    """
+    """The heading of a result, for look-ups."""
 
     format: Annotated[int, Meta(ge=1)]
-    pen: str | None = None
-    tip: str | None = None
-    record: str | None = None
-    takes_back: str | None = None
+    pen: str | None = None  # as of `Names`; None where a later version does not say
+    tip: str | None = None  # likewise
+    record: str | None = None  # as of `Result`, likewise
+    takes_back: str | None = None  # file, without suffix, that is revoked
     origin: str | None = None
     supervisor: str = ""
 
@@ -94,27 +86,14 @@ class TipChange(Struct, frozen=True):
     """Distance of a tip from its predecessor at acceptance.
 
     That one is the tip as found, the one that was accepted the tip as left.
-
-    Attributes
-    ----------
-    accepted : datetime
-        When the tip as found was.
-    difference_mm : triple of float
-        Now minus then, pen frame.
-    expanded_uncertainty_mm : triple of float
-        U (k = 2) of the difference.
-    as_found_mm, as_found_expanded_uncertainty_mm : triple of float
-        The tip that was in force until then, pen frame, and its U (k = 2).
-    limit_mm : float or None
-        Limit of the tip for this change; None if it has none.
     """
 
-    accepted: ZonedTime
-    difference_mm: Vector
-    expanded_uncertainty_mm: Vector
-    as_found_mm: Vector
-    as_found_expanded_uncertainty_mm: Vector
-    limit_mm: float | None = None
+    accepted: ZonedTime  # when the tip as found was
+    difference_mm: Vector  # now minus then, pen frame
+    expanded_uncertainty_mm: Vector  # U (k = 2) of the difference
+    as_found_mm: Vector  # the tip in force until then, pen frame
+    as_found_expanded_uncertainty_mm: Vector  # U (k = 2) of it
+    limit_mm: float | None = None  # limit of the tip; None if it has none
 
     @classmethod
     def of(cls, last: "Result", change: Change, limit: float | None = None) -> Self:
@@ -176,40 +155,21 @@ class _Whole(_Head):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """An accepted calibration.
-
-    Attributes
-    ----------
-    record : Path
-        Folder of the swing that it comes from.
-    images : tuple of int or None
-        Numbers of the images of the swing that were not taken out; None of one that
-        puts an older tip in force again.
-    origin : Origin or None
-        Origin of the images; None if neither the result nor its swing states it.
-    reason : str
-        Why it was accepted though its grade is no pass, in the words of who did.
-    supervisor : str
-        Supervisor who approved a result outside the limits; empty if none was needed.
-    change : TipChange or None
-        Since the result that was in force; None if there was none.
-    restores : str or None
-        Hash of the entry in the archive whose tip it puts in force again.
-    """
+    """An accepted calibration."""
 
     names: Names
     accepted: datetime
     grade: Grade
-    record: Path
-    images: tuple[int, ...] | None
+    record: Path  # folder of the swing that it comes from
+    images: tuple[int, ...] | None  # not taken out; None of a reinstated tip
     calibration: CalibrationRecord
-    origin: Origin | None = None
-    reason: str = ""
+    origin: Origin | None = None  # None if neither it nor its swing states it
+    reason: str = ""  # why it was accepted though it does not pass, by who did
     why: StoredMessage | None = None
     doubts: tuple[StoredMessage, ...] = ()
-    change: TipChange | None = None
-    supervisor: str = ""
-    restores: str | None = None
+    change: TipChange | None = None  # since the result in force before, if any
+    supervisor: str = ""  # who approved it; empty if none was needed
+    restores: str | None = None  # hash of the entry whose tip it reinstates
 
     @property
     def is_simulated(self) -> bool:

@@ -82,19 +82,7 @@ class RigCopies(Struct, frozen=True):
 
 
 class Header(Struct, frozen=True, kw_only=True):
-    """Conditions of the capture of a swing.
-
-    Attributes
-    ----------
-    units : str or None
-        Units given for a pen file without units.
-    led_diameter_mm, nominal_tip_mm : float, triple of float or None
-        Values that replace those of the pen file.
-    mask_px : tuple of triples
-        Circles of stray light: centre x, y and radius.
-    settings : mapping
-        Additional settings: exposure, limits, camera serial number.
-    """
+    """Conditions of the capture of a swing."""
 
     format: int = field(default_factory=partial(newest_format, SWING))
     created: ZonedTime
@@ -105,11 +93,11 @@ class Header(Struct, frozen=True, kw_only=True):
     cone: str = ""
     camera_file: FileCopy
     pen_file: FileCopy
-    units: str | None = None
-    led_diameter_mm: Length | None = None
-    nominal_tip_mm: Vector | None = None
-    mask_px: tuple[Vector, ...] = ()
-    settings: Mapping[str, Plain] = {}
+    units: str | None = None  # units given for a pen file without units
+    led_diameter_mm: Length | None = None  # values that replace those of the pen file
+    nominal_tip_mm: Vector | None = None  # values that replace those of the pen file
+    mask_px: tuple[Vector, ...] = ()  # circles of stray light: centre x, y and radius
+    settings: Mapping[str, Plain] = {}  # further: exposure, limits, camera
     rig: RigCopies | None = None
 
     def __post_init__(self) -> None:

@@ -12,28 +12,13 @@ from lightpen.record.swings.solving import Solution
 
 @dataclass(frozen=True)
 class ImageRow:
-    """One image of a solved swing.
+    """One image of a solved swing."""
 
-    Attributes
-    ----------
-    number : int
-        Number in the record.
-    misfit : float
-        Root mean square residual with the tip in the cone, px; NaN without the pen.
-    n_leds : int
-        LEDs that were seen, by all cameras together.
-    reason : Reason
-        Why it does not take part; `Reason.NONE` where it does.
-    is_taken_out : bool
-        Whether it was taken out and may be put back. Else an image that does not take
-        part was left out by the computation, and would be again.
-    """
-
-    number: int
-    misfit: float
-    n_leds: int
-    reason: Reason
-    is_taken_out: bool
+    number: int  # number in the record
+    misfit: float  # rms residual with the tip in the cone, px; NaN without the pen
+    n_leds: int  # LEDs that were seen, by all cameras together
+    reason: Reason  # why it does not take part; `Reason.NONE` where it does
+    is_taken_out: bool  # and may be put back; else the computation left it out
 
     @property
     def is_used(self) -> bool:

@@ -69,38 +69,20 @@ PRESS_TEST = "press_test"  # among the settings: made to be compared with anothe
 
 @dataclass(frozen=True, eq=False)
 class RecordedImage:
-    """An acknowledged image.
-
-    Attributes
-    ----------
-    time : float
-        s, by the clock of the session that took it.
-    pixels : (L, 2) array
-        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-    rotation, translation : (3, 3) and (3,) array
-        cam_from_pen, mm.
-    stats : Stats
-        What became of the camera's images since the swing began.
-    others : tuple of SecondaryImage
-        Simultaneous images of the other cameras of a rig.
-    touch : int
-        Number of the touch in a verification, from 1; 0 in a swing.
-    approach_cam : (3,) array or None
-        Unit vector along which the tip came to that point.
-    """
+    """An acknowledged image."""
 
     number: int
     file: Path
     sha256: str
-    time: float
+    time: float  # s, by the clock of the session that took it
     device_time_ns: int | None
-    pixels: FloatArray
-    rotation: FloatArray
-    translation: FloatArray
-    stats: Stats = field(default_factory=Stats)
-    others: tuple[SecondaryImage, ...] = ()
-    touch: int = 0
-    approach_cam: FloatArray | None = None
+    pixels: FloatArray  # (L, 2), ellipse centres of LEDs, px; NaN if not seen
+    rotation: FloatArray  # (3, 3), cam_from_pen, mm
+    translation: FloatArray  # (3,), cam_from_pen, mm
+    stats: Stats = field(default_factory=Stats)  # since the swing began
+    others: tuple[SecondaryImage, ...] = ()  # simultaneous images of a rig
+    touch: int = 0  # number of the touch in a verification, from 1; 0 in a swing
+    approach_cam: FloatArray | None = None  # (3,), way of the tip to the point
 
     @property
     def rig_pixels(self) -> FloatArray:
@@ -110,29 +92,15 @@ class RecordedImage:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A swing on disk.
-
-    Attributes
-    ----------
-    images : tuple of RecordedImage
-        All that were acknowledged, in the order of capture.
-    taken_out : mapping of int to str
-        Numbers of images that do not take part, and why.
-    verdict : str or None
-        The last one; None if the swing was interrupted.
-    more : pair of int or None
-        Least and greatest number of images that were requested after a verdict.
-    length : int
-        Length of the journal that was read, bytes.
-    """
+    """A swing on disk."""
 
     folder: Path
     header: Header
-    images: tuple[RecordedImage, ...]
-    taken_out: Mapping[int, str]
-    verdict: str | None
-    more: tuple[int, int] | None
-    length: int
+    images: tuple[RecordedImage, ...]  # acknowledged ones, in order of capture
+    taken_out: Mapping[int, str]  # numbers of images that do not take part, and why
+    verdict: str | None  # the last one; None if the swing was interrupted
+    more: tuple[int, int] | None  # number of images requested after a verdict
+    length: int  # length of the journal that was read, bytes
 
     @property
     def used_images(self) -> tuple[RecordedImage, ...]:

@@ -32,30 +32,19 @@ from lightpen.record.swings.reading import Record, image_name, recorded_origin
 
 @dataclass(frozen=True, eq=False)
 class RecordSource:
-    """Inputs of a calibration.
-
-    Attributes
-    ----------
-    images : ImageSource
-        All images, in the order of capture; a damaged one raises `FileError` when
-        loaded.
-    masks : tuple of (M, 3) array
-        Circles of stray light before each camera: centre x, y and radius, px.
-    units, led_diameter
-        As of `Header`.
-    """
+    """Inputs of a calibration."""
 
     folder: Path
-    images: ImageSource
+    images: ImageSource  # in the order of capture; loading raises `FileError`
     camera: Camera
     pen: Pen
-    masks: tuple[FloatArray, ...]
+    masks: tuple[FloatArray, ...]  # (M, 3), stray light: x, y, radius, px
     camera_files: tuple[Path, ...]
     pen_file: Path
     assumptions: Assumptions = USUAL
     origin: Origin | None = None
-    units: str | None = None
-    led_diameter: float | None = None
+    units: str | None = None  # as of `Header`
+    led_diameter: float | None = None  # as of `Header`
     rig: Rig | None = None
     rig_file: Path | None = None
     other_images: tuple[ImageSource, ...] = ()

@@ -35,27 +35,15 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The tip of a record, with its input.
-
-    Attributes
-    ----------
-    numbers : (N,) array of int
-        Of the images, in the record.
-    observations : Observations
-        Detections in all N images, accepted or not.
-    taken_out : mapping of int to str
-        Numbers of images that do not take part, and why.
-    residuals : (N, C, L, 2) array
-        Observed minus modelled LED centres in each camera with the tip in the cone, px.
-        An image that is left out is turned as fits it best. NaN for LEDs that were not
-        seen, and for images that do not show the pen.
-    """
+    """The tip of a record, with its input."""
 
     source: RecordSource
-    numbers: IntArray
-    observations: Observations
-    taken_out: Mapping[int, str]
+    numbers: IntArray  # (N,), of the images, in the record
+    observations: Observations  # detections in all N images, accepted or not
+    taken_out: Mapping[int, str]  # numbers of images that do not take part, and why
     calibration: Calibration
+    # (N, C, L, 2), observed less modelled centres with tip in the cone, px; an image
+    # that is left out is turned as fits it best; NaN where an LED or pen was not seen
     residuals: FloatArray
     others: tuple[Observations, ...] = ()
 

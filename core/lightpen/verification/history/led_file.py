@@ -48,27 +48,15 @@ FINEST = 1e-4  # mm, to which no LED file is known beforehand
 
 @dataclass(frozen=True, eq=False)
 class ImprovedPen:
-    """A pen with an LED file improved by several swings.
-
-    Attributes
-    ----------
-    moves : (L, 3) array
-        New less old places of the LEDs, mm.
-    pooled : tuple of str
-        Names of the swings.
-    held_out : str
-        Name of the swing that confirms it.
-    sigma_before, sigma_after : float
-        Residuals of that swing with the old and the new LEDs, px.
-    """
+    """A pen with an LED file improved by several swings."""
 
     pen: Pen
     camera: Camera
-    moves: FloatArray
-    pooled: tuple[str, ...]
-    held_out: str
-    sigma_before: float
-    sigma_after: float
+    moves: FloatArray  # (L, 3), new less old places of the LEDs, mm
+    pooled: tuple[str, ...]  # names of the swings
+    held_out: str  # name of the swing that confirms it
+    sigma_before: float  # residuals of that swing with the old and the new LEDs, px
+    sigma_after: float  # residuals of that swing with the old and the new LEDs, px
 
 
 def calibrate_again(

@@ -54,38 +54,23 @@ class Growth(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SwingOfPen:
-    """The state of a pen by one swing, relative to the first.
-
-    Attributes
-    ----------
-    shifts : (L, 3) array
-        Of the LEDs since the first swing, pen frame, mm; NaN where not seen.
-    growth : Growth or None
-        Of the pen since the first swing that tells its size. None of that swing, if the
-        cone or the camera was moved in between, if the images contradict a file, and of
-        several cameras, which see the size itself.
-    """
+    """The state of a pen by one swing, relative to the first."""
 
     name: str
-    shifts: FloatArray
+    shifts: FloatArray  # (L, 3), of LEDs since the first swing, mm; NaN if not seen
+    # Since the first swing that tells its size. None of that swing, if cone or
+    # camera was moved in between, the images contradict a file, or of several
+    # cameras, which see the size itself.
     growth: Growth | None
 
 
 @dataclass(frozen=True, eq=False)
 class PenHealth:
-    """A pen over its swings.
-
-    Attributes
-    ----------
-    moved : tuple of int
-        Numbers of the LEDs that moved, from 1.
-    growth : Growth or None
-        Most significant change of the pen's size; None where it is not determined.
-    """
+    """A pen over its swings."""
 
     swings: tuple[SwingOfPen, ...]
-    moved: tuple[int, ...]
-    growth: Growth | None
+    moved: tuple[int, ...]  # numbers of the LEDs that moved, from 1
+    growth: Growth | None  # most significant; None where not determined
     assessment: VerificationAssessment
 
 

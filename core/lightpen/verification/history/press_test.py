@@ -45,19 +45,12 @@ MORE_IMAGES = message("press-test.more-images")
 
 @dataclass(frozen=True, eq=False)
 class PressTest:
-    """Change of the tip by firm pressure.
+    """Change of the tip by firm pressure."""
 
-    Attributes
-    ----------
-    change : (6,) array
-        Tip in the pen frame and cone in the camera frame, firm less usual, mm; the cone
-        without the move that comes with that of the tip along the pen.
-    uncertainty : (6,) array
-        U (k = 2) of it, mm.
-    """
-
+    # (6,), tip in the pen frame and cone in the camera frame, firm less usual,
+    # mm; the cone without the move that comes with that of the tip along the pen
     change: FloatArray
-    uncertainty: FloatArray
+    uncertainty: FloatArray  # (6,), U (k = 2), mm
     assessment: VerificationAssessment
 
     @property

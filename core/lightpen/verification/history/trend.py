@@ -36,21 +36,14 @@ class Trend:
     """The calibrations of a tip that were accepted and not revoked.
 
     A calibration whose tip was reinstated counts once.
-
-    Attributes
-    ----------
-    entries : tuple of StoredEntry
-        The oldest first.
-    max_uncertainty : float or None
-        Limit of U (k = 2) at the newest, mm.
     """
 
     pen: str = ""
     tip: str = ""
-    entries: tuple[StoredEntry, ...] = ()
+    entries: tuple[StoredEntry, ...] = ()  # the oldest first
     tips: tuple[TipEstimate, ...] = ()
     control: ControlLimits | None = None
-    max_uncertainty: float | None = None
+    max_uncertainty: float | None = None  # limit of U (k = 2) at the newest, mm
     touched: RepeatedPoint | None = None
 
     def touched_with(self, entries: Sequence[StoredEntry]) -> RepeatedPoint | None:

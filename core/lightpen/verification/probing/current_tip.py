@@ -26,30 +26,20 @@ from lightpen.verification.probing.sources import instrument_of
 
 @dataclass(frozen=True, eq=False)
 class CurrentTip:
-    """A tip that was accepted, with the files that it is verified by.
-
-    Attributes
-    ----------
-    nominal_tip, cone_cam : (3,) array or None
-        mm; the cone of the calibration is not known before another camera.
-    masks : tuple of (M, 3) array
-        Circles of stray light before each camera: centre x, y and radius, px.
-    temperature_c, humidity_percent : float or None
-        Of the pen and of the room on the day of the verification, for the record.
-    """
+    """A tip that was accepted, with the files that it is verified by."""
 
     names: Names
     origin: Origin
     calibration: CalibrationFile
     instrument: Instrument
-    nominal_tip: FloatArray | None
-    cone_cam: FloatArray | None
-    masks: tuple[FloatArray, ...]
+    nominal_tip: FloatArray | None  # (3,), mm
+    cone_cam: FloatArray | None  # (3,), mm; None before another camera
+    masks: tuple[FloatArray, ...]  # (M, 3), stray light: x, y, radius, px
     viewers: PenCameras
     tip_file: InputFile
     pen_file: InputFile
-    temperature_c: float | None = None
-    humidity_percent: float | None = None
+    temperature_c: float | None = None  # of the pen on that day
+    humidity_percent: float | None = None  # of the room, likewise
 
     @property
     def region(self) -> RegionOfInterest:

@@ -118,21 +118,11 @@ def _lights(
 
 @dataclass(frozen=True, eq=False)
 class LampDrift:
-    """Drift of fixed lamps during a verification.
+    """Drift of fixed lamps during a verification."""
 
-    Attributes
-    ----------
-    lamps : (K, 2) array
-        Where they are in the image, px.
-    moves : (B, 2) array
-        Of each block of images since the first, along u and v where the pen was, mm.
-    uncertainty : float
-        U (k = 2) of one of them, mm.
-    """
-
-    lamps: FloatArray
-    moves: FloatArray
-    uncertainty: float
+    lamps: FloatArray  # (K, 2), where they are in the image, px
+    moves: FloatArray  # (B, 2), of each block since the first, along u and v, mm
+    uncertainty: float  # U (k = 2) of one of them, mm
     assessment: VerificationAssessment = field(repr=False)
 
     @property

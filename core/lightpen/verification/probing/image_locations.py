@@ -55,13 +55,7 @@ class RecordedTouch:
 
 @dataclass(frozen=True, eq=False)
 class ImageLocation:
-    """Images of touches, and the files that they bring if they are a record's.
-
-    Attributes
-    ----------
-    masks : tuple of (M, 3) array or None
-        Circles of stray light before each camera: centre x, y and radius, px.
-    """
+    """Images of touches, and the files that they bring if they are a record's."""
 
     name: str
     images: tuple[ImageSource, ...]
@@ -69,7 +63,7 @@ class ImageLocation:
     viewers: PenCameras | None = None
     pen: Pen | None = None
     pen_file: Path | None = None
-    masks: tuple[FloatArray | None, ...] = (None,)
+    masks: tuple[FloatArray | None, ...] = (None,)  # (M, 3), stray light, px
     touches: tuple[RecordedTouch, ...] | None = None
 
     @property

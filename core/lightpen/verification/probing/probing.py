@@ -63,24 +63,12 @@ class ProbingEventKind(StrEnum):
 
 @dataclass(frozen=True)
 class ProbingRules:
-    """Rules of recording a touch.
+    """Rules of recording a touch."""
 
-    Attributes
-    ----------
-    n_frames : int
-        Images of a touch.
-    n_settling : int
-        Images before them through which the pen is still already.
-    min_turn : float
-        Angle by which its posture differs from that of touches before, rad, and
-    min_distance : float
-        distance by which its place does, mm: one of the two is enough.
-    """
-
-    n_frames: int = FAST
-    n_settling: int = SETTLING
-    min_turn: float = 0.0
-    min_distance: float = 0.0
+    n_frames: int = FAST  # images of a touch
+    n_settling: int = SETTLING  # images before them, the pen being still
+    min_turn: float = 0.0  # of posture against touches before, rad; or
+    min_distance: float = 0.0  # of place, mm: one of the two is enough
 
     def __post_init__(self) -> None:
         if self.n_frames < 1 or self.n_settling < 0:
@@ -101,37 +89,17 @@ class TipObservation:
 
 @dataclass(frozen=True, eq=False)
 class ProbingState:
-    """The touches so far.
-
-    Attributes
-    ----------
-    held : tuple of TipObservation
-        Observations while the pen is still; at rest the first and the last one.
-    deviating : TipObservation or None
-        The last observation, if it disagrees with those held.
-    rejected : tuple of RejectedFrame
-        Rejected between those held.
-    n_lost : int
-        Images in a row without the pen.
-    path : tuple of array
-        Where the tip was before, (3,) each, mm.
-    taken : tuple of StillFrames
-        Points probed so far.
-    places : tuple of TipObservation
-        One observation of each point.
-    is_sliding : bool
-        Whether the pen was seen without a break since a point was taken.
-    """
+    """The touches so far."""
 
     phase: ProbingPhase = ProbingPhase.MOVING
-    held: tuple[TipObservation, ...] = ()
-    deviating: TipObservation | None = None
-    rejected: tuple[RejectedFrame, ...] = ()
-    n_lost: int = 0
-    path: tuple[FloatArray, ...] = ()
-    taken: tuple[StillFrames, ...] = ()
-    places: tuple[TipObservation, ...] = ()
-    is_sliding: bool = False
+    held: tuple[TipObservation, ...] = ()  # while still; at rest the first and last
+    deviating: TipObservation | None = None  # the last one, if it disagrees
+    rejected: tuple[RejectedFrame, ...] = ()  # rejected between those held
+    n_lost: int = 0  # images in a row without the pen
+    path: tuple[FloatArray, ...] = ()  # where the tip was before, (3,) each, mm
+    taken: tuple[StillFrames, ...] = ()  # points probed so far
+    places: tuple[TipObservation, ...] = ()  # one observation of each point
+    is_sliding: bool = False  # seen without a break since the last point
 
     def progress(self, rules: ProbingRules) -> float:
         """Return the completed fraction of a touch, 0 to 1."""

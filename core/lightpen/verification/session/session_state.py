@@ -84,33 +84,16 @@ class RunsOfTask:
 
 @dataclass(frozen=True, eq=False)
 class SessionState:
-    """A verification at one moment.
-
-    Attributes
-    ----------
-    runs : tuple of tuple of ProbedPoint
-        Runs of the task at hand that are done.
-    fault : Message or None
-        Problem with the last point, or why the points do not suffice although their
-        number does.
-    found : mapping of str to Found
-        Results of the completed tasks by kind.
-    measured : mapping of str to RunsOfTask
-        Their points by kind.
-    visits : tuple of tuple of ProbedPoint
-        Visits of the reference cone so far.
-    pending : tuple of RunsOfTask
-        Results since the last visit, which do not include the drift yet.
-    """
+    """A verification at one moment."""
 
     touching: ProbingState = field(default_factory=ProbingState)
     touches: Points = ()
-    runs: tuple[Points, ...] = ()
-    fault: Message | None = None
-    found: Mapping[str, Found] = field(default_factory=dict)
-    measured: Mapping[str, RunsOfTask] = field(default_factory=dict)
-    visits: tuple[Points, ...] = ()
-    pending: tuple[RunsOfTask, ...] = ()
+    runs: tuple[Points, ...] = ()  # runs of the task at hand that are done
+    fault: Message | None = None  # of the last point, or of all though enough
+    found: Mapping[str, Found] = field(default_factory=dict)  # of completed tasks
+    measured: Mapping[str, RunsOfTask] = field(default_factory=dict)  # likewise
+    visits: tuple[Points, ...] = ()  # visits of the reference cone so far
+    pending: tuple[RunsOfTask, ...] = ()  # results that lack the next drift
 
     def found_by(self, task: VerificationTask[OptionsT, FoundT]) -> FoundT | None:
         """Return the result of a task; None until it is complete."""

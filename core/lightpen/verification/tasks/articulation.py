@@ -84,29 +84,14 @@ OTHER_POSTURE = message("session.other-posture")
 
 @dataclass(frozen=True, eq=False)
 class Articulation(Found):
-    """The location error of one point in several postures.
-
-    Attributes
-    ----------
-    locations : (N, 3) array
-        Mean of each posture, camera frame, mm.
-    spreads : (N,) array
-        Largest distance of a touch from the mean of its posture, mm.
-    location_error : float
-        Diameter of the smallest sphere about the locations, mm.
-    uncertainty : float
-        U (k = 2) of it, mm: 95 % of the location errors by what is known of the
-        touches stay within it.
-    expected : float
-        Mean of these location errors, mm.
-    """
+    """The location error of one point in several postures."""
 
     names: tuple[str, ...]
-    locations: FloatArray
-    spreads: FloatArray
-    location_error: float
-    uncertainty: float
-    expected: float
+    locations: FloatArray  # (N, 3), mean of each posture, camera frame, mm
+    spreads: FloatArray  # (N,), farthest touch from the mean of its posture, mm
+    location_error: float  # diameter of the smallest sphere about the locations, mm
+    uncertainty: float  # U (k = 2), mm: 95 % of the errors by noise are less
+    expected: float  # mean of these location errors, mm
     tip: TipEvidence
 
 

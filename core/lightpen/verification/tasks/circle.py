@@ -95,25 +95,15 @@ SIMULATED_STEPS = 12
 
 @dataclass(frozen=True, eq=False)
 class CircleRun:
-    """One run round a ring.
-
-    Attributes
-    ----------
-    left_out : tuple of ProbedPoint
-        Off the ring: the pen was lifted.
-    radius : float
-        Of the ring, the ball compensated, mm.
-    form_by_noise : float
-        Largest form, mm, that an ideal ring shows by what is known of the points.
-    """
+    """One run round a ring."""
 
     name: str
     touches: tuple[ProbedPoint, ...]
-    left_out: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]  # off the ring: the pen was lifted
     fit: CircleFit
-    radius: float
+    radius: float  # of the ring, the ball compensated, mm
     uncertainty: float
-    form_by_noise: float
+    form_by_noise: float  # largest that an ideal ring shows, mm
 
     @property
     def form(self) -> float:

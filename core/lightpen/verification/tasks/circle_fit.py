@@ -28,31 +28,15 @@ N_SAMPLES = 500  # of three points each
 
 @dataclass(frozen=True, eq=False)
 class CircleFit:
-    """A circle of least squares in its own plane.
+    """A circle of least squares in its own plane."""
 
-    Attributes
-    ----------
-    center_cam, normal_cam : (3,) array
-        mm; the normal points to the camera.
-    radius : float
-        mm.
-    radial, axial : (N,) array
-        Distances of the points from the circle in its plane, outwards, and from its
-        plane, mm.
-    angles : (N,) array
-        Where the points lie on it, rad: from the right of the camera against the
-        clock, as the camera sees them.
-    weights : (N, 3) array
-        Derivative of the radius by each point.
-    """
-
-    center_cam: FloatArray
-    normal_cam: FloatArray
-    radius: float
-    radial: FloatArray
-    axial: FloatArray
-    angles: FloatArray
-    weights: FloatArray
+    center_cam: FloatArray  # (3,), mm; the normal points to the camera
+    normal_cam: FloatArray  # (3,), mm; the normal points to the camera
+    radius: float  # mm
+    radial: FloatArray  # (N,), distances from the circle in its plane, outwards, mm
+    axial: FloatArray  # (N,), distances from its plane, mm
+    angles: FloatArray  # (N,), rad: from the right of the camera, anticlockwise
+    weights: FloatArray  # (N, 3), derivative of the radius by each point
 
     @property
     def roundness(self) -> float:
@@ -127,17 +111,10 @@ def _across(normal: FloatArray) -> FloatArray:
 
 
 class RingResiduals(NamedTuple):
-    """Derivatives of the residuals of points from a ring: radial, then out of plane.
+    """Derivatives of the residuals of points from a ring: radial, then out of plane."""
 
-    Attributes
-    ----------
-    by_points : (2 N, 3 N) array
-    by_ring : (2 N, 5) array
-        By its centre in its plane, its height and two tilts.
-    """
-
-    by_points: FloatArray
-    by_ring: FloatArray
+    by_points: FloatArray  # (2 N, 3 N)
+    by_ring: FloatArray  # (2 N, 5): centre in its plane, height, two tilts
 
 
 def ring_residuals(fit: CircleFit, n: int) -> RingResiduals:

@@ -96,30 +96,16 @@ class Scatter:
 
 @dataclass(frozen=True, eq=False)
 class FixedPoint(Found):
-    """A fixed point by N probed points.
-
-    Attributes
-    ----------
-    left_out : tuple of ProbedPoint
-        Far from all others: the pen was lifted.
-    nominal : Scatter or None
-        The same images with the nominal tip; None where it is not known.
-    uncertainty : (3,) array
-        U (k = 2) of the mean, mm.
-    expected_deviation : (3,) array
-        Standard deviation of the touches by all that is known of them, mm.
-    moved : (3,) array or None
-        Mean less the cone of the calibration, mm; None before another camera.
-    """
+    """A fixed point by N probed points."""
 
     touches: tuple[ProbedPoint, ...]
-    left_out: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]  # far from all others: the pen was lifted
     calibrated: Scatter
-    nominal: Scatter | None
-    uncertainty: FloatArray
-    expected_deviation: FloatArray
+    nominal: Scatter | None  # with the nominal tip, if known
+    uncertainty: FloatArray  # (3,), U (k = 2) of the mean, mm
+    expected_deviation: FloatArray  # (3,), of the touches, as is known, mm
     tip: TipEvidence
-    moved: FloatArray | None
+    moved: FloatArray | None  # (3,), mean less the calibration's cone, mm
 
     @property
     def probed(self) -> tuple[ProbedPoint, ...]:

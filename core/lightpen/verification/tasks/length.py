@@ -155,28 +155,16 @@ class Length(Found):
 
 
 class LengthOptions(TaskOptions, frozen=True, tag="length"):
-    """A length and its artefact.
+    """A length and its artefact."""
 
-    Attributes
-    ----------
-    length : float
-        At 20 degrees Celsius, mm; 0 if not known.
-    lengths : tuple of float
-        Of each place, mm, where they differ.
-    temperature, temperature_uncertainty : float
-        Of the artefact, degrees Celsius, and U (k = 2) of it, K.
-    expansion : float
-        Coefficient of thermal expansion, ppm/K; 0 if it does not expand.
-    """
-
-    length: Annotated[float, Meta(ge=0)] = 0.0
+    length: Annotated[float, Meta(ge=0)] = 0.0  # at 20 degrees, mm; 0 if unknown
     length_uncertainty: Annotated[float, Meta(ge=0)] = 0.0
     surface: Surface = Surface.GROOVE
     n_places: Annotated[int, Meta(ge=1, le=MOST_RUNS)] = 1
-    lengths: tuple[Annotated[float, Meta(gt=0)], ...] = ()
-    temperature: float = REFERENCE
-    temperature_uncertainty: Annotated[float, Meta(ge=0)] = 1.0
-    expansion: Annotated[float, Meta(ge=0)] = 0.0
+    lengths: tuple[Annotated[float, Meta(gt=0)], ...] = ()  # of each, if different
+    temperature: float = REFERENCE  # of the artefact, degrees Celsius
+    temperature_uncertainty: Annotated[float, Meta(ge=0)] = 1.0  # U (k = 2), K
+    expansion: Annotated[float, Meta(ge=0)] = 0.0  # thermal, ppm/K; 0 for none
     ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
 
     def certified(self, n_places: int) -> tuple[FloatArray, FloatArray]:

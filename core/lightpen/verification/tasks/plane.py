@@ -91,25 +91,13 @@ SIMULATED_RADII = 15.0, 30.0
 
 @dataclass(frozen=True, eq=False)
 class PlaneFit:
-    """A plane of least squares.
+    """A plane of least squares."""
 
-    Attributes
-    ----------
-    center_cam, normal_cam : (3,) array
-        Middle of the points, mm, and unit normal, towards the camera.
-    extent : float
-        Root mean square distance of the points from their middle, mm.
-    residuals : (N,) array
-        Distances of the points along the normal, mm.
-    weights : (N, N) array
-        Derivative of the residuals by moves of the points along the normal.
-    """
-
-    center_cam: FloatArray
-    normal_cam: FloatArray
-    extent: float
-    residuals: FloatArray
-    weights: FloatArray
+    center_cam: FloatArray  # (3,), middle of the points, mm
+    normal_cam: FloatArray  # (3,), unit normal, towards the camera
+    extent: float  # root mean square distance of the points from their middle, mm
+    residuals: FloatArray  # (N,), distances of the points along the normal, mm
+    weights: FloatArray  # (N, N), derivative of residuals by moves of the points
 
     @property
     def flatness(self) -> float:

@@ -39,22 +39,12 @@ NO_DRIFT = np.zeros(3)  # mm
 
 @dataclass(frozen=True, eq=False)
 class ProbingFrame:
-    """The pen in one image, or in simultaneous images.
+    """The pen in one image, or in simultaneous images."""
 
-    Attributes
-    ----------
-    name : str
-        File or frame.
-    pixels : (C, L, 2) array
-        Ellipse centres of the LEDs in each camera, px; NaN where one was not seen.
-    rotation, translation : (3, 3) and (3,) array
-        Rough cam_from_pen of the first camera, mm.
-    """
-
-    name: str
-    pixels: FloatArray
-    rotation: FloatArray
-    translation: FloatArray
+    name: str  # file or frame
+    pixels: FloatArray  # (C, L, 2), centres of the LEDs, px; NaN if not seen
+    rotation: FloatArray  # (3, 3), rough cam_from_pen of the first camera, mm
+    translation: FloatArray  # (3,), rough cam_from_pen of the first camera, mm
 
 
 @dataclass(frozen=True)
@@ -79,28 +69,14 @@ class StillFrames:
 
 @dataclass(frozen=True, eq=False)
 class ProbedPoint:
-    """A measured point.
+    """A measured point."""
 
-    Attributes
-    ----------
-    point_cam : (3,) array
-        Centre of the probe tip, or the surface that it touched, camera frame, mm.
-    noise : (3, 3) array
-        Covariance by what is its own, mm^2.
-    sensitivity : (3, q) array
-        Derivative by the parameters of the instrument.
-    rotation : (3, 3) array
-        Of cam_from_pen.
-    rms : float
-        Root mean square residual of an LED in them, px.
-    """
-
-    point_cam: FloatArray
-    noise: FloatArray
-    sensitivity: FloatArray
-    rotation: FloatArray
+    point_cam: FloatArray  # (3,), tip centre, or the surface touched, mm
+    noise: FloatArray  # (3, 3), covariance by what is its own, mm^2
+    sensitivity: FloatArray  # (3, q), derivative by the parameters of the instrument
+    rotation: FloatArray  # (3, 3), of cam_from_pen
     names: tuple[str, ...]
-    rms: float
+    rms: float  # root mean square residual of an LED in them, px
     rejected: tuple[RejectedFrame, ...] = ()
     approach_cam: FloatArray | None = None
 

@@ -51,38 +51,20 @@ class TaskOptions(Struct, frozen=True, tag_field="task"):
 
 @dataclass(frozen=True)
 class NumberOption:
-    """A number among the options of a task.
+    """A number among the options of a task."""
 
-    Attributes
-    ----------
-    name : str
-        Attribute of the options.
-    label : Message or None
-        None of one that the window does not show.
-    unknown : Message or None
-        Shown in place of 0, which then stands for a number that must be entered.
-    is_optional : bool
-        Whether the command line takes 0 for one that is not stated.
-    argument, help : str
-        Option of the command line; empty where it has none.
-    of_each_run : str
-        Attribute with the numbers of all runs; empty where they share one.
-    is_of_artefact : bool
-        Whether a task must be done again when it changes.
-    """
-
-    name: str
-    label: Message | None
+    name: str  # attribute of the options
+    label: Message | None  # None of one that the window does not show
     least: float = 0.0
     most: float = LONGEST
     unit: str = "mm"
     decimals: int = 4
-    unknown: Message | None = None
-    is_optional: bool = False
-    argument: str = ""
+    unknown: Message | None = None  # for 0: a number that must be entered
+    is_optional: bool = False  # the command line takes 0 if not stated
+    argument: str = ""  # of the command line; empty for none
     help: str = ""
-    of_each_run: str = ""
-    is_of_artefact: bool = True
+    of_each_run: str = ""  # numbers of all runs; empty if they share one
+    is_of_artefact: bool = True  # whether a task must be done again when it changes
 
 
 @dataclass(frozen=True)
@@ -135,25 +117,14 @@ BALL_OPTION = NumberOption(
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Under which points are measured and judged.
-
-    Attributes
-    ----------
-    ball_diameter : float or None
-        Of the tip, mm; needed where a surface and not a groove is touched.
-    nominal_tip : (3,) array or None
-        mm, to compare with.
-    cone_cam : (3,) array or None
-        Where the calibration had the same cone before the same camera, mm.
-    drift : (3,) array
-        Standard uncertainty of a point by a camera that moved meanwhile, mm.
-    """
+    """Under which points are measured and judged."""
 
     instrument: Instrument
     limits: VerificationLimits = field(default_factory=VerificationLimits)
-    ball_diameter: float | None = None
-    nominal_tip: FloatArray | None = None
-    cone_cam: FloatArray | None = None
+    ball_diameter: float | None = None  # mm; if a surface is touched
+    nominal_tip: FloatArray | None = None  # (3,), mm, to compare with
+    cone_cam: FloatArray | None = None  # (3,), of the calibration, if known, mm
+    # (3,), standard uncertainty of a point by a camera that moved, mm
     drift: FloatArray = field(default_factory=NO_DRIFT.copy)
 
 
@@ -236,23 +207,12 @@ def without_last(count: int, fault: Message) -> Screening:
 
 @dataclass(frozen=True)
 class HandGoal:
-    """Goal of a simulated operator for the next point.
+    """Goal of a simulated operator for the next point."""
 
-    Attributes
-    ----------
-    point : (3,) array or None
-        Where the tip goes, from the bottom of the cone, camera frame, mm; None into
-        the cone.
-    outwards : (3,) array or None
-        Unit normal of the surface there, on which the ball then rests.
-    tilt, direction : float
-        How the pen is held in the cone, rad.
-    """
-
-    point: FloatArray | None = None
-    tilt: float = 0.0
-    direction: float = 0.0
-    outwards: FloatArray | None = None
+    point: FloatArray | None = None  # (3,), from the cone's bottom, mm
+    tilt: float = 0.0  # how the pen is held in the cone, rad
+    direction: float = 0.0  # how the pen is held in the cone, rad
+    outwards: FloatArray | None = None  # (3,), normal of the surface there
 
 
 OptionsT = TypeVar("OptionsT", bound=TaskOptions)
@@ -261,85 +221,29 @@ FoundT = TypeVar("FoundT", bound=Found)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class VerificationTask(Generic[OptionsT, FoundT]):
-    """One task of a verification.
+    """One task of a verification."""
 
-    Attributes
-    ----------
-    kind : str
-        Name in records and settings.
-    summary, run_help : str
-        Help texts of the command and of one run.
-    title : Message
-        A noun.
-    purpose : Message
-        Instruction shown beside the check box of the task.
-    first, another, other_run : Message
-        Few words on what to do next: for the first point, for another one, and for the
-        first point of another run.
-    known : Message
-        Said of a point that was touched before.
-    limits : tuple of str
-        Fields of `VerificationLimits`.
-    measure : callable
-        Returns the result of all runs. Raises `CalibrationError` where the points do
-        not suffice.
-    entries : callable
-        Returns what of it is recorded.
-    tables : callable
-        Returns the figures of it.
-    figures_so_far : callable
-        Returns the figures while points are probed.
-    hand : callable
-        Returns what a simulated operator does, by options, run and point from 0.
-    n_points, n_runs : callable
-        Needed in a run; of runs.
-    fraction : callable
-        Returns how much of the run at hand is done; it ends at 1.
-    count : callable
-        Returns how much is probed of how much.
-    screen : callable
-        Returns which points count.
-    newness : callable
-        Returns the turn, rad, and the distance, mm, one of which makes a point a new
-        one; both 0 where it is the same again after the tip was lifted.
-    rule_of : callable
-        Returns the decision rule in words, by options and limits.
-    missing : callable
-        Returns what must be entered before, by options and ball diameter.
-    is_each_run_measured : bool
-        Whether a single run gives a result.
-    check : callable
-        Raises `CalibrationError` where the last of some runs does not suffice, if that
-        takes less than `measure`.
-    is_pooled : bool
-        Whether all images that are given to the command are one run.
-    counts_drift : bool
-        Whether U counts how far the camera moved.
-    scans : callable
-        Whether the pen slides along a surface in a run, from 0, after its first point.
-    shows_postures : bool
-        Whether the window shows how the pen was held.
-    """
-
-    kind: str
-    summary: str
-    run_help: str
-    title: Message
-    purpose: Message
-    first: Message
-    another: Message
-    known: Message
-    limits: tuple[str, ...]
+    kind: str  # name in records and settings
+    summary: str  # help text of the command
+    run_help: str  # help text of one run
+    title: Message  # a noun
+    purpose: Message  # instruction shown beside the check box of the task
+    first: Message  # what to do, in few words
+    another: Message  # likewise, for another point than the first
+    known: Message  # said of a point that was touched before
+    limits: tuple[str, ...]  # fields of `VerificationLimits`
+    # Raises `CalibrationError` where the points do not suffice.
     measure: Callable[[Runs, Conditions, OptionsT], FoundT]
-    entries: Callable[[FoundT, Instrument], dict[str, Any]]
+    entries: Callable[[FoundT, Instrument], dict[str, Any]]  # of the record
     tables: Callable[[FoundT, Conditions], tuple[ResultTable, ...]]
-    hand: Callable[[OptionsT, int, int], HandGoal]
+    hand: Callable[[OptionsT, int, int], HandGoal]  # by run and point from 0
     instruction: Callable[[OptionsT, TaskProgress], Message]
+    # Turn, rad, or distance, mm, that makes a point new; both 0 once lifted
     newness: Callable[[OptionsT], tuple[float, float]]
-    n_points: Callable[[OptionsT], int]
+    n_points: Callable[[OptionsT], int]  # of a run
     options: type[OptionsT]
     fields: tuple[Option, ...] = ()
-    other_run: Message | None = None
+    other_run: Message | None = None  # what to do for the first point of another
     n_runs: Callable[[OptionsT], int] = lambda _: 1
     figures_so_far: Callable[
         [OptionsT, TaskProgress, Conditions], tuple[ResultTable, ...]
@@ -349,17 +253,21 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     screen: Callable[[OptionsT, Conditions, TaskProgress], Screening] = (
         lambda options, conditions, progress: keep_all(len(progress.points))
     )
+    # What must be entered before, by options and ball diameter
     missing: Callable[[OptionsT, float | None], Message | None] = lambda *_: None
+    # The decision rule, by options and limits
     rule_of: Callable[[OptionsT, VerificationLimits], Message] = (
         lambda options, limits: rule_in_words(limits)
     )
+    # Whether the pen slides along a surface in a run, from 0
     scans: Callable[[OptionsT, int], bool] = lambda options, run: False
-    is_each_run_measured: bool = True
+    is_each_run_measured: bool = True  # whether a single run gives a result
+    # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, OptionsT], object] | None = None
-    is_pooled: bool = False
-    counts_drift: bool = True
+    is_pooled: bool = False  # all images of the command are one run
+    counts_drift: bool = True  # whether U counts how far the camera moved
     compares_nominal_tip: bool = False
-    shows_postures: bool = False
+    shows_postures: bool = False  # whether the window shows how the pen was held
 
     def __str__(self) -> str:
         return self.kind

@@ -52,25 +52,12 @@ LARGEST = 1.0  # mm: what shows no smaller error shows none
 
 @dataclass(frozen=True, eq=False)
 class TipEvidence:
-    """The evidence of points on the tip.
+    """The evidence of points on the tip."""
 
-    Attributes
-    ----------
-    change : (3,) array
-        The tip that the points require, less the given one, pen frame, mm.
-    covariance : (3, 3) array
-        Of the change of a correct tip, mm^2.
-    is_significant : bool
-        Whether it is more than chance.
-    detectable : float
-        Tip error that would be detected with 95 % probability along any direction, mm;
-        infinite where the postures show none.
-    """
-
-    change: FloatArray
-    covariance: FloatArray
-    is_significant: bool
-    detectable: float
+    change: FloatArray  # (3,), required tip less the given one, pen frame, mm
+    covariance: FloatArray  # (3, 3), of the change of a correct tip, mm^2
+    is_significant: bool  # whether it is more than chance
+    detectable: float  # found with 95 % probability, mm; inf if never
 
     @property
     def uncertainty(self) -> FloatArray:
