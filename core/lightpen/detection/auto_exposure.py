@@ -40,21 +40,13 @@ class ExposureState(StrEnum):
 
 @dataclass(frozen=True)
 class AutoExposure:
-    """An adjustment of exposure and gain, image by image.
+    """An adjustment of exposure and gain, image by image."""
 
-    Attributes
-    ----------
-    asked : CameraSettings
-        Exposure and gain to be set; images taken with others are passed over.
-    level : float
-        Brightest LED of the last image, as a fraction of full scale.
-    saturating : float
-        Least light (exposure in us, times gain) that saturated an LED so far.
-    """
-
+    # Exposure and gain to be set; images taken with others are passed over.
     asked: CameraSettings
     outcome: ExposureState = ExposureState.ADJUSTING
-    level: float = 0.0
+    level: float = 0.0  # brightest LED of the last image, as a fraction of full scale
+    # Least light (exposure in us, times gain) that saturated an LED so far.
     saturating: float = inf
     n_steps: int = 0
     n_blind: int = 0

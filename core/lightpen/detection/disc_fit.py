@@ -67,18 +67,11 @@ _Reals: TypeAlias = npt.NDArray[np.floating[Any]]  # of either precision
 
 
 class DiscFits(NamedTuple):
-    """Blurred discs fitted to windows.
+    """Blurred discs fitted to windows."""
 
-    Attributes
-    ----------
-    centers : (N, 2) array
-        px from the middle of the window.
-    sigmas : (N,) array
-        Standard deviation of one coordinate, px, larger for discs whose shape differs
-        from the others.
-    """
-
-    centers: FloatArray
+    centers: FloatArray  # (N, 2), px from the middle of the window
+    # (N,), standard deviation of one coordinate, px, larger for discs whose shape
+    # differs from the others.
     sigmas: FloatArray
 
 

@@ -70,46 +70,25 @@ DENT_SIGMAS = 3.5
 
 
 class EdgeFit(NamedTuple):
-    """The outline of a disc.
+    """The outline of a disc."""
 
-    Attributes
-    ----------
-    center : (2,) array
-        px.
-    shape : (2, 2) array
-        Covariance of the area, px^2; eigenvalues a^2 / 4 and b^2 / 4.
-    sigma : float
-        Standard deviation of the blur, px.
-    is_whole : bool
-        Whether no part of the rim lies off the ellipse, nor is missing.
-    """
-
-    center: FloatArray
+    center: FloatArray  # (2,), px
+    # (2, 2), covariance of the area, px^2; eigenvalues a^2 / 4 and b^2 / 4.
     shape: FloatArray
-    sigma: float
-    is_whole: bool
+    sigma: float  # standard deviation of the blur, px
+    is_whole: bool  # whether no part of the rim lies off the ellipse, nor is missing
 
 
 class EdgeStart(NamedTuple):
-    """Start values of an edge fit.
+    """Start values of an edge fit."""
 
-    Attributes
-    ----------
-    center : (2,) array
-        Of the region, px.
-    shape : (2, 2) array
-        Covariance of its area, px^2.
-    sigma : float or None
-        Blur of the same disc in the image before, px, whose shape this is then; None
-        for a disc seen for the first time.
-    offset : (2,) array
-        By how much the region's centre was off the disc's there, px, as by light
-        reflected beside it.
-    """
-
-    center: FloatArray
-    shape: FloatArray
+    center: FloatArray  # (2,), of the region, px
+    shape: FloatArray  # (2, 2), covariance of its area, px^2
+    # Blur of the same disc in the image before, px, whose shape this is then; None for
+    # a disc seen for the first time.
     sigma: float | None = None
+    # (2,), by how much the region's centre was off the disc's there, px, as by light
+    # reflected beside it.
     offset: FloatArray = np.zeros(2)
 
 
@@ -132,43 +111,25 @@ class _Ellipses(NamedTuple):
 
 
 class _Rays(NamedTuple):
-    """Intersections of rays with ellipses, and their derivatives by the parameters.
+    """Intersections of rays with ellipses, and their derivatives by the parameters."""
 
-    Attributes
-    ----------
-    feet, normals : (D, N, 2) array
-        Crossings, px, and the unit normals there, outwards.
-    moves : (D, N, 5) array
-        Movement along the normal, px, by the centre, px, and by relative changes of the
-        size and of the two ways to stretch it.
-    """
-
+    # `feet` and `normals`: (D, N, 2), crossings, px, and the unit normals there,
+    # outwards.
     feet: FloatArray
     normals: FloatArray
+    # (D, N, 5), movement along the normal, px, by the centre, px, and by relative
+    # changes of the size and of the two ways to stretch it.
     moves: FloatArray
 
 
 class _Edges(NamedTuple):
-    """Edge positions along rays.
+    """Edge positions along rays."""
 
-    Attributes
-    ----------
-    places : (D, N) array
-        Of the edge along the ray, px from its foot.
-    weights : (D, N) array
-    blurs : (D,) array
-        By how much the blur is wider than supposed, px.
-    are_dark : (D,) array
-        Whether rays meet no light inside the rim.
-    are_lit : (D,) array
-        Whether there is light inside at all.
-    """
-
-    places: FloatArray
-    weights: FloatArray
-    blurs: FloatArray
-    are_dark: BoolArray
-    are_lit: BoolArray
+    places: FloatArray  # (D, N), of the edge along the ray, px from its foot
+    weights: FloatArray  # (D, N)
+    blurs: FloatArray  # (D,), by how much the blur is wider than supposed, px
+    are_dark: BoolArray  # (D,), whether rays meet no light inside the rim
+    are_lit: BoolArray  # (D,), whether there is light inside at all
 
 
 def fit_edge(image: Image, center: FloatArray, shape: FloatArray) -> EdgeFit | None:

@@ -30,19 +30,11 @@ MAX_OFF_CENTER = 0.5  # radii, of a merged or cut spot from its LED
 
 
 class Followed(NamedTuple):
-    """Labels and pose of one image.
-
-    Attributes
-    ----------
-    seen : (L, 2) array
-        Ellipse centres of all labelled LEDs, px; NaN elsewhere.
-    poses : Poses
-        Of the image.
-    """
+    """Labels and pose of one image."""
 
     labels: Labels
-    seen: FloatArray
-    poses: Poses
+    seen: FloatArray  # (L, 2), ellipse centres of all labelled LEDs, px; NaN elsewhere
+    poses: Poses  # of the image
 
 
 def follow_spots(

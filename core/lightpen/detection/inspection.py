@@ -20,20 +20,13 @@ SAME_SPOT = 2.0  # px between the centres of a spot in two images, at least
 
 @dataclass(frozen=True)
 class Exposure:
-    """Brightness of the LEDs of an image.
+    """Brightness of the LEDs of an image."""
 
-    Attributes
-    ----------
-    peaks : tuple of float
-        Peak of each LED as a fraction of full scale; 1 if saturated.
-    are_leds : bool
-        False where no LED could be identified, and these are of all that is bright.
-    leds : tuple of int
-        Numbers of the LEDs, counted from 1; empty where no LED could be identified.
-    """
-
+    # Peak of each LED as a fraction of full scale; 1 if saturated.
     peaks: tuple[float, ...] = ()
+    # False where no LED could be identified, and these are of all that is bright.
     are_leds: bool = True
+    # Numbers of the LEDs, counted from 1; empty where no LED could be identified.
     leds: tuple[int, ...] = ()
 
     @property
@@ -67,21 +60,12 @@ class Exposure:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Exposure and focus of one image.
+    """Exposure and focus of one image."""
 
-    Attributes
-    ----------
-    exposure : Exposure
-        Exposure of the LEDs, or of all spots if no LED is labelled.
-    edge_width : float
-        Median width of their rims from dark to bright, px; NaN without any.
-    chosen : (N,) array of int
-        Which of the spots these are.
-    """
-
-    exposure: Exposure
+    exposure: Exposure  # exposure of the LEDs, or of all spots if no LED is labelled
+    # Median width of their rims from dark to bright, px; NaN without any.
     edge_width: float
-    chosen: IntArray
+    chosen: IntArray  # (N,), which of the spots these are
 
     @property
     def is_sharp(self) -> bool:
@@ -160,18 +144,10 @@ def lasting_light(images: Sequence[Spots]) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class StraySearch:
-    """A search for stray light, image by image, while the pen is covered.
+    """A search for stray light, image by image, while the pen is covered."""
 
-    Attributes
-    ----------
-    images : tuple of Spots
-        Bright spots in the images so far.
-    n_with_pen : int
-        Images of them that show the pen all the same.
-    """
-
-    images: tuple[Spots, ...] = ()
-    n_with_pen: int = 0
+    images: tuple[Spots, ...] = ()  # bright spots in the images so far
+    n_with_pen: int = 0  # images of them that show the pen all the same
 
     @property
     def is_over(self) -> bool:

@@ -38,52 +38,37 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Detections of the pen in N images.
+    """Detections of the pen in N images."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        File or frame, one an image.
-    pixels : (N, L, 2) array
-        Ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
-    seen_pixels : (N, L, 2) array
-        Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
-    areas : (N, L) array
-        Areas of the LEDs that are fit for use, not saturated and larger than their
-        blur, px^2; NaN elsewhere, or where only centres are given.
-    sigmas : (N, L) array
-        Standard deviation of one coordinate of each centre by its estimator, px, which
-        shows how LEDs of one image compare; NaN where an LED is not fit for use.
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Rough cam_from_pen, mm; NaN where there is none.
-    edge_widths : (N,) array
-        Mean width of the rims of the labelled LEDs from dark to bright, px; NaN where
-        none is labelled, or only centres are given.
-    lamps : (N, K, 2) array
-        Centres of K fixed lamps in view, px; NaN where an image does not show one, or
-        not the pen.
-    reasons : tuple of Reason
-        Why an image cannot be used; `Reason.NONE` where it can.
-    details : tuple of Message or None
-        More on that, where the reason does not say all.
-    advice : Message or None
-        Likely problem of the whole set; None if most images with spots are labelled.
-    interval_ms : float or None
-        Time from one image to the next; None if not known.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # file or frame, one an image
+    # (N, L, 2), ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
     pixels: FloatArray
+    # (N, L, 2), centres of all labelled LEDs, also of merged and cut ones, px; NaN
+    # elsewhere.
     seen_pixels: FloatArray
+    # (N, L), areas of the LEDs that are fit for use, not saturated and larger than
+    # their blur, px^2; NaN elsewhere, or where only centres are given.
     areas: FloatArray
+    # (N, L), standard deviation of one coordinate of each centre by its estimator, px,
+    # which shows how LEDs of one image compare; NaN where an LED is not fit for use.
     sigmas: FloatArray
+    # `rotations` and `translations`: (N, 3, 3) and (N, 3), rough cam_from_pen, mm; NaN
+    # where there is none.
     rotations: FloatArray
     translations: FloatArray
+    # (N,), mean width of the rims of the labelled LEDs from dark to bright, px; NaN
+    # where none is labelled, or only centres are given.
     edge_widths: FloatArray
+    # (N, K, 2), centres of K fixed lamps in view, px; NaN where an image does not show
+    # one, or not the pen.
     lamps: FloatArray
+    # Why an image cannot be used; `Reason.NONE` where it can.
     reasons: tuple[Reason, ...]
+    # More on that, where the reason does not say all.
     details: tuple[Message | None, ...]
+    # Likely problem of the whole set; None if most images with spots are labelled.
     advice: Message | None = None
+    # Time from one image to the next; None if not known.
     interval_ms: float | None = None
 
 

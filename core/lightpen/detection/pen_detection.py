@@ -42,45 +42,28 @@ _REASONS = {  # of sharp spots without a pose
 
 @dataclass(frozen=True, eq=False)
 class PenDetection:
-    """The pen in one image.
+    """The pen in one image."""
 
-    Attributes
-    ----------
-    pixels : (L, 2) array
-        Ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
-    seen_pixels : (L, 2) array
-        Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
-    reason : Reason
-        Why there is no pose; `Reason.NONE` where there is one.
-    rotation, translation : (3, 3) and (3,) array
-        cam_from_pen, mm; NaN without a pose.
-    cofactors : (6, 6) array
-        Covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm; NaN
-        without a pose or where it is a rough one.
-    sigma : float
-        Standard deviation of one image coordinate, by this image alone, px; NaN
-        likewise.
-    spots : Spots or None
-        All that was found in the image.
-    labels : Labels or None
-        Assignment of spots to LEDs.
-    others : tuple of PenDetection
-        Detections in the simultaneous images of the other cameras of a rig.
-    posed_by : int
-        Index of the camera that determines the pose, from 0.
-    """
-
+    # (L, 2), ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
     pixels: FloatArray
+    # (L, 2), centres of all labelled LEDs, also of merged and cut ones, px; NaN
+    # elsewhere.
     seen_pixels: FloatArray
-    reason: Reason
+    reason: Reason  # why there is no pose; `Reason.NONE` where there is one
+    # `rotation` and `translation`: (3, 3) and (3,), cam_from_pen, mm; NaN without a
+    # pose.
     rotation: FloatArray = field(default_factory=lambda: np.full((3, 3), np.nan))
     translation: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
+    # (6, 6), covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm; NaN
+    # without a pose or where it is a rough one.
     cofactors: FloatArray = field(default_factory=lambda: np.full((6, 6), np.nan))
+    # Standard deviation of one image coordinate, by this image alone, px; NaN likewise.
     sigma: float = float("nan")
-    spots: Spots | None = None
-    labels: Labels | None = None
+    spots: Spots | None = None  # all that was found in the image
+    labels: Labels | None = None  # assignment of spots to LEDs
+    # Detections in the simultaneous images of the other cameras of a rig.
     others: tuple["PenDetection", ...] = ()
-    posed_by: int = 0
+    posed_by: int = 0  # index of the camera that determines the pose, from 0
 
     @property
     def rig_pixels(self) -> FloatArray:

@@ -47,30 +47,19 @@ NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses ``cam_from_pen`` of N images.
+    """Poses ``cam_from_pen`` of N images."""
 
-    Attributes
-    ----------
-    rotations : (N, 3, 3) array
-    translations : (N, 3) array
-        mm.
-    covariances : (N, 6, 6) array
-        Of (theta, dt) in rad and mm, for the noise ``sigma``, or for the image's own
-        where that is clearly larger.
-    residuals : (N, L, 2) array
-        Observed minus modelled centres, px; NaN where an LED was not seen.
-    weights : (N, L) array
-        Weight of each LED under the robust loss, 0 to 1; 0 where not seen.
-    sigma : float
-        Standard deviation of one image coordinate, px, estimated over all images; of
-        the most exact LEDs, where they differ.
-    """
-
-    rotations: FloatArray
-    translations: FloatArray
+    rotations: FloatArray  # (N, 3, 3)
+    translations: FloatArray  # (N, 3), mm
+    # (N, 6, 6), of (theta, dt) in rad and mm, for the noise ``sigma``, or for the
+    # image's own where that is clearly larger.
     covariances: FloatArray
+    # (N, L, 2), observed minus modelled centres, px; NaN where an LED was not seen.
     residuals: FloatArray
+    # (N, L), weight of each LED under the robust loss, 0 to 1; 0 where not seen.
     weights: FloatArray
+    # Standard deviation of one image coordinate, px, estimated over all images; of the
+    # most exact LEDs, where they differ.
     sigma: float
 
     @property

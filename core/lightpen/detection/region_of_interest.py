@@ -9,21 +9,13 @@ from lightpen.model.pen import Pen
 
 @dataclass(frozen=True, eq=False)
 class RegionOfInterest:
-    """Camera, pen and mask for the detection in images.
+    """Camera, pen and mask for the detection in images."""
 
-    Attributes
-    ----------
-    camera : Camera or None
-        Intrinsics, if they are known.
-    mask : (M, 3) array or None
-        Circles of stray light to leave out: centre x, y and radius, px.
-    others : tuple of RegionOfInterest
-        Regions in the images of the other cameras of a rig.
-    """
-
-    camera: Camera | None = None
+    camera: Camera | None = None  # intrinsics, if they are known
     pen: Pen | None = None
+    # (M, 3), circles of stray light to leave out: centre x, y and radius, px
     mask: FloatArray | None = None
+    # Regions in the images of the other cameras of a rig.
     others: tuple["RegionOfInterest", ...] = ()
 
     @property

@@ -58,38 +58,18 @@ LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
 
 @dataclass(frozen=True, eq=False)
 class SmallSpots:
-    """LEDs of a few pixels.
+    """LEDs of a few pixels."""
 
-    Attributes
-    ----------
-    centers : (N, 2) array
-        px.
-    shapes : (N, 2, 2) array
-        Covariance of the area at half level, px^2.
-    radii : (N,) array
-        At half level, px.
-    peaks : (N,) array
-        Above the local background, digital numbers.
-    sigmas : (N,) array
-        Standard deviation of one coordinate of each centre, px.
-    noises : (N,) array
-        Standard deviation of a pixel beside the centre, digital numbers.
-    are_whole : (N,) array
-        Whether the LED is neither hidden nor merged.
-    saturated : (N,) array
-        Whether the light is clipped.
-    alone : (N,) array
-        Whether it is dark all round, so that the outline shows a whole LED.
-    """
-
-    centers: FloatArray
-    shapes: FloatArray
-    radii: FloatArray
-    peaks: FloatArray
-    sigmas: FloatArray
+    centers: FloatArray  # (N, 2), px
+    shapes: FloatArray  # (N, 2, 2), covariance of the area at half level, px^2
+    radii: FloatArray  # (N,), at half level, px
+    peaks: FloatArray  # (N,), above the local background, digital numbers
+    sigmas: FloatArray  # (N,), standard deviation of one coordinate of each centre, px
+    # (N,), standard deviation of a pixel beside the centre, digital numbers.
     noises: FloatArray
-    are_whole: BoolArray
-    saturated: BoolArray
+    are_whole: BoolArray  # (N,), whether the LED is neither hidden nor merged
+    saturated: BoolArray  # (N,), whether the light is clipped
+    # (N,), whether it is dark all round, so that the outline shows a whole LED.
     alone: BoolArray
 
 

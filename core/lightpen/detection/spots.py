@@ -98,45 +98,28 @@ class SpotFlaw(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """The candidate spots of an image, brightest first.
+    """The candidate spots of an image, brightest first."""
 
-    Attributes
-    ----------
-    centers : (N, 2) array
-        Centres, px.
-    shapes : (N, 2, 2) array
-        Covariance of the area of each spot, px^2; a full ellipse with semi-axes
-        a and b has the eigenvalues a^2 / 4 and b^2 / 4.
-    areas : (N,) array
-        Area at half level, px^2.
-    contrasts : (N,) array
-        Peak above the local background, fraction of the full range.
-    edge_widths : (N,) array
-        Width of the rim from dark to bright, px; blur widens it.
-    flaws : (N,) array
-        `SpotFlaw` of each spot.
-    sigmas : (N,) array
-        Standard deviation of one coordinate of each centre, px, by the estimator that
-        found it; `EXACT_SIGMA` for discs that are wide enough to have a rim.
-    offsets : (N, 2) array
-        By how much the centre of the bright region is off that of the disc, px.
-    has_smears : bool
-        Whether there is light, but no spot: discs moved by many times their size during
-        the exposure leave streaks, a dark image leaves nothing.
-    tiny_width : float
-        Usual width of spots that are too small for a centre, px, where most are; else
-        NaN.
-    """
-
-    centers: FloatArray
+    centers: FloatArray  # (N, 2), centres, px
+    # (N, 2, 2), covariance of the area of each spot, px^2; a full ellipse with semi-
+    # axes a and b has the eigenvalues a^2 / 4 and b^2 / 4.
     shapes: FloatArray
-    areas: FloatArray
+    areas: FloatArray  # (N,), area at half level, px^2
+    # (N,), peak above the local background, fraction of the full range.
     contrasts: FloatArray
+    # (N,), width of the rim from dark to bright, px; blur widens it.
     edge_widths: FloatArray
-    flaws: IntArray
+    flaws: IntArray  # (N,), `SpotFlaw` of each spot
+    # (N,), standard deviation of one coordinate of each centre, px, by the estimator
+    # that found it; `EXACT_SIGMA` for discs that are wide enough to have a rim.
     sigmas: FloatArray
+    # (N, 2), by how much the centre of the bright region is off that of the disc, px
     offsets: FloatArray
+    # Whether there is light, but no spot: discs moved by many times their size during
+    # the exposure leave streaks, a dark image leaves nothing.
     has_smears: bool = False
+    # Usual width of spots that are too small for a centre, px, where most are; else
+    # NaN.
     tiny_width: float = float("nan")
 
     @classmethod

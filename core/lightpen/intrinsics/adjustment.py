@@ -63,17 +63,11 @@ class _System(NamedTuple):
 
 
 class LinearSight(NamedTuple):
-    """Points of one camera and their derivatives, 0 where not seen.
+    """Points of one camera and their derivatives, 0 where not seen."""
 
-    Attributes
-    ----------
-    residuals : (V, N, 2) array
-        px.
-    shared, own, by_board : (V, N, 2, p), (V, N, 2, 6) and (V, N, 2, 3) array
-        By all but the poses, by the pose of the view, and by the points on the board.
-    """
-
-    residuals: FloatArray
+    residuals: FloatArray  # (V, N, 2), px
+    # `shared`, `own` and `by_board`: (V, N, 2, p) and (V, N, 2, 6) and (V, N, 2, 3), by
+    # all but the poses, by the pose of the view, and by the points on the board.
     shared: FloatArray
     own: FloatArray
     by_board: FloatArray

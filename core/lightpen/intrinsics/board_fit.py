@@ -15,55 +15,34 @@ N_POSE, N_SHAPE = 6, 5
 
 @dataclass(frozen=True, eq=False)
 class BoardState:
-    """Parameters of the projected points of the views.
+    """Parameters of the projected points of the views."""
 
-    Attributes
-    ----------
-    cameras : tuple of Camera
-        C of them.
-    rotations, translations : (C, 3, 3) and (C, 3) array
-        Of cam_from_rig, mm.
-    poses : BoardPoses
-        Poses of rig_from_board.
-    shape : (5,) array
-        Stretch, shear, and three bends, mm.
-    offsets : (3,) or (N, 3) array
-        Of the single points from where shape has them, mm.
-    """
-
-    cameras: tuple[Camera, ...]
+    cameras: tuple[Camera, ...]  # C of them
+    # `rotations` and `translations`: (C, 3, 3) and (C, 3), of cam_from_rig, mm
     rotations: FloatArray
     translations: FloatArray
-    poses: BoardPoses
-    shape: FloatArray
+    poses: BoardPoses  # poses of rig_from_board
+    shape: FloatArray  # (5,), stretch, shear, and three bends, mm
+    # (3,) and (N, 3), of the single points from where shape has them, mm
     offsets: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
 class BoardFit:
-    """A fitted state with its covariance.
-
-    Attributes
-    ----------
-    residuals : (V, C, N, 2) array
-        Observed minus modelled, px; NaN where not seen.
-    sigma : float
-        Noise of one coordinate, px.
-    information, scores : (V, p, p) and (V, p) array
-        Of each view about all but its pose, for points of 1 px noise; their gradient.
-    prior : (p, p) array
-        Information of the priors.
-    covariance : (p, p) array
-        Of the unknowns but the poses; of `adjust_board` by independent noise alone.
-    """
+    """A fitted state with its covariance."""
 
     board: Board
     state: BoardState
+    # (V, C, N, 2), observed minus modelled, px; NaN where not seen.
     residuals: FloatArray
-    sigma: float
+    sigma: float  # noise of one coordinate, px
+    # `information` and `scores`: (V, p, p) and (V, p), of each view about all but its
+    # pose, for points of 1 px noise; their gradient.
     information: FloatArray
     scores: FloatArray
-    prior: FloatArray
+    prior: FloatArray  # (p, p), information of the priors
+    # (p, p), of the unknowns but the poses; of `adjust_board` by independent noise
+    # alone.
     covariance: FloatArray
 
     @property

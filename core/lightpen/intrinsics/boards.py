@@ -63,28 +63,20 @@ class BoardKind(StrEnum):
 
 @dataclass(frozen=True)
 class Board:
-    """A flat board with known points.
-
-    Attributes
-    ----------
-    columns, rows : int
-        Inner corners of a chessboard, squares of a ChArUco board, markers, or circles.
-    pitch : float
-        Side of a square, side of a marker of a board of markers alone, or distance of
-        the circles (half of that within a row, if they are asymmetric), mm.
-    detail : float
-        Side of a marker of a ChArUco board, gap between markers, or diameter of the
-        circles, mm; 0 of a chessboard.
-    dictionary : str
-        Marker dictionary, by its OpenCV name; empty without markers.
-    """
+    """A flat board with known points."""
 
     kind: BoardKind
+    # `columns` and `rows`: inner corners of a chessboard, squares of a ChArUco board,
+    # markers, or circles.
     columns: int
     rows: int
+    # Side of a square, side of a marker of a board of markers alone, or distance of the
+    # circles (half of that within a row, if they are asymmetric), mm
     pitch: float
+    # Side of a marker of a ChArUco board, gap between markers, or diameter of the
+    # circles, mm; 0 of a chessboard.
     detail: float = 0.0
-    dictionary: str = ""
+    dictionary: str = ""  # marker dictionary, by its OpenCV name; empty without markers
 
     @property
     def name(self) -> str:

@@ -78,64 +78,34 @@ UNEVEN_VIEWS = 2.0  # times the noise: a smooth error of views that is no blur
 
 @dataclass(frozen=True, eq=False)
 class ViewHalves:
-    """Split-half check: odd views against even ones.
+    """Split-half check: odd views against even ones."""
 
-    Attributes
-    ----------
-    difference : (4,) array
-        Of fx fy cx cy, px.
-    expanded_uncertainty : (4,) array
-        U (k = 2) of it.
-    in_image : float
-        Distance that the two put between the images of one point, px rms.
-    detectable_zoom : float
-        Least zoom from the first half in time to the second that is found, relative.
-    """
-
-    difference: FloatArray
-    expanded_uncertainty: FloatArray
-    in_image: float
+    difference: FloatArray  # (4,), of fx fy cx cy, px
+    expanded_uncertainty: FloatArray  # (4,), U (k = 2) of it
+    in_image: float  # distance that the two put between the images of one point, px rms
+    # Least zoom from the first half in time to the second that is found, relative.
     detectable_zoom: float
 
 
 @dataclass(frozen=True, eq=False)
 class CameraCalibration:
-    """Intrinsics of a camera.
-
-    Attributes
-    ----------
-    views : Views
-        Views with a detected board; excluded points are NaN.
-    left_out : tuple of str
-        Views that fit no other.
-    n_points_left_out : int
-        Excluded points in the accepted views.
-    held_out : (V,) array
-        Distance of the points of each view by the others, px rms.
-    effects : MixedFit
-        The final fit, with what board, lens and single views do beside the model.
-    duplicates : tuple of str
-        Views in which the board is where it was in another.
-    change : CameraChange or None
-        Of the camera in time, or of every second view, too small to refuse the set; U
-        contains it.
-    halves : ViewHalves or None
-        None where there are too few views.
-    remarks : tuple of Message
-        Warnings.
-    """
+    """Intrinsics of a camera."""
 
     camera: Camera
-    views: Views
+    views: Views  # views with a detected board; excluded points are NaN
+    # The final fit, with what board, lens and single views do beside the model.
     effects: MixedFit
-    duplicates: tuple[str, ...]
-    left_out: tuple[str, ...]
-    n_points_left_out: int
+    duplicates: tuple[str, ...]  # views in which the board is where it was in another
+    left_out: tuple[str, ...]  # views that fit no other
+    n_points_left_out: int  # excluded points in the accepted views
     choice: Choice
+    # (V,), distance of the points of each view by the others, px rms.
     held_out: FloatArray
+    # Of the camera in time, or of every second view, too small to refuse the set; U
+    # contains it.
     change: CameraChange | None
-    halves: ViewHalves | None
-    remarks: tuple[Message, ...]
+    halves: ViewHalves | None  # None where there are too few views
+    remarks: tuple[Message, ...]  # warnings
 
     @property
     def adjustment(self) -> BoardFit:

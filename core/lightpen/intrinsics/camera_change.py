@@ -19,21 +19,12 @@ LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 
 @dataclass(frozen=True)
 class CameraChange:
-    """A camera that changed while its views were taken.
+    """A camera that changed while its views were taken."""
 
-    Attributes
-    ----------
-    name : str
-        Of the first view after it; empty if it continued gradually.
-    difference : (4 + n,) array
-        Of the intrinsics, after less before, or last less first.
-    in_image : float
-        Distance that it puts between the images of one point, px rms.
-    """
-
-    name: str
+    name: str  # of the first view after it; empty if it continued gradually
+    # (4 + n,), of the intrinsics, after less before, or last less first.
     difference: FloatArray
-    in_image: float
+    in_image: float  # distance that it puts between the images of one point, px rms
 
 
 def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:

@@ -35,23 +35,14 @@ class BoardVisibility(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Capture:
-    """Captured views, and the last detection of the board.
-
-    Attributes
-    ----------
-    kept : tuple of (N, 2) array
-        px.
-    points : (N, 2) array or None
-        In the newest image; None where it is not seen.
-    still_since : float
-        s, on the clock of the images.
-    """
+    """Captured views, and the last detection of the board."""
 
     board: Board
     image_size: tuple[int, int]
-    kept: tuple[FloatArray, ...] = ()
+    kept: tuple[FloatArray, ...] = ()  # each (N, 2), px
+    # (N, 2), in the newest image; None where it is not seen.
     points: FloatArray | None = None
-    still_since: float = 0.0
+    still_since: float = 0.0  # s, on the clock of the images
     sight: BoardVisibility = BoardVisibility.UNSEEN
 
     def after(self, points: FloatArray | None, time_s: float) -> "Capture":

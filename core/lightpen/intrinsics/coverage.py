@@ -29,23 +29,12 @@ SIDE_NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class BoardCoverage:
-    """Coverage by views of a board.
+    """Coverage by views of a board."""
 
-    Attributes
-    ----------
-    cells : (6, 8) array of int
-        Points seen in each part of the image.
-    sizes : (V,) array
-        Side of a square of the board's area in the image, px.
-    tilts : (V,) array
-        Between the board and the image, rad.
-    tilted : (4,) array of int
-        Views in which the board faces to the right, down, to the left and up.
-    """
-
-    cells: IntArray
-    sizes: FloatArray
-    tilts: FloatArray
+    cells: IntArray  # (6, 8), points seen in each part of the image
+    sizes: FloatArray  # (V,), side of a square of the board's area in the image, px
+    tilts: FloatArray  # (V,), between the board and the image, rad
+    # (4,), views in which the board faces to the right, down, to the left and up.
     tilted: IntArray
 
     @property

@@ -40,26 +40,17 @@ MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
 @dataclass(frozen=True)
 class Choice:
-    """Choice of the lens model.
+    """Choice of the lens model."""
 
-    Attributes
-    ----------
-    n_coefficients : int
-        5 or 8, or 4 of a fisheye.
-    held_out : dict of int to float
-        Distance of points in views that were not fitted to, px rms, with each number of
-        coefficients that the views show.
-    pull : float or None
-        Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they
-        folded the image; None where they did not.
-    apart : float
-        Between images of the chosen model and of the other one of a wide lens that is
-        near to the views, px rms over the image: mostly where no view shows the board.
-    """
-
-    n_coefficients: int
+    n_coefficients: int  # 5 or 8, or 4 of a fisheye
+    # Distance of points in views that were not fitted to, px rms, with each number of
+    # coefficients that the views show.
     held_out: dict[int, float]
+    # Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they folded
+    # the image; None where they did not.
     pull: float | None = None
+    # Between images of the chosen model and of the other one of a wide lens that is
+    # near to the views, px rms over the image: mostly where no view shows the board.
     apart: float = 0.0
 
     @property

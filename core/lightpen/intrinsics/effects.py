@@ -22,75 +22,45 @@ from lightpen.model.lens_field import LensField
 
 @dataclass(frozen=True)
 class VarianceComponents:
-    """Standard deviations of the random effects.
+    """Standard deviations of the random effects."""
 
-    Attributes
-    ----------
-    noise : float
-        Of one coordinate, px; of several cameras the geometric mean.
-    in_plane, out_of_plane : float
-        Of the points of the board, mm.
-    view : float
-        Of the smooth error of a view, px.
-    between : float
-        Of the turns, and of the shifts, of the board in a view of a further camera, px
-        rms; alike in all directions.
-    lenses : tuple of float
-        Amplitude of the residual field of each camera, px.
-    lines : float
-        Of the mean offset of a column of points along the rows, or of a row along the
-        columns, mm; by independent points it is that of a point by the root of their
-        number.
-    """
-
-    noise: float
+    noise: float  # of one coordinate, px; of several cameras the geometric mean
+    # `in_plane` and `out_of_plane`: of the points of the board, mm
     in_plane: float
     out_of_plane: float
-    view: float
+    view: float  # of the smooth error of a view, px
+    # Of the turns, and of the shifts, of the board in a view of a further camera, px
+    # rms; alike in all directions.
     between: float
-    lenses: tuple[float, ...]
+    lenses: tuple[float, ...]  # amplitude of the residual field of each camera, px
+    # Of the mean offset of a column of points along the rows, or of a row along the
+    # columns, mm; by independent points it is that of a point by the root of their
+    # number.
     lines: float
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Normal equations for points of 1 px noise.
+    """Normal equations for points of 1 px noise."""
 
-    Attributes
-    ----------
-    normal : (p, p) array
-    right : (V, p) array
-    columns : (V, p, s) array
-        Of the normal equations of each view, by the first s unknowns.
-    cross : (V, p, o) array
-    own_own, own_right : (V, o, o) and (V, o) array
-        Of the pose and the smooth errors of each view.
-    n_between : int
-        Number of these that cameras differ by; they are the last.
-    squares : float
-        Of the residuals, px^2.
-    n : int
-        Number of coordinates.
-    shared_prior, prior_pull : (s, s) and (p,) array
-        Information of the priors of the board adjustment, and their gradient.
-    fields : tuple of LensField
-        Of amplitude 1, one a camera.
-    lines : (3 N, g) array
-        Orthonormal offsets of whole rows and columns of the board.
-    """
-
-    normal: FloatArray
-    right: FloatArray
+    normal: FloatArray  # (p, p)
+    right: FloatArray  # (V, p)
+    # (V, p, s), of the normal equations of each view, by the first s unknowns.
     columns: FloatArray
-    cross: FloatArray
+    cross: FloatArray  # (V, p, o)
+    # `own_own` and `own_right`: (V, o, o) and (V, o), of the pose and the smooth errors
+    # of each view.
     own_own: FloatArray
     own_right: FloatArray
-    n_between: int
-    squares: float
-    n: int
+    n_between: int  # number of these that cameras differ by; they are the last
+    squares: float  # of the residuals, px^2
+    n: int  # number of coordinates
+    # `shared_prior` and `prior_pull`: (s, s) and (p,), information of the priors of the
+    # board adjustment, and their gradient.
     shared_prior: FloatArray
     prior_pull: FloatArray
-    fields: tuple[LensField, ...]
+    fields: tuple[LensField, ...]  # of amplitude 1, one a camera
+    # (3 N, g), orthonormal offsets of whole rows and columns of the board.
     lines: FloatArray
     n_points: int
 

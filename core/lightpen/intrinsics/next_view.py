@@ -31,18 +31,11 @@ TURNS = ((0, 0), (TILT, 0), (-TILT, 0), (0, TILT), (0, -TILT), (TILT, TILT))
 
 @dataclass(frozen=True, eq=False)
 class SuggestedView:
-    """Suggested pose of the board.
+    """Suggested pose of the board."""
 
-    Attributes
-    ----------
-    outline : (4, 2) array
-        Of its points in the image, px, from its first corner on.
-    gain : float
-        Share of the uncertainty that it takes away.
-    """
-
+    # (4, 2), of its points in the image, px, from its first corner on.
     outline: FloatArray
-    gain: float
+    gain: float  # share of the uncertainty that it takes away
 
 
 def choose_next_view(adjustment: BoardFit, board: Board) -> SuggestedView:

@@ -33,16 +33,10 @@ OTHER_LAYOUT = {
 
 @dataclass(frozen=True, eq=False)
 class ObservedBoard:
-    """Views of a board.
-
-    Attributes
-    ----------
-    unseen : tuple of str
-        Names of the images, or moments, in which none did.
-    """
+    """Views of a board."""
 
     views: Views
-    unseen: tuple[str, ...]
+    unseen: tuple[str, ...]  # names of the images, or moments, in which none did
 
 
 @dataclass(frozen=True, eq=False)

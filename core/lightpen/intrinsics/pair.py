@@ -55,22 +55,13 @@ LEAST_LAG = 0.02  # of the time between two views
 
 @dataclass(frozen=True)
 class PairLag:
-    """Time lag of the second camera, if the views are a sequence.
+    """Time lag of the second camera, if the views are a sequence."""
 
-    Attributes
-    ----------
-    views, sigma : float
-        Lag in view intervals, and its standard deviation.
-    interval_ms : float or None
-        Interval between two views, if known.
-    px_per_ms : float
-        What a millisecond costs at the pen's speed of 100 mm/s.
-    """
-
+    # `views` and `sigma`: lag in view intervals, and its standard deviation.
     views: float
     sigma: float
-    interval_ms: float | None
-    px_per_ms: float
+    interval_ms: float | None  # interval between two views, if known
+    px_per_ms: float  # what a millisecond costs at the pen's speed of 100 mm/s
 
     @property
     def is_significant(self) -> bool:

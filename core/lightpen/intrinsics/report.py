@@ -25,19 +25,11 @@ COLUMNS, ROWS = 4, 3
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """Residuals of one camera in 3 rows and 4 columns.
+    """Residuals of one camera in 3 rows and 4 columns."""
 
-    Attributes
-    ----------
-    n_points : (3, 4) array of int
-    rms : (3, 4) array
-        px; NaN without points.
-    means : (3, 4, 2) array
-        px; a lens that the model does not fit pulls its regions to some side.
-    """
-
-    n_points: IntArray
-    rms: FloatArray
+    n_points: IntArray  # (3, 4)
+    rms: FloatArray  # (3, 4), px; NaN without points
+    # (3, 4, 2), px; a lens that the model does not fit pulls its regions to some side.
     means: FloatArray
 
 

@@ -17,24 +17,15 @@ LARGEST_U = 0.05  # of the length
 class ScaleCheck:
     """A length that was measured.
 
-    Attributes
-    ----------
-    stated : float
-        As the description of the board has it: mm, or pixels of a screen.
-    measured : float
-        mm.
-    expanded_uncertainty : float
-        U (k = 2), mm.
-
     Raises
     ------
     UsageError
         The lengths are not above 0, or U is more than a twentieth of the length.
     """
 
-    stated: float
-    measured: float
-    expanded_uncertainty: float
+    stated: float  # as the description of the board has it: mm, or pixels of a screen
+    measured: float  # mm
+    expanded_uncertainty: float  # U (k = 2), mm
 
     def __post_init__(self) -> None:
         values = (self.stated, self.measured, self.expanded_uncertainty)

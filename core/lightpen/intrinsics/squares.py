@@ -37,19 +37,12 @@ class _Beyond(Enum):
 
 @dataclass(frozen=True)
 class CornerCount:
-    """Number of visible inner corners of a chessboard.
+    """Number of visible inner corners of a chessboard."""
 
-    Attributes
-    ----------
-    columns, rows : int
-        The more first.
-    is_whole : bool
-        Whether the rim is seen all round; else there may be more.
-    """
-
+    # `columns` and `rows`: the more first.
     columns: int
     rows: int
-    is_whole: bool
+    is_whole: bool  # whether the rim is seen all round; else there may be more
 
 
 def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:

@@ -22,17 +22,10 @@ COLUMNS, ROWS = 9, 7
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyMap:
-    """Standard uncertainty of projections over the image.
+    """Standard uncertainty of projections over the image."""
 
-    Attributes
-    ----------
-    pixels : (7, 9, 2) array
-        Where in the image, px.
-    sigmas : (7, 9) array
-        Along the worst direction there, px; NaN where a fisheye sees nothing.
-    """
-
-    pixels: FloatArray
+    pixels: FloatArray  # (7, 9, 2), where in the image, px
+    # (7, 9), along the worst direction there, px; NaN where a fisheye sees nothing.
     sigmas: FloatArray
 
     @property

@@ -56,37 +56,26 @@ SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two paramet
 class MixedFit:
     """A fitted board with its random effects.
 
-    Attributes
-    ----------
-    adjustment : BoardFit
-        At the estimate, with the covariance by all effects; its residuals are without
-        the fields.
-    repeatability : (p, p) array
-        Share of the covariance by noise and by errors of single views, which another
-        set of views draws again.
-    fields : tuple of LensField or None
-        Of each camera; None where the likelihood does not support one.
-    field_gain : float
-        Twice the gain of log-likelihood by the fields.
-    clustering : float
-        Variance of the views' scores over what the components make of it [1]_; the
-        covariance is multiplied by it where it is above 1.
-    scores : ViewScores
-        Of each view, for tests of groups of views.
-
     References
     ----------
     .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
        linear models", Biometrika 73 (1986) 13-22.
     """
 
+    # At the estimate, with the covariance by all effects; its residuals are without the
+    # fields.
     adjustment: BoardFit
     components: VarianceComponents
+    # (p, p), share of the covariance by noise and by errors of single views, which
+    # another set of views draws again.
     repeatability: FloatArray
+    # Of each camera; None where the likelihood does not support one.
     fields: tuple[LensField | None, ...]
-    field_gain: float
+    field_gain: float  # twice the gain of log-likelihood by the fields
+    # Variance of the views' scores over what the components make of it [1]_; the
+    # covariance is multiplied by it where it is above 1.
     clustering: float
-    scores: ViewScores
+    scores: ViewScores  # of each view, for tests of groups of views
 
 
 class _Reduced(NamedTuple):

@@ -9,19 +9,11 @@ from lightpen.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ViewScores:
-    """Scores (gradients) of the views for all parameters but poses and effects.
+    """Scores (gradients) of the views for all parameters but poses and effects."""
 
-    Attributes
-    ----------
-    scores : (V, s) array
-    information : (V, q, s) array
-        Columns of the information matrix of each view.
-    covariance : (q, q) array
-        Of these parameters and the effects of board and lens, by all views.
-    """
-
-    scores: FloatArray
-    information: FloatArray
+    scores: FloatArray  # (V, s)
+    information: FloatArray  # (V, q, s), columns of the information matrix of each view
+    # (q, q), of these parameters and the effects of board and lens, by all views.
     covariance: FloatArray
 
     def change(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -17,42 +17,23 @@ def listed_names(names: tuple[str, ...]) -> str:
 
 @dataclass(frozen=True)
 class BoardTolerances:
-    """Standard uncertainties of a board's geometry, priors of the adjustment.
+    """Standard uncertainties of a board's geometry, priors of the adjustment."""
 
-    Attributes
-    ----------
-    flatness : float
-        By how much its corners bend away from the plane, mm.
-    squareness : float
-        Relative tolerance of the aspect ratio and of the right angle: printers stretch
-        the paper along its path.
-    scale : float
-        Relative tolerance of the scale. No view determines it.
-    """
-
-    flatness: float = 0.1
+    flatness: float = 0.1  # by how much its corners bend away from the plane, mm
+    # Relative tolerance of the aspect ratio and of the right angle: printers stretch
+    # the paper along its path.
     squareness: float = 5e-4
-    scale: float = 1e-4
+    scale: float = 1e-4  # Relative tolerance of the scale. No view determines it.
 
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """The points of a board in V views of C cameras.
-
-    Attributes
-    ----------
-    names : tuple of str
-        One a view.
-    pixels : (V, C, N, 2) array
-        px; NaN where a point was not seen.
-    image_sizes : tuple of tuple of int
-        Width and height, one a camera, px.
-    """
+    """The points of a board in V views of C cameras."""
 
     board: Board
-    names: tuple[str, ...]
-    pixels: FloatArray
-    image_sizes: tuple[tuple[int, int], ...]
+    names: tuple[str, ...]  # one a view
+    pixels: FloatArray  # (V, C, N, 2), px; NaN where a point was not seen
+    image_sizes: tuple[tuple[int, int], ...]  # width and height, one a camera, px
 
     @property
     def n_views(self) -> int:

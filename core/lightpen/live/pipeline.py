@@ -52,22 +52,13 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class LiveImage:
-    """An image with its detections.
-
-    Attributes
-    ----------
-    spots : Spots
-        All bright spots that are not masked.
-    detection : PenDetection or None
-        None without intrinsics or pen, or if the image is not of the camera's size.
-    camera : int
-        Index of the camera.
-    """
+    """An image with its detections."""
 
     frame: Frame
-    spots: Spots
+    spots: Spots  # all bright spots that are not masked
+    # None without intrinsics or pen, or if the image is not of the camera's size.
     detection: PenDetection | None
-    camera: int = 0
+    camera: int = 0  # index of the camera
 
 
 Sink: TypeAlias = Callable[[LiveImage], None]

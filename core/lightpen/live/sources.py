@@ -22,19 +22,11 @@ SECOND_SERIAL = "SIM-2"
 
 @dataclass(frozen=True, eq=False)
 class SourceEnvironment:
-    """Environment of sources: scene and clocks.
+    """Environment of sources: scene and clocks."""
 
-    Attributes
-    ----------
-    scene : Scene
-        Scene of the simulated camera.
-    now : callable
-        Returns date and time with the time zone.
-    """
-
-    scene: Scene = field(default_factory=Scene)
+    scene: Scene = field(default_factory=Scene)  # scene of the simulated camera
     clock: Clock = field(default_factory=MachineClock)
-    now: Callable[[], datetime] = local_now
+    now: Callable[[], datetime] = local_now  # returns date and time with the time zone
 
 
 def sample_files(around: SourceEnvironment, folder: Path) -> OpenedFiles:

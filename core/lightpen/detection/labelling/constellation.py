@@ -21,31 +21,19 @@ ALIKE_NORMALS = 0.9  # cosine
 
 @dataclass(frozen=True, eq=False)
 class Constellation:
-    """Properties of a pen for the search, computed once per pen.
+    """Properties of a pen for the search, computed once per pen."""
 
-    Attributes
-    ----------
-    leds, normals : (L, 3) array
-        Centres, mm, and unit normals of the discs in the pen frame.
-    radius : float
-        Radius of the discs, mm.
-    min_leds : int
-        LEDs to be explained before a labelling is believed.
-    triples : (Q, 3) array
-        All ordered triples of LEDs that form a triangle.
-    sides : (Q, 3) array
-        Sides 01, 02, 12 of the triangles, mm.
-    self_rotations, self_translations : (M, 3, 3) array, (M, 3) array
-        Motions of the pen frame that put at least ``min_leds`` LEDs nearly where other
-        LEDs were, discs facing alike. Empty for a pen without near-symmetry.
-    """
-
+    # `leds` and `normals`: (L, 3), centres, mm, and unit normals of the discs in the
+    # pen frame.
     leds: FloatArray
     normals: FloatArray
-    radius: float
-    min_leds: int
-    triples: IntArray
-    sides: FloatArray
+    radius: float  # radius of the discs, mm
+    min_leds: int  # LEDs to be explained before a labelling is believed
+    triples: IntArray  # (Q, 3), all ordered triples of LEDs that form a triangle
+    sides: FloatArray  # (Q, 3), sides 01, 02, 12 of the triangles, mm
+    # `self_rotations` and `self_translations`: (M, 3, 3) and (M, 3). Motions of the pen
+    # frame that put at least ``min_leds`` LEDs nearly where other LEDs were, discs
+    # facing alike. Empty for a pen without near-symmetry.
     self_rotations: FloatArray
     self_translations: FloatArray
 
@@ -99,13 +87,7 @@ def _constellation(
 
 
 class _Pattern(NamedTuple):
-    """Pattern of a pen, independent of its discs and of the LEDs needed.
-
-    Attributes
-    ----------
-    n_laid : (M,) array of int
-        LEDs that each motion lays onto LEDs.
-    """
+    """Pattern of a pen, independent of its discs and of the LEDs needed."""
 
     leds: FloatArray
     normals: FloatArray
@@ -113,7 +95,7 @@ class _Pattern(NamedTuple):
     sides: FloatArray
     self_rotations: FloatArray
     self_translations: FloatArray
-    n_laid: IntArray
+    n_laid: IntArray  # (M,), LEDs that each motion lays onto LEDs
 
 
 @lru_cache(maxsize=16)

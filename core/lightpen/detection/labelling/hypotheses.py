@@ -43,27 +43,13 @@ SHIFT_TOLERANCE = 20.0  # px, once the shift common to all is taken off
 
 @dataclass(frozen=True)
 class SearchEffort:
-    """Effort of the search of an image.
+    """Effort of the search of an image."""
 
-    Attributes
-    ----------
-    n_triples : int
-        Triples of spots tried.
-    n_hypotheses : int
-        LED triples tried for each.
-    n_poses : int
-        Poses laid over the spots.
-    n_settled : int
-        Labellings refined.
-    sized : bool
-        Believe that the size of a spot shows its distance.
-    """
-
-    n_triples: int
-    n_hypotheses: int
-    n_poses: int
-    n_settled: int
-    sized: bool = True
+    n_triples: int  # triples of spots tried
+    n_hypotheses: int  # LED triples tried for each
+    n_poses: int  # poses laid over the spots
+    n_settled: int  # labellings refined
+    sized: bool = True  # believe that the size of a spot shows its distance
 
 
 def poses_from_triples(

@@ -83,31 +83,19 @@ class LabelStatus(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """The spots of one image that are LEDs, and the pose by them.
+    """The spots of one image that are LEDs, and the pose by them."""
 
-    Attributes
-    ----------
-    spot : (L,) array
-        Spot of each LED, -1 where it has none; all -1 if refused.
-    whole : (L,) array
-        LEDs whose spot is a whole disc. A merged or cut spot is labelled when it lies
-        in the middle of the LED's disc, but its centre is not that of the LED, and it
-        takes part in the pose only if the whole spots alone do not suffice.
-    R : (3, 3) array
-    t : (3,) array
-        cam_from_pen, mm, by least squares on the whole LEDs; nan if refused.
-    rms_px : float
-        Root mean square of the residuals, per image coordinate, px; nan if refused.
-    reason : LabelStatus
-        ``LABELLED``, or why the image was refused.
-    """
-
-    spot: IntArray
+    spot: IntArray  # (L,), spot of each LED, -1 where it has none; all -1 if refused
+    # (L,). LEDs whose spot is a whole disc. A merged or cut spot is labelled when it
+    # lies in the middle of the LED's disc, but its centre is not that of the LED, and
+    # it takes part in the pose only if the whole spots alone do not suffice.
     whole: BoolArray
-    R: FloatArray
+    R: FloatArray  # (3, 3)
+    # (3,), cam_from_pen, mm, by least squares on the whole LEDs; nan if refused.
     t: FloatArray
+    # Root mean square of the residuals, per image coordinate, px; nan if refused.
     rms_px: float
-    reason: LabelStatus
+    reason: LabelStatus  # ``LABELLED``, or why the image was refused
 
 
 EFFORTS = (

@@ -35,28 +35,14 @@ AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Pose hypotheses for images, with the spots they explain.
+    """Pose hypotheses for images, with the spots they explain."""
 
-    Attributes
-    ----------
-    image : (C,) array
-        Index into the `SpotArrays`.
-    R : (C, 3, 3) array
-    t : (C, 3) array
-        Of cam_from_pen.
-    spot : (C, L) array
-        Spot of each LED, -1 if none.
-    residuals : (C, L) array
-        Distance to the spot, px; 0 where there is none.
-    area_ratio : (C,) array
-        Median of measured over predicted area of the discs; nan until settled.
-    """
-
-    image: IntArray
-    R: FloatArray
-    t: FloatArray
-    spot: IntArray
-    residuals: FloatArray
+    image: IntArray  # (C,), index into the `SpotArrays`
+    R: FloatArray  # (C, 3, 3)
+    t: FloatArray  # (C, 3), of cam_from_pen
+    spot: IntArray  # (C, L), spot of each LED, -1 if none
+    residuals: FloatArray  # (C, L), distance to the spot, px; 0 where there is none
+    # (C,), median of measured over predicted area of the discs; nan until settled.
     area_ratio: FloatArray
 
     def __len__(self) -> int:

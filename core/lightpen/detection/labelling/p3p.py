@@ -25,19 +25,11 @@ DOUBLE_ROOT = 1e-9  # discriminant taken for zero, relative
 
 
 class PosesOfThree(NamedTuple):
-    """Every real pose of a batch of three-point problems.
+    """Every real pose of a batch of three-point problems."""
 
-    Attributes
-    ----------
-    source : (S,) array
-        The problem that each pose solves.
-    rotations : (S, 3, 3) array
-    translations : (S, 3) array
-        ``rays`` times their ranges equal ``points @ R.T + t``.
-    """
-
-    source: IntArray
-    rotations: FloatArray
+    source: IntArray  # (S,), the problem that each pose solves
+    rotations: FloatArray  # (S, 3, 3)
+    # (S, 3), ``rays`` times their ranges equal ``points @ R.T + t``.
     translations: FloatArray
 
 

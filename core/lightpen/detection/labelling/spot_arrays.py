@@ -19,29 +19,15 @@ UNWHOLE = int(SpotFlaw.MERGED | SpotFlaw.CUT)
 
 @dataclass(frozen=True, eq=False)
 class SpotArrays:
-    """The spots of B images in pinhole pixels, padded to N spots each.
+    """The spots of B images in pinhole pixels, padded to N spots each."""
 
-    Attributes
-    ----------
-    focal : float
-        Pinhole pixels in one unit of the normalised plane.
-    points : (B, N, 2) array
-        Centres, `FAR` where there is no usable spot.
-    unwhole_points : (B, N, 2) array
-        Centres of the merged and cut spots, `FAR` elsewhere.
-    shapes : (B, N, 2, 2) array
-        Covariances of the areas.
-    usable : (B, N) array
-    radius : float
-        Radius of the discs of the pen, mm.
-    """
-
-    focal: float
-    points: FloatArray
+    focal: float  # pinhole pixels in one unit of the normalised plane
+    points: FloatArray  # (B, N, 2), centres, `FAR` where there is no usable spot
+    # (B, N, 2), centres of the merged and cut spots, `FAR` elsewhere.
     unwhole_points: FloatArray
-    shapes: FloatArray
-    usable: BoolArray
-    radius: float
+    shapes: FloatArray  # (B, N, 2, 2), covariances of the areas
+    usable: BoolArray  # (B, N)
+    radius: float  # radius of the discs of the pen, mm
 
     @cached_property
     def rays(self) -> FloatArray:
