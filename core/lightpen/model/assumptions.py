@@ -13,42 +13,66 @@ class Assumptions:
     Those of the camera are typical errors of the file of a lens that was mounted and
     focused again after its calibration. The others concern the station: temperature of
     the pen, form of ball and cone, compliance.
+
+    Attributes
+    ----------
+    focal_length : float
+        Relative standard uncertainty of the focal length.
+    aspect : float
+        Relative standard uncertainty of fy / fx.
+    principal_point : float
+        Standard uncertainty of cx and of cy, px.
+    k1, k2, tangential : float
+        Standard uncertainty of the distortion coefficients; ``tangential`` applies to
+        p1 and p2.
+    scale : float
+        Relative standard uncertainty of the scale of all LED coordinates.
+    expansion : float
+        Thermal expansion of the pen, 1/K: 2e-6 (carbon fibre) to 23e-6 (aluminium).
+    expansion_share : float
+        Relative standard uncertainty of a stated expansion coefficient.
+    temperature_c : float or None
+        Temperature of the pen during the swing, degrees Celsius; None if not measured.
+    humidity_percent : float or None
+        Relative humidity during the swing, for the record; None if not measured.
+    temperature : float
+        Standard uncertainty of the temperature, K.
+    warmth : float
+        Standard uncertainty of the temperature difference from the LED measurement, if
+        the temperature during the swing was not measured, K.
+    diameter : float
+        Relative standard uncertainty of the LED disc diameter.
+    form_error : float
+        Standard uncertainty of the seat of the ball by the form error of ball and cone,
+        along each axis in each form of dependence on the tilt, mm.
+    center_bias : float
+        Standard uncertainty of the centre of an LED's image, px, by errors that do not
+        average out: different in each posture, equal whenever the posture returns.
+    compliance : float
+        Standard uncertainty of the deflection of stylus, seat and stand, mm, divided by
+        the sine of the tilt.
+    rotation, translation : float
+        Standard uncertainty of the pose of a camera in its rig about and along each
+        axis, rad and mm.
     """
 
-    focal_length: float = 0.005  # relative standard uncertainty of the focal length
-    aspect: float = 0.0003  # relative standard uncertainty of fy / fx
-    principal_point: float = 5.0  # standard uncertainty of cx and of cy, px
-    # `k1`, `k2` and `tangential`: standard uncertainty of the distortion coefficients;
-    # ``tangential`` applies to p1 and p2.
+    focal_length: float = 0.005
+    aspect: float = 0.0003
+    principal_point: float = 5.0
     k1: float = 0.02
     k2: float = 0.1
     tangential: float = 0.0003
-    # Relative standard uncertainty of the scale of all LED coordinates.
     scale: float = 1e-5
-    # Thermal expansion of the pen, 1/K: 2e-6 (carbon fibre) to 23e-6 (aluminium).
     expansion: float = 2.3e-5
-    # Relative standard uncertainty of a stated expansion coefficient.
     expansion_share: float = 0.1
-    # Temperature of the pen during the swing, degrees Celsius; None if not measured.
     temperature_c: float | None = None
-    # Relative humidity during the swing, for the record; None if not measured.
     humidity_percent: float | None = None
-    temperature: float = 0.5  # standard uncertainty of the temperature, K
-    # Standard uncertainty of the temperature difference from the LED measurement, if
-    # the temperature during the swing was not measured, K.
+    temperature: float = 0.5
     warmth: float = 1.5  # U (k = 2) of 3 K
-    diameter: float = 0.05  # relative standard uncertainty of the LED disc diameter
-    # Standard uncertainty of the seat of the ball by the form error of ball and cone,
-    # along each axis in each form of dependence on the tilt, mm
+    diameter: float = 0.05
     form_error: float = 0.0002
-    # Standard uncertainty of the centre of an LED's image, px, by errors that do not
-    # average out: different in each posture, equal whenever the posture returns.
     center_bias: float = 0.003
-    # Standard uncertainty of the deflection of stylus, seat and stand, mm, divided by
-    # the sine of the tilt.
     compliance: float = 0.004
-    # `rotation` and `translation`: standard uncertainty of the pose of a camera in its
-    # rig about and along each axis, rad and mm
     rotation: float = 0.02
     translation: float = 20.0
 
