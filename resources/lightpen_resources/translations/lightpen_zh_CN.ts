@@ -7789,8 +7789,8 @@ mm</translation>
         <translation>与其他各点相距 {distance:.1f} mm 的测点不计入：测头不在锥孔中。请把测头放入锥孔并保持不动。</translation>
     </message>
     <message>
-        <source>A result with U within the limit is CHECK if the tips from odd and even images differ by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED is displaced by more than {displaced:g} mm, if the cameras are not synchronised, if more than {dropped:.0f} % of the images with the pen are excluded, if fewer than {n_images} images show the pen, or none on one of the eight sides.</source>
-        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥孔与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；拍到光笔的图像中未参与计算的超过 {dropped:.0f} %；拍到光笔的图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
+        <source>A result with U within the limit is CHECK if the tips from odd and even images differ by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the noise of LED centres exceeds {sigma:g} px, if an LED is displaced by more than {displaced:g} mm, if the cameras are not synchronised, if more than {dropped:.0f} % of the images with the pen are excluded, if fewer than {n_images} images show the pen, or none on one of the eight sides.</source>
+        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥孔与相机的相对移动超过 {moved:.4f} mm；LED 中心的噪声超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；拍到光笔的图像中未参与计算的超过 {dropped:.0f} %；拍到光笔的图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
     </message>
     <message>
         <source>A supervisor&apos;s approval and a reason are needed. Enter the supervisor&apos;s name and password.</source>

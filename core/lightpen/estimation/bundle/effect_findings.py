@@ -55,8 +55,12 @@ class FoundEffect:
 
     @property
     def is_certain(self) -> bool:
-        """Whether chance alone makes it less than once in a thousand."""
-        return self.gain > chi_square_quantile(1, CERTAIN)
+        """Whether chance, or another effect, makes it less than once in a thousand.
+
+        What is smaller than its uncertainty beside the others may be part of these.
+        """
+        is_known = self.sigma is None or abs(self.size) > self.sigma
+        return is_known and self.gain > chi_square_quantile(1, CERTAIN)
 
     @property
     def message(self) -> Message:

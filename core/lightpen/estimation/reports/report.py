@@ -85,7 +85,7 @@ def calibration_record(
         change_from_nominal_mm=None if nominal is None else plain(tip - nominal),
         rms_px=plain(calibration.joint.rms),
         rms_mm=plain(result.rms_mm),
-        sigma_px=plain(calibration.joint.sigma),
+        sigma_px=plain(calibration.bundle.sigma),
         images=ImageCounts(
             total=len(calibration.used),
             used=int(calibration.used.sum()),

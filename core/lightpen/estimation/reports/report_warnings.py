@@ -35,7 +35,7 @@ def lamp_warnings(calibration: Calibration) -> list[Message]:
 
 def warnings_of(calibration: Calibration) -> list[Message]:
     """Return all warnings, one or two sentences each."""
-    leds, sigma = calibration.leds, calibration.joint.sigma
+    leds, sigma = calibration.leds, calibration.bundle.sigma
     warnings = [
         *_rig_warnings(calibration),
         *(each.message for each in calibration.contradictions),

@@ -312,7 +312,7 @@ def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message
         yield message(Code.FILE_CONTRADICTED, why=worst_one.message)
     if calibration.moved > FAR_MOVED * limit:
         yield message(Code.CAMERA_MOVED, distance=calibration.moved)
-    sigma = calibration.joint.sigma
+    sigma = calibration.bundle.sigma  # a moving seat apart, which has a finding
     if sigma > USUAL_SIGMA:
         yield message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA)
     if calibration.leds.displaced:

@@ -219,3 +219,10 @@ def test_the_likelier_of_two_shapes_is_taken() -> None:
     effect = Effect(EffectName.LENS, 0, columns, shapes)
     found = size_of(effect, S, S @ np.array([0.0, 0.01]))
     assert found.covariance[1, 1] > 1e3 * found.covariance[0, 0]
+
+
+def test_an_effect_within_its_uncertainty_is_not_certain() -> None:
+    play = FoundEffect(EffectName.LOOSE, "", size=0.003, sigma=0.0014, gain=12.0)
+    assert play.is_certain
+    assert not replace(play, gain=10.0).is_certain
+    assert not replace(play, size=0.001).is_certain

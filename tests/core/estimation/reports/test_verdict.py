@@ -123,7 +123,18 @@ def test_leds_that_do_not_fit_are_checked() -> None:
     noisy = calibrated(swing_poses(300, np.random.default_rng(0)), sigma=0.15)
     verdict = judge(noisy, SwingLimits(max_uncertainty=0.05))
     assert verdict.reason.code == Code.LEDS_MISFIT
-    assert verdict.reason.values["sigma"] == noisy.joint.sigma
+    assert verdict.reason.values["sigma"] == noisy.bundle.sigma
+
+
+def test_a_seat_that_moves_is_not_taken_for_leds_that_do_not_fit() -> None:
+    swing = swing_poses(150, np.random.default_rng(0))
+    moves = np.random.default_rng(2).normal(0, 0.05, swing.translations.shape)
+    moved = calibrated(replace(swing, translations=swing.translations + moves), 0.03)
+    assert moved.joint.sigma > 0.15
+    assert judge(moved, SwingLimits(max_uncertainty=0.05)).grade is Grade.PASS
+    codes = {each.code for each in warnings_of(moved)}
+    assert "warning.seat-jitter" in codes
+    assert "warning.large-residuals" not in codes
 
 
 def with_share(
