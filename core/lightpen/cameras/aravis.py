@@ -38,13 +38,7 @@ STRAYING_S = 0.03  # some times what a packet waits in a packet socket until it 
 
 
 class AravisFeatures:
-    """The features of an open camera.
-
-    Parameters
-    ----------
-    converting_errors : callable
-        Returns the context that raises errors as messages.
-    """
+    """The features of an open camera, with what raises errors as messages."""
 
     def __init__(
         self,
@@ -131,27 +125,20 @@ class AravisFeatures:
 
 
 class AravisDevice:
-    """A camera that Aravis drives.
+    """A camera that Aravis drives, by its serial number or address.
 
-    Parameters
-    ----------
-    place : str
-        Serial number or address. By an address it is opened without a search, also
-        where the network lets no broadcast through.
+    By an address it is opened without a search, also where the network lets no
+    broadcast through.
     """
 
     def __init__(self, place: str) -> None:
-        self._place = self._serial = place
+        self._place = place
+        self.serial = place  # until it is open
         self._aravis: Aravis | None = None
         self._camera: int | None = None
         self._stream: int | None = None
         self._features: AravisFeatures | None = None
         self._is_gone = False
-
-    @property
-    def serial(self) -> str:
-        """Serial number, or the place until it is open."""
-        return self._serial
 
     @property
     def features(self) -> AravisFeatures:
@@ -174,7 +161,7 @@ class AravisDevice:
         self._require_control(aravis, camera)
         with suppress(AravisError):  # not every camera shows its serial number
             serial = aravis.camera_get_device_serial_number(camera)
-            self._serial = serial.decode("utf-8", "replace") or self._serial
+            self.serial = serial.decode("utf-8", "replace") or self.serial
         self._features = AravisFeatures(aravis, camera, self._converting_errors)
 
     def close(self) -> None:
@@ -234,9 +221,9 @@ class AravisDevice:
             yield
         except AravisError as error:
             if not error.is_gone:
-                raise setting_refused(self._serial, str(error)) from error
+                raise setting_refused(self.serial, str(error)) from error
             self._is_gone = True
-            raise lost(self._serial, str(error)) from error
+            raise lost(self.serial, str(error)) from error
 
     def _open_ones(self) -> tuple[Aravis, int]:
         assert self._aravis is not None
@@ -282,7 +269,7 @@ class AravisDevice:
         if aravis.gv_device_is_controller(aravis.camera_get_device(camera)):
             return
         if not is_new:
-            raise lost(self._serial, "another program controls it")
+            raise lost(self.serial, "another program controls it")
         self.close()
         raise busy(self._place)
 

@@ -21,7 +21,7 @@ from ctypes import (
     c_void_p,
 )
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 NAME = "libaravis-0.8.so.0"
 GLIB, GOBJECT = "libglib-2.0.so.0", "libgobject-2.0.so.0"
@@ -42,120 +42,91 @@ class _GError(ctypes.Structure):
     _fields_ = (("domain", c_uint32), ("code", c_int), ("message", c_char_p))
 
 
+ADDRESS, TEXT = c_void_p, c_char_p
+INTEGER, NUMBER = POINTER(c_int64), POINTER(c_double)  # that are filled in
+# Result and arguments of the functions that cannot fail, named without ``arv_``;
+PLAIN: dict[str, tuple[Any, ...]] = {
+    "update_device_list": (None,),
+    "get_n_devices": (c_uint,),
+    "get_device_id": (TEXT, c_uint),
+    "get_device_serial_nbr": (TEXT, c_uint),
+    "get_device_model": (TEXT, c_uint),
+    "get_device_vendor": (TEXT, c_uint),
+    "camera_get_device": (ADDRESS, ADDRESS),
+    "camera_is_gv_device": (c_bool, ADDRESS),
+    "gv_device_is_controller": (c_bool, ADDRESS),
+    "camera_gv_set_stream_options": (None, ADDRESS, c_int),
+    "device_get_feature": (ADDRESS, ADDRESS, TEXT),
+    "gc_integer_get_type": (c_size_t,),
+    "stream_get_info_uint64_by_name": (c_uint64, ADDRESS, TEXT),
+    "stream_push_buffer": (None, ADDRESS, ADDRESS),
+    "stream_timeout_pop_buffer": (ADDRESS, ADDRESS, c_uint64),
+    "buffer_new_allocate": (ADDRESS, c_size_t),
+    "buffer_get_status": (c_int, ADDRESS),
+    "buffer_get_frame_id": (c_uint64, ADDRESS),
+    "buffer_get_timestamp": (c_uint64, ADDRESS),
+    "buffer_get_image_data": (ADDRESS, ADDRESS, POINTER(c_size_t)),
+    "buffer_get_image_width": (c_int, ADDRESS),
+    "buffer_get_image_height": (c_int, ADDRESS),
+    "buffer_get_image_padding": (None, ADDRESS, POINTER(c_int), POINTER(c_int)),
+}
+# and of those that report errors by one argument more.
+RISKY: dict[str, tuple[Any, ...]] = {
+    "camera_new": (ADDRESS, TEXT),
+    "camera_get_device_serial_number": (TEXT, ADDRESS),
+    "camera_get_payload": (c_uint, ADDRESS),
+    "camera_start_acquisition": (None, ADDRESS),
+    "camera_stop_acquisition": (None, ADDRESS),
+    "camera_create_stream": (ADDRESS, ADDRESS, ADDRESS, ADDRESS),
+    "camera_is_feature_available": (c_bool, ADDRESS, TEXT),
+    "camera_get_integer": (c_int64, ADDRESS, TEXT),
+    "camera_set_integer": (None, ADDRESS, TEXT, c_int64),
+    "camera_get_integer_bounds": (None, ADDRESS, TEXT, INTEGER, INTEGER),
+    "camera_get_integer_increment": (c_int64, ADDRESS, TEXT),
+    "camera_get_float": (c_double, ADDRESS, TEXT),
+    "camera_set_float": (None, ADDRESS, TEXT, c_double),
+    "camera_get_float_bounds": (None, ADDRESS, TEXT, NUMBER, NUMBER),
+    "camera_get_string": (TEXT, ADDRESS, TEXT),
+    "camera_set_string": (None, ADDRESS, TEXT, TEXT),
+    "camera_set_boolean": (None, ADDRESS, TEXT, c_int),
+    "camera_execute_command": (None, ADDRESS, TEXT),
+    "camera_dup_available_enumerations_as_strings": (
+        POINTER(TEXT),
+        ADDRESS,
+        TEXT,
+        POINTER(c_uint),
+    ),
+}
+
+
 class Aravis:
-    """The functions of the library, named without ``arv_``.
+    """The functions of `PLAIN` and `RISKY`, and some of GLib.
 
     Those of a camera take its pointer first; what fails raises `AravisError`.
     """
 
     def __init__(self) -> None:
         self._library = ctypes.CDLL(NAME)
-        self._glib = ctypes.CDLL(GLIB)
-        self._gobject = ctypes.CDLL(GOBJECT)
-        plain, risky = self._plain, self._risky
-        pointer, text = c_void_p, c_char_p
-
-        self.update_device_list = plain("update_device_list", None)
-        self.get_n_devices = plain("get_n_devices", c_uint)
-        self.get_device_id = plain("get_device_id", text, c_uint)
-        self.get_device_serial_nbr = plain("get_device_serial_nbr", text, c_uint)
-        self.get_device_model = plain("get_device_model", text, c_uint)
-        self.get_device_vendor = plain("get_device_vendor", text, c_uint)
-
-        self.camera_new = risky("camera_new", pointer, text)
-        self.camera_get_device = plain("camera_get_device", pointer, pointer)
-        self.camera_is_gv_device = plain("camera_is_gv_device", c_bool, pointer)
-        self.gv_device_is_controller = plain("gv_device_is_controller", c_bool, pointer)
-        self.camera_gv_set_stream_options = plain(
-            "camera_gv_set_stream_options", None, pointer, c_int
-        )
-        self.camera_get_device_serial_number = risky(
-            "camera_get_device_serial_number", text, pointer
-        )
-        self.camera_get_payload = risky("camera_get_payload", c_uint, pointer)
-        self.camera_start_acquisition = risky("camera_start_acquisition", None, pointer)
-        self.camera_stop_acquisition = risky("camera_stop_acquisition", None, pointer)
-        self.camera_create_stream = risky(
-            "camera_create_stream", pointer, pointer, pointer, pointer
-        )
-
-        self.device_get_feature = plain("device_get_feature", pointer, pointer, text)
-        self.gc_integer_get_type = plain("gc_integer_get_type", c_size_t)
-        self.camera_is_feature_available = risky(
-            "camera_is_feature_available", c_bool, pointer, text
-        )
-        self.camera_get_integer = risky("camera_get_integer", c_int64, pointer, text)
-        self.camera_set_integer = risky(
-            "camera_set_integer", None, pointer, text, c_int64
-        )
-        self.camera_get_integer_bounds = risky(
-            "camera_get_integer_bounds",
-            None,
-            pointer,
-            text,
-            POINTER(c_int64),
-            POINTER(c_int64),
-        )
-        self.camera_get_integer_increment = risky(
-            "camera_get_integer_increment", c_int64, pointer, text
-        )
-        self.camera_get_float = risky("camera_get_float", c_double, pointer, text)
-        self.camera_set_float = risky("camera_set_float", None, pointer, text, c_double)
-        self.camera_get_float_bounds = risky(
-            "camera_get_float_bounds",
-            None,
-            pointer,
-            text,
-            POINTER(c_double),
-            POINTER(c_double),
-        )
-        self.camera_get_string = risky("camera_get_string", text, pointer, text)
-        self.camera_set_string = risky("camera_set_string", None, pointer, text, text)
-        self.camera_set_boolean = risky(
-            "camera_set_boolean", None, pointer, text, c_int
-        )
-        self.camera_execute_command = risky(
-            "camera_execute_command", None, pointer, text
-        )
-        self.camera_dup_available_enumerations_as_strings = risky(
-            "camera_dup_available_enumerations_as_strings",
-            POINTER(text),
-            pointer,
-            text,
-            POINTER(c_uint),
-        )
-
-        self.stream_get_info_uint64_by_name = plain(
-            "stream_get_info_uint64_by_name", c_uint64, pointer, text
-        )
-        self.stream_push_buffer = plain("stream_push_buffer", None, pointer, pointer)
-        self.stream_timeout_pop_buffer = plain(
-            "stream_timeout_pop_buffer", pointer, pointer, c_uint64
-        )
-        self.buffer_new_allocate = plain("buffer_new_allocate", pointer, c_size_t)
-        self.buffer_get_status = plain("buffer_get_status", c_int, pointer)
-        self.buffer_get_frame_id = plain("buffer_get_frame_id", c_uint64, pointer)
-        self.buffer_get_timestamp = plain("buffer_get_timestamp", c_uint64, pointer)
-        self.buffer_get_image_data = plain(
-            "buffer_get_image_data", pointer, pointer, POINTER(c_size_t)
-        )
-        self.buffer_get_image_width = plain("buffer_get_image_width", c_int, pointer)
-        self.buffer_get_image_height = plain("buffer_get_image_height", c_int, pointer)
-        self.buffer_get_image_padding = plain(
-            "buffer_get_image_padding", None, pointer, POINTER(c_int), POINTER(c_int)
-        )
-
-        self._device_errors = plain("device_error_quark", c_uint32)()
-        self._free_error = _bound(self._glib.g_error_free, None, POINTER(_GError))
-        self.free = _bound(self._glib.g_free, None, pointer)
-        self.unref = _bound(self._gobject.g_object_unref, None, pointer)
+        glib, gobject = ctypes.CDLL(GLIB), ctypes.CDLL(GOBJECT)
+        for name, signature in PLAIN.items():
+            setattr(self, name, self._plain(name, *signature))
+        for name, signature in RISKY.items():
+            setattr(self, name, self._risky(name, *signature))
+        self._device_errors = self._plain("device_error_quark", c_uint32)()
+        self._free_error = _bound(glib.g_error_free, None, POINTER(_GError))
+        self.free = _bound(glib.g_free, None, ADDRESS)
+        self.unref = _bound(gobject.g_object_unref, None, ADDRESS)
         # One property, its value, and the null that ends the list of them.
         self.set_property = _bound(
-            self._gobject.g_object_set, None, pointer, text, c_int, pointer
+            gobject.g_object_set, None, ADDRESS, TEXT, c_int, ADDRESS
         )
         self.is_a = _bound(
-            self._gobject.g_type_check_instance_is_a, c_bool, pointer, c_size_t
+            gobject.g_type_check_instance_is_a, c_bool, ADDRESS, c_size_t
         )
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Callable[..., Any]: ...
 
     def _plain(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
         return _bound(getattr(self._library, f"arv_{name}"), result, *arguments)

@@ -27,14 +27,9 @@ class BaslerDevice:
     """A camera that pylon drives, found by its serial number."""
 
     def __init__(self, serial: str) -> None:
-        self._serial = serial
+        self.serial = serial
         self._camera: Any = None
         self._features: GenapiFeatures | None = None
-
-    @property
-    def serial(self) -> str:
-        """Serial number."""
-        return self._serial
 
     @property
     def features(self) -> GenapiFeatures:
@@ -52,25 +47,25 @@ class BaslerDevice:
             layer, info = next(
                 (layer, info)
                 for layer, info in _infos()
-                if info.GetSerialNumber() == self._serial
+                if info.GetSerialNumber() == self.serial
             )
         except StopIteration:
-            raise not_found(self._serial) from None
+            raise not_found(self.serial) from None
         if not layer.IsDeviceAccessible(info):
-            raise busy(self._serial)
+            raise busy(self.serial)
         try:
             self._camera = camera = pylon.InstantCamera(layer.CreateDevice(info))
             camera.Open()
         except genicam.GenericException as error:
             self.close()
-            raise not_found(self._serial, str(error)) from error
+            raise not_found(self.serial, str(error)) from error
         camera.MaxNumBuffer.Value = N_BUFFERS
         nodes = camera.GetNodeMap()
         self._features = GenapiFeatures(
             nodes.GetNode,
             str.capitalize,
             lambda node: node.GetAccessMode(),
-            partial(_converting_errors, self._serial),
+            partial(_converting_errors, self.serial),
         )
 
     def close(self) -> None:
@@ -89,7 +84,7 @@ class BaslerDevice:
         """Start streaming."""
         from pypylon import pylon
 
-        with _converting_errors(self._serial):
+        with _converting_errors(self.serial):
             self._camera.StartGrabbing(pylon.GrabStrategy_OneByOne)
 
     def stop(self) -> None:
@@ -104,7 +99,7 @@ class BaslerDevice:
         from pypylon import pylon
 
         timeout_ms, returns = round(1000 * timeout_s), pylon.TimeoutHandling_Return
-        with _converting_errors(self._serial):
+        with _converting_errors(self.serial):
             result = self._camera.RetrieveResult(timeout_ms, returns)
             if not result.IsValid():
                 return None
@@ -114,7 +109,7 @@ class BaslerDevice:
     def probe(self) -> None:
         """Raise an error unless the camera responds."""
         if self._camera.IsCameraDeviceRemoved():
-            raise lost(self._serial, "it was removed")
+            raise lost(self.serial, "it was removed")
         self.features.number("Width")
 
 

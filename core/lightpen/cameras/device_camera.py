@@ -87,13 +87,7 @@ class Device(Protocol):
 
 
 class DeviceCamera:
-    """A camera that a library drives.
-
-    Parameters
-    ----------
-    device : Device
-        Not open; used by this camera only.
-    """
+    """A camera that a library drives, with a device that is not open."""
 
     def __init__(self, device: Device, clock: Clock | None = None) -> None:
         self._device = device

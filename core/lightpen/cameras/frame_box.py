@@ -66,12 +66,8 @@ class FrameQueue:
     def take(self, timeout_s: float) -> Frame:
         """Return the oldest frame.
 
-        Raises
-        ------
-        FrameTimeout
-            No frame within ``timeout_s``.
-        EndOfImages
-            The images have ended.
+        Raises `FrameTimeout` without one within ``timeout_s``, and `EndOfImages` after
+        the last.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._frames or self._is_ended, timeout_s)

@@ -37,15 +37,11 @@ class GenicamDevice:
     """A camera that a GenTL producer drives."""
 
     def __init__(self, place: SourcePlace) -> None:
-        self._place = place
+        self.serial = place.name  # or an ID of the producer
+        self._producer = place.producer
         self._harvester: Any = None
         self._acquirer: Any = None
         self._features: GenapiFeatures | None = None
-
-    @property
-    def serial(self) -> str:
-        """Serial number, or the ID given by the producer."""
-        return self._place.name
 
     @property
     def features(self) -> GenapiFeatures:
@@ -57,10 +53,10 @@ class GenicamDevice:
         """Open the camera."""
         if not _is_installed():
             raise DeviceNotFound(_ABSENT)
-        self._harvester = harvester = _harvester(self._place.producer)
+        self._harvester = harvester = _harvester(self._producer)
         from genicam import gentl
 
-        name = self._place.name
+        name = self.serial
         try:
             indices = [
                 index

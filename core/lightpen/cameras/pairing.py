@@ -79,17 +79,9 @@ class FramePairs:
         self._waiting[c].append(frame)
 
     def take(self, n_images: int | None = None) -> Frame | None:
-        """Return the next complete pair; None if there is none.
+        """Return the first camera's frame with the other's; None without a pair.
 
-        Parameters
-        ----------
-        n_images : int, optional
-            Length of two recordings that are repeated.
-
-        Returns
-        -------
-        Frame or None
-            The first camera's, with the other's.
+        ``n_images`` is the length of two recordings that are repeated.
         """
         is_known = n_images is not None or self._is_settled
         first, second = self._waiting

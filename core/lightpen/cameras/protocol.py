@@ -250,29 +250,19 @@ class ImageCamera(Protocol):
 
         Values are clipped to their ranges; unsupported settings are ignored.
         `caps` may be others after it: the region gives the size of the images.
-
-        Raises
-        ------
-        ConfigError
-            The pixel format is not offered.
+        Raises `ConfigError` if the pixel format is not offered.
         """
 
     def set_exposure(self, exposure_us: float) -> float:
         """Set the exposure, also while streaming; return the actual one, us.
 
-        Raises
-        ------
-        ConfigError
-            It cannot be set.
+        Raises `ConfigError` if it cannot be set.
         """
 
     def set_gain(self, gain_db: float) -> float:
         """Set the gain, also while streaming; return the actual one, dB.
 
-        Raises
-        ------
-        ConfigError
-            It cannot be set.
+        Raises `ConfigError` if it cannot be set.
         """
 
     def start(self) -> None:
@@ -284,23 +274,12 @@ class ImageCamera(Protocol):
     def read(self, timeout_s: float) -> Frame:
         """Return the next complete image.
 
-        Raises
-        ------
-        FrameTimeout
-            No frame within ``timeout_s``.
-        FrameIncomplete
-            A frame arrived damaged.
-        EndOfImages
-            There are no more.
+        Raises `FrameTimeout` without one within ``timeout_s``, `FrameIncomplete` if one
+        arrived damaged, and `EndOfImages` after the last.
         """
 
     def probe(self) -> None:
-        """Raise an error unless the device responds.
-
-        Raises
-        ------
-        DeviceLost
-        """
+        """Raise `DeviceLost` unless the device responds."""
 
     def stats(self) -> Stats:
         """Return the frame counters; ``skipped`` stays 0."""

@@ -65,15 +65,10 @@ class WebcamDevice:
     """A webcam by its number, or another name that OpenCV opens."""
 
     def __init__(self, place: str) -> None:
-        self._place = place
+        self.serial = place  # number by its connection
         self._capture: cv2.VideoCapture | None = None
         self._features: WebcamFeatures | None = None
         self._n_read = 0
-
-    @property
-    def serial(self) -> str:
-        """Number of the webcam, by its connection."""
-        return self._place
 
     @property
     def features(self) -> WebcamFeatures:
@@ -83,7 +78,7 @@ class WebcamDevice:
 
     def open(self) -> None:
         """Open the camera."""
-        place = self._place
+        place = self.serial
         self._capture = capture = (
             cv2.VideoCapture(int(place))
             if place.isdecimal()
@@ -112,7 +107,7 @@ class WebcamDevice:
         assert self._capture is not None
         is_read, image = self._capture.read()
         if not is_read:
-            raise lost(self._place, "it sends no image")
+            raise lost(self.serial, "it sends no image")
         self._n_read += 1
         height, width = image.shape[:2]
         data = np.asarray(image, np.uint8).reshape(-1)

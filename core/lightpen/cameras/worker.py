@@ -191,17 +191,18 @@ class CameraWorker:
 
     def set_exposure(self, exposure_us: float) -> None:
         """Request another exposure while streaming."""
-        self._requests.put(lambda: self._set_exposure(exposure_us))
-        self._wake.set()
+        self._request(lambda: self._set_exposure(exposure_us))
 
     def set_gain(self, gain_db: float) -> None:
         """Request another gain while streaming."""
-        self._requests.put(lambda: self._set_gain(gain_db))
-        self._wake.set()
+        self._request(lambda: self._set_gain(gain_db))
 
     def configure(self, settings: CameraSettings) -> None:
         """Request other settings; streaming stops briefly."""
-        self._requests.put(lambda: self._configure(settings))
+        self._request(lambda: self._configure(settings))
+
+    def _request(self, act: Callable[[], None]) -> None:
+        self._requests.put(act)
         self._wake.set()
 
     def _run(self) -> None:
@@ -297,10 +298,14 @@ class CameraWorker:
         self._n_skipped += 1
         self._n_missed += 1
         self._skipped_ns = self._clock.now_ns()
-        is_slow = is_too_slow(self._n_missed, self._n_offered)
+        n_missed, n_offered = self._n_missed, self._n_offered
+        is_slow = is_too_slow(n_missed, n_offered)
         if is_slow and not self._skipping_reported:  # once is enough until it is over
             self._skipping_reported = True
-            self._on_event(FaultRaised(_too_slow(self._n_missed, self._n_offered)))
+            fault = FramesSkipped(
+                "camera.too-slow", n_missed=n_missed, n_offered=n_offered
+            )
+            self._on_event(FaultRaised(fault))
 
     def _report_keeping_up(self) -> None:
         """Report that images are no longer skipped."""
@@ -397,9 +402,8 @@ class CameraWorker:
         except ConfigError as error:  # it is not what it was when they were kept
             self._settings = CameraSettings()
             self._start(self._settings)
-            self._on_event(
-                FaultRaised(error)
-            )  # when images come, which take back others
+            # When images come, which take back others.
+            self._on_event(FaultRaised(error))
 
     def _start(self, settings: CameraSettings) -> None:
         """Configure the open camera and start streaming."""
@@ -468,7 +472,3 @@ def merged_settings(before: CameraSettings, now: CameraSettings) -> CameraSettin
 def is_too_slow(n_missed: int, n_offered: int) -> bool:
     """Return whether images are skipped persistently."""
     return n_missed >= max(LEAST_SKIPPED, SKIPPED_SHARE * n_offered)
-
-
-def _too_slow(n_missed: int, n_offered: int) -> FramesSkipped:
-    return FramesSkipped("camera.too-slow", n_missed=n_missed, n_offered=n_offered)
