@@ -89,17 +89,9 @@ def discover(
 ) -> Discovery:
     """Find tip, pen and camera.
 
-    Parameters
-    ----------
-    sightings : Sightings
-        Of a swing in time order, with the tip in the cone.
-    report : callable
-        Called with the fraction done; what it raises stops the computation.
-
-    Raises
-    ------
-    CalibrationError
-        The images do not determine them; the text says what to do.
+    The sightings are those of a swing in time order, with the tip in the cone.
+    ``report`` is called with the fraction done; what it raises stops the computation.
+    Raises `CalibrationError` if the images do not determine them.
     """
     swing = _labelled_swing(sightings, request, report)
     swing = replace(swing, found=numbered(swing.found, request))
@@ -203,7 +195,7 @@ def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _
     report(0.2)
     seed = solve_seed(joined, sightings.size, request.camera)
     report(0.4)
-    found = label(seed, joined, certain, centers, width)
+    found = label(seed, certain, centers, width)
     require_no_second_pen(found)
     if np.median(found.unexplained.sum(axis=1)) >= SECOND_PEN:
         require_one_focal_length(joined, sightings.size, request.camera)

@@ -8,12 +8,8 @@ from lightpen.arrays import FloatArray
 from lightpen.discovery.hypotheses import Hypothesis
 from lightpen.discovery.normals import FACING
 from lightpen.discovery.numbering import frame_by, framed
-from lightpen.discovery.scale import (
-    farthest_apart,
-    with_led_covariance,
-    with_lengths_known,
-)
-from lightpen.discovery.starts import KnownLength
+from lightpen.discovery.scale import with_led_covariance, with_lengths_known
+from lightpen.discovery.starts import KnownLength, farthest_apart
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.disc_normals import (
@@ -90,14 +86,8 @@ def discovery_of(
 ) -> Discovery:
     """Return the result of a calibration with wide priors.
 
-    Parameters
-    ----------
-    choice : Choice or None
-        Of the lens model; None where the camera is known.
-    sketch : (L, 3) array or None
-        Rough LEDs in the frame that the pen is given, mm.
-    second : SecondSwing or None
-        Swing in a second cone that the calibration includes.
+    The choice is that of the lens model, None where the camera is known; the sketch
+    (L, 3), mm, are rough LEDs in the frame that the pen is given.
     """
     bundle, instrument = calibration.bundle, calibration.instrument
     state, tip = bundle.state, calibration.joint.tip_pen
@@ -165,8 +155,7 @@ def _with_length_found(pen: Pen) -> Pen:
     """Return a pen whose scale, known by two cones, holds without these images, too."""
     assert pen.found is not None
     assert pen.scale_sigma is not None
-    first, second = farthest_apart(pen.leds)
-    length = float(np.linalg.norm(pen.leds[second] - pen.leds[first]))
+    first, second, length = farthest_apart(pen.leds)
     longest = KnownLength(first, second, length, length * pen.scale_sigma)
     known = with_lengths_known(pen, (longest,)).led_covariance
     assert known is not None

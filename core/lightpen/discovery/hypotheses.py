@@ -18,6 +18,7 @@ from lightpen.discovery.starts import (
     Start,
     adjust_start,
     any_camera,
+    farthest_apart,
     focal_length_of,
     focal_sigma,
     free_focal_length,
@@ -89,17 +90,9 @@ def solve_seed(
 ) -> Seed:
     """Solve the part of a swing in which most track pieces are visible for longest.
 
-    Parameters
-    ----------
-    size : tuple of int
-        Width and height of the images, px.
-    known : Camera, optional
-        With its covariance, where there is a camera file.
-
-    Raises
-    ------
-    CalibrationError
-        No part is long enough, or shape and mirror image fit alike.
+    The size is width and height of the images, px; the camera is known where there is
+    a file. Raises `CalibrationError` if no part is long enough, or shape and mirror
+    image fit alike.
     """
     seed = _somewhere_solved(pieces, size, known)
     fits = seed.start.sigma <= FITTING
@@ -184,17 +177,13 @@ def _solved(
 
 def _best(tried: Sequence[Seed]) -> Seed:
     """Return the solution that fits best, with the hypotheses of all."""
-    least = min(map(_misfit, tried))
+    least = min(seed.start.sigma for seed in tried)
     near = [seed for seed in tried if seed.start.sigma <= DECIDED * least]
     decided = [seed for seed in near if seed.margin >= DECIDED]
-    best = min(decided or near, key=_misfit)
+    best = min(decided or near, key=lambda seed: seed.start.sigma)
     others = [each for seed in tried if seed is not best for each in seed.hypotheses]
     failed = tuple(replace(each, is_best=False) for each in others)
     return replace(best, hypotheses=best.hypotheses + failed)
-
-
-def _misfit(seed: Seed) -> float:
-    return seed.start.sigma
 
 
 def _attempted(
@@ -269,10 +258,7 @@ def require_one_focal_length(
 ) -> None:
     """Refuse a swing whose ends fit alone, with focal lengths of their own.
 
-    Parameters
-    ----------
-    most_misfit : float
-        Of ends that fit, px.
+    Ends fit that have ``most_misfit``, px, or less.
     """
     n = len(pieces.spots)
     n_end = max(MIN_IMAGES, int(END * n))
@@ -288,10 +274,7 @@ def require_one_focal_length(
         pixels = part.pixels[np.ix_(seed.images, seed.pieces)]
         camera = seed.start.state.rig.cameras[0]
         prior = camera_prior(camera, known)
-        leds = seed.start.state.pen.leds
-        apart = np.linalg.norm(leds[:, None] - leds, axis=2)
-        first, second = np.unravel_index(np.argmax(apart), apart.shape)
-        length = KnownLength(int(first), int(second), float(apart.max()), 1e-4 * UNIT)
+        length = KnownLength(*farthest_apart(seed.start.state.pen.leds), 1e-4 * UNIT)
         misfits.append(seed.start.sigma)
         focal_lengths.append(camera.fx)
         sigmas.append(focal_sigma(seed.start, pixels, prior, (length,)))
@@ -317,10 +300,10 @@ class _Trial:
         self, shape: WeakShape, focal: float, *, mirrored: bool
     ) -> tuple[Hypothesis, Start]:
         """Return the result of the adjustment of a shape."""
-        first, second, unit = _longest(shape)
+        first, second, apart = farthest_apart(shape.points)
         length = (KnownLength(first, second, UNIT, 1e-4 * UNIT),)
         camera = self.known or ideal_camera(*self.size, focal)
-        state, held = state_of(shape, camera, POINT, unit), held_camera(camera)
+        state, held = state_of(shape, camera, POINT, UNIT / apart), held_camera(camera)
         start = adjust_start(state, self.pixels, held, 12, length, ROUGH)
         if self.known is None:
             prior = free_focal_length(camera)
@@ -336,14 +319,6 @@ def camera_prior(camera: Camera, known: Camera | None) -> CameraPrior:
     if known is None:
         return any_camera(camera)
     return CameraPrior.of(known, prior_of_camera(known, USUAL).covariance)
-
-
-def _longest(shape: WeakShape) -> tuple[int, int, float]:
-    """Return the two points farthest apart, and mm a unit by `UNIT`."""
-    points = shape.points
-    apart = np.linalg.norm(points[:, None] - points, axis=2)
-    first, second = np.unravel_index(np.argmax(apart), apart.shape)
-    return int(first), int(second), UNIT / float(apart.max())
 
 
 def _best_part(pieces: Pieces) -> tuple[IntArray, IntArray]:

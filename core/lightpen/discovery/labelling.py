@@ -51,22 +51,17 @@ class Labelled:
 
 
 def label(
-    seed: Seed, joined: Pieces, certain: Pieces, spots: Sequence[FloatArray], width: int
+    seed: Seed, certain: Pieces, spots: Sequence[FloatArray], width: int
 ) -> Labelled:
-    """Label the spots of all images from a part that is solved.
+    """Label the spots (S, 2), px, of all images from a part that is solved.
 
-    Parameters
-    ----------
-    joined : Pieces
-        Those that the seed is of.
-    certain : Pieces
-        Those that are labelled as a whole.
-    spots : sequence of (S, 2) array
-        Of each image, px.
-    width : int
-        Of the images, px.
+    The certain pieces are labelled as a whole; the width is that of the images, px.
     """
-    search = _Search.begun(seed, joined, certain, spots, width)
+    search = _Search(seed.start.state, certain, spots, width)
+    search.rotations[seed.images] = seed.start.state.rotations
+    search.solved[seed.images] = True
+    # Of the joined pieces, those certain ones of which the seed is made fit.
+    search.name_pieces()
     for _ in range(ROUNDS):
         progressed = search.turn_next()
         progressed |= search.name_pieces()
@@ -100,23 +95,6 @@ class _Search:
         self.failed = np.zeros(n, bool)
         self.sought = np.zeros(n, bool)
         self.led = np.full(pieces.spots.shape[1], -1)
-
-    @classmethod
-    def begun(
-        cls,
-        seed: Seed,
-        joined: Pieces,
-        certain: Pieces,
-        spots: Sequence[FloatArray],
-        width: int,
-    ) -> "_Search":
-        """Return the search with the seed's images solved."""
-        search = cls(seed.start.state, certain, spots, width)
-        search.rotations[seed.images] = seed.start.state.rotations
-        search.solved[seed.images] = True
-        # Of the joined pieces, those certain ones of which the seed is made fit.
-        search.name_pieces()
-        return search
 
     def predicted(self, rotations: FloatArray) -> FloatArray:
         """Return where the LEDs are by rotations (M, 3, 3), (M, L, 2), px."""

@@ -61,14 +61,8 @@ def choose_lens(
 ) -> tuple[BundleState, Choice]:
     """Return the start with the lens model that predicts images best, and the choice.
 
-    Parameters
-    ----------
-    start : Start
-        Model with 5 coefficients.
-    pixels : (M, L, 2) array
-        LED centres in its images, px; NaN where an LED was not seen.
-    needed : int, optional
-        Number of coefficients to use, unless they fold the image.
+    The start has 5 coefficients; ``needed`` are to be used instead, unless they fold
+    the image. Pixels (M, L, 2) are LED centres; NaN where one was not seen.
     """
     if needed is not None and needed != FEW:
         only = _refitted(start, needed, pixels, lengths, worth=-np.inf)

@@ -21,11 +21,6 @@ def number_by_place(state: BundleState) -> IntArray:
 
     From the tip upwards, those of a row from left to right as the camera sees them; a
     pen of the paper's layout has the paper's numbers.
-
-    Parameters
-    ----------
-    state : BundleState
-        With the tip in the frame of its pen.
     """
     leds = state.pen.leds - state.tip_pen
     towards = towards_camera(state)
@@ -42,19 +37,10 @@ def number_by_place(state: BundleState) -> IntArray:
 
 
 def number_by_sketch(leds: FloatArray, sketch: FloatArray) -> IntArray:
-    """Return the LEDs in the order of a sketch.
+    """Return the LEDs (L, 3) in the order of a sketch (L, 3), roughly, mm.
 
-    Parameters
-    ----------
-    leds : (L, 3) array
-        In any right-handed frame and to any scale.
-    sketch : (L, 3) array
-        Roughly, mm.
-
-    Raises
-    ------
-    CalibrationError
-        Their numbers differ, or they do not resemble each other.
+    They are in any right-handed frame and to any scale. Raises `CalibrationError` if
+    their numbers differ, or they do not resemble the sketch.
     """
     n = len(sketch)
     if len(leds) != n:
@@ -88,14 +74,8 @@ def framed(
 
     The frame is that of the sketch where there is one, and that of the paper for a pen
     of its layout. Else LED 1 is the origin, y runs to the last LED, and z, at right
-    angles to it, is next to the normal of the discs.
-
-    Parameters
-    ----------
-    tip : (3,) array
-        In the frame of the pen, mm; not estimated, and moved with it.
-    sketch : (L, 3) array or None
-        mm.
+    angles to it, is next to the normal of the discs. Tip (3,) and sketch (L, 3) are in
+    mm.
     """
     leds = pen.leds
     if sketch is not None:

@@ -101,10 +101,7 @@ def require_distance(
 ) -> None:
     """Refuse a distance of two cones that known lengths contradict.
 
-    Parameters
-    ----------
-    without : Calibration
-        Of both swings, by the lengths alone.
+    The calibration is that of both swings without it, by the lengths alone.
     """
     bundle, second = without.bundle, without.second
     assert second is not None
@@ -119,13 +116,7 @@ def require_distance(
 def contradicting_distance(
     stated: float, implied: float, known: KnownLength
 ) -> CalibrationError:
-    """Return the error of a distance of two cones, mm, that a known length contradicts.
-
-    Parameters
-    ----------
-    implied : float
-        Distance by the length, mm.
-    """
+    """Return the error of a distance of two cones, mm, for that implied by a length."""
     return CalibrationError(
         "discover.cones-contradict",
         distance=stated,
@@ -156,9 +147,7 @@ def require_sketched(lengths: Sequence[KnownLength], sketch: Pen) -> None:
     """Refuse lengths that the sketch of the pen contradicts."""
     for each in lengths:
         row = gradient_of(sketch.leds, each)
-        sketched = float(
-            np.linalg.norm(sketch.leds[each.second] - sketch.leds[each.first])
-        )
+        sketched = each.between(sketch.leds)
         if sketch.led_covariance is not None:
             variance = float(row @ sketch.led_covariance @ row)
         elif sketch.led_sigma is not None:
@@ -178,13 +167,7 @@ def require_sketched(lengths: Sequence[KnownLength], sketch: Pen) -> None:
 
 
 def require_certain(discovery: Discovery, sightings: Sightings) -> None:
-    """Refuse a swing that hardly determines tip or camera, or much of which is left.
-
-    Raises
-    ------
-    CalibrationError
-        Says what is missing.
-    """
+    """Refuse a swing that hardly determines tip or camera, or much of which is left."""
     calibration = discovery.calibration
     n_used = int(calibration.used.sum())
     n_images = sum(len(each) >= MIN_LEDS for each in sightings.centers)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.discovery.starts import KnownLength, gradient_of
+from lightpen.discovery.starts import KnownLength, farthest_apart, gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
@@ -32,17 +32,14 @@ def known_lengths(
 ) -> tuple[KnownLength, ...]:
     """Return measured lengths by the indices of numbered LEDs (L, 3).
 
-    Raises
-    ------
-    CalibrationError
-        An LED is none of the pen's, or one LED is given twice.
+    Raises `CalibrationError` if an LED is none of the pen's or given twice.
     """
     return tuple(_known(each, leds) for each in measured)
 
 
 def _known(each: MeasuredLength, leds: FloatArray) -> KnownLength:
     if each.leds is None:
-        return KnownLength(*farthest_apart(leds), each.length, each.sigma)
+        return KnownLength(*farthest_apart(leds)[:2], each.length, each.sigma)
     first, second = each.leds
     for number in each.leds:
         if not 1 <= number <= len(leds):
@@ -54,22 +51,12 @@ def _known(each: MeasuredLength, leds: FloatArray) -> KnownLength:
     return KnownLength(first - 1, second - 1, each.length, each.sigma)
 
 
-def farthest_apart(leds: FloatArray) -> tuple[int, int]:
-    """Return the indices of the two of LEDs (L, 3) that are farthest apart."""
-    apart = np.linalg.norm(leds[:, None] - leds, axis=2)
-    one, other = np.unravel_index(np.argmax(apart), apart.shape)
-    return int(one), int(other)
-
-
 def scale_by(lengths: Sequence[KnownLength], leds: FloatArray) -> float:
     """Return the factor that brings LEDs (L, 3) to the lengths, least squares.
 
-    Raises
-    ------
-    CalibrationError
-        The lengths contradict each other; the text shows which.
+    Raises `CalibrationError` if they contradict each other; the text shows which.
     """
-    found = np.array([_distance(leds, each) for each in lengths])
+    found = np.array([each.between(leds) for each in lengths])
     stated = np.array([each.length for each in lengths])
     sigmas = np.array([each.sigma for each in lengths])
     weights = found / sigmas
@@ -125,11 +112,12 @@ def with_led_covariance(pen: Pen, covariance: FloatArray) -> Pen:
 
     Images fit a pen of any size, so the longest distance tells the scale.
     """
-    longest = KnownLength(*farthest_apart(pen.leds), 0.0, 0.0)
+    first, second, _ = farthest_apart(pen.leds)
+    longest = KnownLength(first, second, 0.0, 0.0)
     row = gradient_of(pen.leds, longest)
     by_scale = covariance @ row
     variance = float(row @ by_scale)
-    sigma = float(np.sqrt(variance)) / _distance(pen.leds, longest)
+    sigma = float(np.sqrt(variance)) / longest.between(pen.leds)
     if sigma > LARGEST_SCALE:
         return replace(pen, led_covariance=covariance, scale_sigma=EXACT_SCALE)
     return replace(
@@ -137,7 +125,3 @@ def with_led_covariance(pen: Pen, covariance: FloatArray) -> Pen:
         led_covariance=covariance - np.outer(by_scale, by_scale) / variance,
         scale_sigma=max(sigma, EXACT_SCALE),
     )
-
-
-def _distance(leds: FloatArray, known: KnownLength) -> float:
-    return float(np.linalg.norm(leds[known.second] - leds[known.first]))

@@ -89,13 +89,7 @@ def _of_leds(state: BundleState, order: IntArray) -> BundleState:
 
 
 def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> ScaledStart:
-    """Return the start of the adjustment, to scale and in the pen's frame.
-
-    Parameters
-    ----------
-    pixels : (N, L, 2) array
-        px.
-    """
+    """Return the start of the adjustment to pixels (N, L, 2), in the pen's frame."""
     state, leds = found.state, found.state.pen.leds
     measured = request.lengths or (MeasuredLength(None, RELATIVE, 0.0),)
     lengths = tuple(
@@ -130,13 +124,7 @@ def scaled_start(request: Request, found: Labelled, pixels: FloatArray) -> Scale
 def adjust_halves(
     start: ScaledStart, pixels: FloatArray, known: Camera | None
 ) -> Halves:
-    """Adjust each half of the images alone.
-
-    Parameters
-    ----------
-    pixels : (N, L, 2) array
-        Of the images of the start, px.
-    """
+    """Adjust each half of the images of the start, with pixels (N, L, 2), alone."""
     state, n = start.state, len(pixels)
     prior = camera_prior(state.rig.cameras[0], known)
     found, sigmas, noise = np.empty(2), np.empty(2), np.empty(2)

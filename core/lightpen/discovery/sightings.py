@@ -40,10 +40,7 @@ def sightings_of_centers(
 ) -> Sightings:
     """Return the sightings of centres that were found elsewhere.
 
-    Raises
-    ------
-    FileError
-        Most centres are outside an image of this size, or close together.
+    Raises `FileError` if most are outside an image of this size, or close together.
     """
     every = np.concatenate([np.zeros((0, 2)), *centers])
     outside = np.any((every < -0.5) | (every > size), axis=1)
@@ -65,10 +62,7 @@ def find_spots(
 ) -> Sightings:
     """Find the spots in images that are whole and sharp.
 
-    Raises
-    ------
-    FileError
-        No image can be read, or they differ in size.
+    Raises `FileError` if no image can be read.
     """
     found: list[tuple[Spots, tuple[int, int] | None]] = []
     fault: FileError | None = None

@@ -40,6 +40,27 @@ FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e8
 WORST = 1e12  # misfit of a state that is none
 
 
+@dataclass(frozen=True)
+class KnownLength:
+    """A length between two LEDs by index, with its standard uncertainty, mm."""
+
+    first: int
+    second: int
+    length: float
+    sigma: float
+
+    def between(self, leds: FloatArray) -> float:
+        """Return the distance of the two among LEDs (L, 3)."""
+        return float(np.linalg.norm(leds[self.second] - leds[self.first]))
+
+
+def farthest_apart(points: FloatArray) -> tuple[int, int, float]:
+    """Return the indices of the two of points (L, 3) farthest apart, and how far."""
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    one, other = np.unravel_index(np.argmax(apart), apart.shape)
+    return int(one), int(other), float(apart.max())
+
+
 class CameraPrior(NamedTuple):
     """Prior knowledge of the intrinsics of a camera."""
 
@@ -130,12 +151,7 @@ def state_of(
 ) -> BundleState:
     """Return the state of a shape before a camera.
 
-    Parameters
-    ----------
-    radius : float
-        Of the discs, mm.
-    unit : float
-        mm a unit of the shape.
+    The radius is that of the discs, mm; ``unit`` are mm a unit of the shape.
     """
     distances = camera.fx * unit / shape.scales
     middle = np.array([camera.cx, camera.cy])
@@ -161,7 +177,7 @@ def adjust_start(
     pixels: FloatArray,
     prior: CameraPrior,
     n_steps: int,
-    lengths: tuple["KnownLength", ...],
+    lengths: tuple[KnownLength, ...],
     least_sigma: float = 0.0,
 ) -> Start:
     """Adjust a state by damped Gauss-Newton steps on the Cauchy loss.
@@ -213,7 +229,7 @@ def focal_sigma(
     start: Start,
     pixels: FloatArray,
     prior: CameraPrior,
-    lengths: tuple["KnownLength", ...],
+    lengths: tuple[KnownLength, ...],
 ) -> float:
     """Return the standard uncertainty of the focal length of an adjusted start, px."""
     state = start.state
@@ -224,16 +240,6 @@ def focal_sigma(
     unit = np.zeros_like(b)
     unit[N_CONE] = 1.0
     return float(np.sqrt(_damped_step(N, unit, 0.0)[N_CONE]))
-
-
-@dataclass(frozen=True)
-class KnownLength:
-    """A length between two LEDs by index, with its standard uncertainty, mm."""
-
-    first: int
-    second: int
-    length: float
-    sigma: float
 
 
 def scaled_to(state: BundleState, factor: float) -> BundleState:
@@ -264,7 +270,8 @@ def _cost(
     off = state.rig.cameras[0].intrinsics - prior.intrinsics
     loss += float(off @ prior.information @ off)
     loss += float(np.sum(off_sight(state) ** 2)) / FACING**2
-    loss += sum(((_length(state, k) - k.length) / k.sigma) ** 2 for k in lengths)
+    leds = state.pen.leds
+    loss += sum(((k.between(leds) - k.length) / k.sigma) ** 2 for k in lengths)
     return loss if np.isfinite(loss) else WORST
 
 
@@ -283,11 +290,6 @@ def _weighted(view: CameraView, sigma: float) -> CameraView:
         effects=each * view.effects,
         diameter=0.0 * np.nan_to_num(view.diameter),
     )
-
-
-def _length(state: BundleState, known: KnownLength) -> float:
-    leds = state.pen.leds
-    return float(np.linalg.norm(leds[known.second] - leds[known.first]))
 
 
 def _with_priors(
@@ -309,7 +311,7 @@ def _with_priors(
     at_leds = len(b) - 3 * state.pen.n_leds
     for known in lengths:
         row = gradient_of(state.pen.leds, known)
-        miss = known.length - _length(state, known)
+        miss = known.length - known.between(state.pen.leds)
         N[at_leds:, at_leds:] += np.outer(row, row) / known.sigma**2
         b[at_leds:] += row * miss / known.sigma**2
     at_diameter = at_leds - 1

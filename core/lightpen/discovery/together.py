@@ -65,10 +65,8 @@ def discover_together(
 ) -> Together:
     """Find tip, pen and camera by two or more swings of the same pen and tip.
 
-    Raises
-    ------
-    CalibrationError
-        A swing determines nothing, or the last contradicts the others.
+    Raises `CalibrationError` if a swing determines nothing, or the last contradicts the
+    others.
     """
     for k, sightings in enumerate(swings):
         if sightings.size != swings[0].size:

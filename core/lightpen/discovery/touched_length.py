@@ -18,11 +18,8 @@ def with_touched_length(request: Request, relative: Discovery) -> Request:
 
     The touches measure that length in the unit of the relative result. The ratio to the
     certified length is the scale, and so the distance of the LEDs farthest apart.
-
-    Raises
-    ------
-    CalibrationError
-        The touches are not of two ends, or a known length contradicts theirs.
+    Raises `CalibrationError` if the touches are not of two ends, or a known length
+    contradicts theirs.
     """
     touched = request.touched
     assert touched is not None
@@ -34,8 +31,7 @@ def with_touched_length(request: Request, relative: Discovery) -> Request:
     own = run.uncertainty / COVERAGE_FACTOR / run.measured
     sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
     for each in known_lengths(request.lengths, relative.pen.leds):
-        ends = relative.pen.leds[[each.first, each.second]]
-        implied = run.measured * each.length / float(np.linalg.norm(ends[1] - ends[0]))
+        implied = run.measured * each.length / each.between(relative.pen.leds)
         relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
         by_chance = np.hypot(implied * relative_sigma, certified.sigma)
         if abs(implied - certified.distance) > CONTRADICTING * by_chance:

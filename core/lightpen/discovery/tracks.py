@@ -55,14 +55,7 @@ def padded(spots: Sequence[FloatArray]) -> FloatArray:
 
 
 def follow(spots: Sequence[FloatArray], width: int) -> tuple[Pieces, Pieces]:
-    """Follow spots from image to image.
-
-    Parameters
-    ----------
-    spots : sequence of (S, 2) array
-        Of each image, in any order, px.
-    width : int
-        Of the images, px.
+    """Follow spots (S, 2), px, in any order, from image to image of some width, px.
 
     Returns
     -------
@@ -144,13 +137,7 @@ def find_lamps(pieces: Pieces) -> FloatArray:
 def without_lamps(
     spots: Sequence[FloatArray], lamps: FloatArray
 ) -> tuple[tuple[FloatArray, ...], tuple[IntArray, ...]]:
-    """Return the spots that are not at the places of lamps (K, 2), and their numbers.
-
-    Parameters
-    ----------
-    spots : sequence of (S, 2) array
-        Of each image, px.
-    """
+    """Return the spots that are not at places of lamps (K, 2), and their numbers."""
     numbers = []
     for each in spots:
         apart = np.linalg.norm(each[:, None] - lamps, axis=2)

@@ -243,17 +243,17 @@ def _check_separation(leds: FloatArray, diameter: float) -> None:
 
 
 def _check_not_in_line(leds: FloatArray, extent: float) -> None:
-    off_line = _off_line(leds).max()
-    if off_line < MIN_OFF_LINE * extent:
+    farthest = off_line(leds).max()
+    if farthest < MIN_OFF_LINE * extent:
         raise FileError(
             "pen.leds-in-line",
-            off_line=off_line,
+            off_line=farthest,
             extent=extent,
             needed=MIN_OFF_LINE * extent,
         )
 
 
-def _off_line(points: FloatArray) -> FloatArray:
+def off_line(points: FloatArray) -> FloatArray:
     """Return the distances of points (..., N, 3) from their best line."""
     centred = points - points.mean(axis=-2, keepdims=True)
     direction = np.linalg.svd(centred, full_matrices=False)[2][..., :1, :]
@@ -271,7 +271,7 @@ def _layout(leds: FloatArray) -> IntArray | None:
     if len(leds) != 10:
         return None
     backs = np.array(list(combinations(range(10), 4)))
-    in_line = _off_line(leds[backs]).max(axis=1) <= FRAME_TOLERANCE
+    in_line = off_line(leds[backs]).max(axis=1) <= FRAME_TOLERANCE
     for back in backs[in_line]:
         slots = _layout_behind(leds, back)
         if slots is not None:
@@ -367,14 +367,14 @@ def _misfit(leds: FloatArray) -> Message:
     """Return why LEDs are not of the paper's layout."""
     if len(leds) != 10:
         return message("pen.led-count", n_leds=len(leds))
-    off_line = _off_line(leds[_BACK])
+    off_back = off_line(leds[_BACK])
     front = leds[4:] - leds[4:].mean(axis=0)
     off_plane = np.abs(front @ np.linalg.svd(front)[2][2])
-    if off_line.max() > FRAME_TOLERANCE:
+    if off_back.max() > FRAME_TOLERANCE:
         return message(
             "pen.off-line",
-            led=int(np.argmax(off_line)) + 1,
-            distance=float(off_line.max()),
+            led=int(np.argmax(off_back)) + 1,
+            distance=float(off_back.max()),
         )
     if off_plane.max() > FRAME_TOLERANCE:
         return message(

@@ -14,6 +14,7 @@ from lightpen.model.pen import (
     check_frame,
     check_leds,
     in_pen_frame,
+    off_line,
     pen_frame_from_raw,
 )
 
@@ -126,7 +127,7 @@ def _measured(pen: Pen) -> tuple[RuleCheck, ...]:
     leds = pen.leds
     back, front = leds[:4], leds[4:]
     amounts = {
-        Rule.LINE: _off_line(back),
+        Rule.LINE: float(off_line(back).max()),
         Rule.ORIGIN: float(np.hypot(*leds[0, :2])),
         Rule.AXIS: float(np.abs(back[:, 0] - back[0, 0]).max()),
         Rule.PLANE: float(np.abs(front[:, 2]).max()),
@@ -143,11 +144,3 @@ def _measured(pen: Pen) -> tuple[RuleCheck, ...]:
             RuleCheck(rule, RuleStatus.BROKEN if broken else RuleStatus.MET, amount)
         )
     return tuple(checks)
-
-
-def _off_line(points: FloatArray) -> float:
-    """Return the largest distance of points from their best line, mm."""
-    centred = points - points.mean(axis=0)
-    along = np.linalg.svd(centred)[2][0]
-    off = centred - np.outer(centred @ along, along)
-    return float(np.linalg.norm(off, axis=1).max())

@@ -89,7 +89,7 @@ def labelled(swing: Swing, pixels: FloatArray, spots: IntArray) -> Labelled:
     R = swing.rotations[:N_SOLVED]
     start = Start(BundleState(rig_of(CAMERA), FLAT, np.zeros(3), CONE, R), 0.03)
     seed = Seed(np.arange(N_SOLVED), np.arange(FLAT.n_leds), start, (), np.inf)
-    return label(seed, pieces, pieces, tuple(pixels), CAMERA.width)
+    return label(seed, pieces, tuple(pixels), CAMERA.width)
 
 
 def test_a_flat_pen_that_passes_the_view_from_the_front_does_not_turn_back() -> None:
