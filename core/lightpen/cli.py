@@ -33,52 +33,28 @@ from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
 from lightpen.messages import Message
 
-# Each with what adds its options, which is imported only for what was given.
+# Name, module that adds the options, imported only for what was given, and purpose.
 COMMANDS = (
-    (
-        "calibrate",
-        "calibrate the tip from the images of a swing",
-        "calibrate:add_calibrate",
-    ),
-    ("simulate", "write a simulated swing", "simulate:add_simulate"),
-    ("pivot", "calibrate the tip from given poses", "pivot:add_pivot"),
-    ("pen", "transform measured LED coordinates into the pen frame", "pen:add_pen"),
-    ("verify", "verify a tip on reference artefacts", "verify:add_verify"),
-    ("measure", "measure a part by a plan", "measure:add_measure"),
-    (
-        "discover",
-        "find tip, pen and camera from one swing and one length",
-        "discover:add_discover",
-    ),
-    (
-        "repeatability",
-        "compare calibrations of one tip",
-        "repeatability:add_repeatability",
-    ),
-    (
-        "recalculate",
-        "recompute calibrations and check U by Monte Carlo",
-        "recalculate:add_recalculate",
-    ),
-    (
-        "improve-pen",
-        "improve the LED file from several swings",
-        "pen_health:add_improve_pen",
-    ),
-    ("intrinsics", "calibrate a camera with a board", "intrinsics:add_intrinsics"),
+    ("calibrate", "calibrate", "calibrate the tip from the images of a swing"),
+    ("simulate", "simulate", "write a simulated swing"),
+    ("pivot", "pivot", "calibrate the tip from given poses"),
+    ("pen", "pen", "transform measured LED coordinates into the pen frame"),
+    ("verify", "verify", "verify a tip on reference artefacts"),
+    ("measure", "measure", "measure a part by a plan"),
+    ("discover", "discover", "find tip, pen and camera from one swing and one length"),
+    ("repeatability", "repeatability", "compare calibrations of one tip"),
+    ("recalculate", "recalculate", "recompute calibrations and check U by Monte Carlo"),
+    ("improve-pen", "pen_health", "improve the LED file from several swings"),
+    ("intrinsics", "intrinsics", "calibrate a camera with a board"),
     (
         "extrinsics",
+        "intrinsics",
         "calibrate the extrinsics of two cameras with a board",
-        "intrinsics:add_extrinsics",
     ),
-    ("board", "write a calibration board for printing", "board:add_board"),
-    (
-        "check-camera",
-        "check the camera file with a swing",
-        "check_camera:add_check_camera",
-    ),
-    ("export", "export a tip for other programs", "export:add_export"),
-    ("stream", "stream pose and tip to other programs", "stream:add_stream"),
+    ("board", "board", "write a calibration board for printing"),
+    ("check-camera", "check_camera", "check the camera file with a swing"),
+    ("export", "export", "export a tip for other programs"),
+    ("stream", "stream", "stream pose and tip to other programs"),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
@@ -209,20 +185,21 @@ def _parser(
         add_desktop(parser, desktop)
         add_open(added("open", "open a recorded swing"), desktop)
         add_report(added("report", "write the calibration report as PDF"), desktop)
-    for name, help_text, function in COMMANDS:
+    for name, module, help_text in COMMANDS:
         command = added(name, help_text)
         command.set_defaults(log_folder=usual_data_folder)
         if name in given:
-            resolve_name(f"lightpen.commands.{function}")(command)
+            add = f"add_{name.replace('-', '_')}"
+            resolve_name(f"lightpen.commands.{module}:{add}")(command)
     data_folder = usual_data_folder if desktop is None else desktop.data_folder
-    for name, help_text, add in (
+    for name, help_text, add_options in (
         ("archive", "check, list, export and import entries", add_archive),
         ("tips", "manage the library of pens, tips and cones", add_tips),
     ):
         command = added(name, help_text)
         command.set_defaults(log_folder=usual_data_folder)
         if name in given:
-            add(command, data_folder)
+            add_options(command, data_folder)
     return parser, commands.choices
 
 

@@ -6,14 +6,9 @@ from lightpen.messages import Message, Value, shown
 
 
 class LightpenError(Exception):
-    """Base of the errors that are shown to the user.
+    """Base of the errors shown to the user, by a message or its code with values.
 
-    Parameters
-    ----------
-    content : Message or str
-        Message or its code: what was found, what is needed, what to do.
-    **values : Value or Path
-        Of a message given by its code.
+    The message says what was found, what is needed, what to do; a path is shown.
     """
 
     def __init__(self, content: Message | str, /, **values: Value | Path) -> None:

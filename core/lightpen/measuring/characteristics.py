@@ -25,7 +25,7 @@ from lightpen.measuring.features import AXIS, PLACE, Feature
 from lightpen.measuring.plan import CharacteristicKind as Of
 from lightpen.measuring.plan import Nominal, PlannedCharacteristic
 from lightpen.measuring.quantities import Quantity, derive
-from lightpen.measuring.surfaces import FeatureKind
+from lightpen.measuring.surfaces import RADIAL, FeatureKind
 from lightpen.measuring.zones import Criterion, fit_zone
 
 N_DRAWS = 4000
@@ -35,7 +35,6 @@ COORDINATES = {Of.X: 0, Of.Y: 1, Of.Z: 2}
 AXIAL = {FeatureKind.LINE, FeatureKind.CYLINDER, FeatureKind.CONE}
 FLAT = {FeatureKind.PLANE}
 CENTRED = {FeatureKind.POINT, FeatureKind.CIRCLE, FeatureKind.SLOT, FeatureKind.SPHERE}
-RADIAL = {FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER}
 FORMS = {
     Of.STRAIGHTNESS: {FeatureKind.LINE},
     Of.FLATNESS: {FeatureKind.PLANE},

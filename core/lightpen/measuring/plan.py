@@ -22,7 +22,7 @@ from msgspec import Meta, Struct, structs
 from lightpen.errors import FileError
 from lightpen.formats.documents import parse_document
 from lightpen.formats.files import read_text, write_whole
-from lightpen.measuring.surfaces import SURFACES, FeatureKind
+from lightpen.measuring.surfaces import RADIAL, SURFACES, FeatureKind
 from lightpen.measuring.zones import Criterion
 from lightpen.messages import Message, message, printable
 from lightpen.model.decision_rules import DecisionRule
@@ -35,7 +35,6 @@ NEVER = "least squares"
 FARTHEST = 1e6  # mm or degrees, of what a plan states
 REDUNDANT = 2  # times as many points as determine a feature
 UNKNOWN_TOUCHES = 8  # of a feature to be recognised
-OF_ONE_SIZE = {FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER}
 KNOWN_FORMS = "a plane, or a circle, sphere or cylinder with its nominal diameter"
 NEEDS_FRAME = ("x", "y", "z", "position")
 
@@ -367,7 +366,7 @@ def _has_known_form(feature: PlannedFeature) -> bool:
     if feature.kind is FeatureKind.PLANE:
         return True
     has_size = feature.nominal is not None and feature.nominal.diameter is not None
-    return feature.kind in OF_ONE_SIZE and has_size
+    return feature.kind in RADIAL and has_size
 
 
 def _unknown(

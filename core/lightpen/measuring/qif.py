@@ -6,6 +6,7 @@ As a plan can combine features freely, characteristics are user-defined linear o
 angular ones that name what is measured.
 """
 
+from collections.abc import Sequence
 from uuid import uuid4
 from xml.etree import ElementTree as ET
 
@@ -23,6 +24,7 @@ from lightpen.model.decision_rules import Decision
 
 NAMESPACE = "http://qifstandards.org/xsd/qif3"
 VERSION = "3.0.0"
+PARTS = ("Definition", "Nominal", "Item", "Measurement")  # of a characteristic
 N_DECIMALS = 12
 NAMES = {FeatureKind.SLOT: "ElongatedCircle"}  # that are other words in QIF
 STATUS = {
@@ -71,12 +73,10 @@ def qif_text(part: MeasuredPart) -> str:
     if n:
         measured = ET.SubElement(one, "MeasuredCharacteristics")
         group = ET.SubElement(measured, "CharacteristicMeasurements", {"n": str(n)})
+        parents = (definitions, nominals, items, group)
         for result in part.results:
-            own = tuple(str(next(ids)) for _ in range(4))
-            _add_definition(definitions, result, own)
-            _add_nominal(nominals, result, own)
-            _add_item(items, result, own)
-            _add_measurement(group, result, own)
+            own = [str(next(ids)) for _ in parents]
+            _add_characteristic(parents, result, own)
     status = ET.SubElement(one, "InspectionStatus")
     _text(status, "InspectionStatusEnum", _overall(part))
     ET.indent(root)
@@ -114,63 +114,39 @@ def _add_units(root: ET.Element) -> None:
         _text(conversion, "Factor", _number(factor))
 
 
-def _kind(result: CharacteristicResult) -> str:
-    is_angle = result.planned.quantity in IS_ANGLE
-    return f"UserDefined{'Angular' if is_angle else 'Linear'}Characteristic"
-
-
-def _add(
-    parent: ET.Element, result: CharacteristicResult, part: str, id_: str
-) -> ET.Element:
-    return ET.SubElement(parent, f"{_kind(result)}{part}", {"id": id_})
-
-
-def _add_definition(
-    parent: ET.Element, result: CharacteristicResult, ids: tuple[str, ...]
+def _add_characteristic(
+    parents: Sequence[ET.Element], result: CharacteristicResult, ids: Sequence[str]
 ) -> None:
+    """Add definition, nominal, item and measurement, each referring to the last."""
     planned = result.planned
-    element = _add(parent, result, "Definition", ids[0])
-    _text(element, "Name", planned.label)
+    kind = "Angular" if planned.quantity in IS_ANGLE else "Linear"
+    definition, nominal, item, measured = (
+        ET.SubElement(parent, f"UserDefined{kind}Characteristic{part}", {"id": id_})
+        for parent, part, id_ in zip(parents, PARTS, ids, strict=True)
+    )
+    _text(definition, "Name", planned.label)
     lower, upper = planned.limits
     if np.isinf([lower, upper]).all():
-        _text(element, "NonTolerance", "MEASURED")
+        _text(definition, "NonTolerance", "MEASURED")
     else:
-        tolerance = ET.SubElement(element, "Tolerance")
+        tolerance = ET.SubElement(definition, "Tolerance")
         for name, limit in (("MaxValue", upper), ("MinValue", lower)):
             if np.isfinite(limit):
                 _text(tolerance, name, _number(limit))
         _text(tolerance, "DefinedAsLimit", "true")
     what = f"{planned.quantity.value} of {', '.join(planned.of)}"
     datum = f", datum {planned.datum}" if planned.datum else ""
-    _text(element, "WhatToMeasure", what + datum)
-
-
-def _add_nominal(
-    parent: ET.Element, result: CharacteristicResult, ids: tuple[str, ...]
-) -> None:
-    element = _add(parent, result, "Nominal", ids[1])
-    _text(element, "CharacteristicDefinitionId", ids[0])
-    _text(element, "Name", result.planned.label)
-    if result.planned.nominal is not None:
-        _text(element, "TargetValue", _number(result.planned.nominal))
-
-
-def _add_item(
-    parent: ET.Element, result: CharacteristicResult, ids: tuple[str, ...]
-) -> None:
-    element = _add(parent, result, "Item", ids[2])
-    _text(element, "Name", result.planned.label)
-    _text(element, "CharacteristicNominalId", ids[1])
-
-
-def _add_measurement(
-    parent: ET.Element, result: CharacteristicResult, ids: tuple[str, ...]
-) -> None:
-    element = _add(parent, result, "Measurement", ids[3])
-    status = ET.SubElement(element, "Status")
+    _text(definition, "WhatToMeasure", what + datum)
+    _text(nominal, "CharacteristicDefinitionId", ids[0])
+    _text(nominal, "Name", planned.label)
+    if planned.nominal is not None:
+        _text(nominal, "TargetValue", _number(planned.nominal))
+    _text(item, "Name", planned.label)
+    _text(item, "CharacteristicNominalId", ids[1])
+    status = ET.SubElement(measured, "Status")
     _text(status, "CharacteristicStatusEnum", STATUS[result.decision])
-    _text(element, "CharacteristicItemId", ids[2])
-    _value(element, "Value", result.value.value, result.value.uncertainty)
+    _text(measured, "CharacteristicItemId", ids[2])
+    _value(measured, "Value", result.value.value, result.value.uncertainty)
 
 
 def _value(parent: ET.Element, name: str, value: float, uncertainty: float) -> None:

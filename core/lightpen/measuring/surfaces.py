@@ -175,6 +175,7 @@ SURFACES = {
     FeatureKind.CONE: FeatureModel(_cone, (0, 1, 3, 4), ("radius", "half_angle")),
 }
 
+RADIAL = {FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER}  # of one size
 NAMES = {
     FeatureKind.POINT: message("measuring.point"),
     FeatureKind.LINE: message("measuring.line"),

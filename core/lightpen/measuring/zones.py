@@ -21,7 +21,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.features import fit_feature
 from lightpen.measuring.starts import Start
-from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
+from lightpen.measuring.surfaces import NAMES, RADIAL, SURFACES, FeatureKind
 from lightpen.messages import message
 from lightpen.model.rigid import rotation_from_vector
 
@@ -45,20 +45,10 @@ CRITERIA = {
     Criterion.CIRCUMSCRIBED: message("measuring.circumscribed"),
 }
 ZONES = {
-    Criterion.MINIMUM_ZONE: (
-        FeatureKind.LINE,
-        FeatureKind.PLANE,
-        FeatureKind.CIRCLE,
-        FeatureKind.SPHERE,
-        FeatureKind.CYLINDER,
-        FeatureKind.CONE,
-    ),
-    Criterion.INSCRIBED: (FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER),
-    Criterion.CIRCUMSCRIBED: (
-        FeatureKind.CIRCLE,
-        FeatureKind.SPHERE,
-        FeatureKind.CYLINDER,
-    ),
+    Criterion.MINIMUM_ZONE: RADIAL
+    | {FeatureKind.LINE, FeatureKind.PLANE, FeatureKind.CONE},
+    Criterion.INSCRIBED: RADIAL,
+    Criterion.CIRCUMSCRIBED: RADIAL,
 }
 """The kinds that each criterion is defined for. A circle stays in the plane of least
 squares; a line is the axis of the thinnest cylinder about the points."""
@@ -67,24 +57,12 @@ squares; a line is the axis of the thinnest cylinder about the points."""
 def fit_zone(
     kind: FeatureKind, points: FloatArray, criterion: Criterion
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Fit a feature by a criterion.
+    """Fit a feature to points (N, 3), mm, by a criterion.
 
-    Parameters
-    ----------
-    points : (N, 3) array
-        mm.
-
-    Returns
-    -------
-    origin, axes, sizes : (3,), (3, 3), (S,) array
-        As `features.Feature` has them.
-    zone : float
-        Width of the zone, mm: peak to valley; of a line the diameter of its cylinder.
-
-    Raises
-    ------
-    CalibrationError
-        The criterion is not defined for the kind, or the points do not determine it.
+    Returns origin, axes and sizes as `features.Feature` has them, and the width of the
+    zone, mm: peak to valley; of a line the diameter of its cylinder. Raises
+    `CalibrationError` if the criterion is not defined for the kind, or the points do
+    not determine it.
     """
     if kind not in ZONES[criterion]:
         raise CalibrationError(

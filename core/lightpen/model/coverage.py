@@ -79,12 +79,8 @@ def measure_coverage(rotations: FloatArray) -> Coverage:
 def posture_spread(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the spread of the pen's rotations cam_from_pen (N, 3, 3).
 
-    Returns
-    -------
-    spread : (3,) array
-        Rms turn of three orthogonal directions, the least first, rad.
-    axes : (3, 3) array
-        The directions, unit vectors of the pen frame, one a row.
+    That is the rms turn of three orthogonal directions, the least first, (3,), rad, and
+    these directions, unit vectors of the pen frame, one a row.
     """
     deviations = rotations - rotations.mean(axis=0)
     scatter = np.einsum("nki,nkj->ij", deviations, deviations) / len(rotations)

@@ -50,18 +50,9 @@ def with_turns(moves: FloatArray, arms: FloatArray) -> FloatArray:
 
 
 def vector_from_rotation(rotations: FloatArray) -> FloatArray:
-    """Return the rotation vectors, of length 0 to pi, of rotation matrices.
+    """Return the vectors (..., 3), axis times angle, rad, of rotations (..., 3, 3).
 
-    Goes through the unit quaternion, which stays exact near angles of 0 and pi.
-
-    Parameters
-    ----------
-    rotations : (..., 3, 3) array
-
-    Returns
-    -------
-    (..., 3) array
-        Axis times angle, rad.
+    The angle is 0 to pi; by the unit quaternion [1]_, which stays exact near both.
 
     References
     ----------
@@ -113,18 +104,9 @@ def nearest_rotation(matrices: FloatArray) -> FloatArray:
 
 
 def fit_rigid(source: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return R, t that bring ``source`` onto ``target`` with least squares.
+    """Return R (..., 3, 3), t (..., 3) that fit points to others by least squares [1]_.
 
-    Parameters
-    ----------
-    source, target : (..., N, 3) array
-        Corresponding points, mm.
-
-    Returns
-    -------
-    R : (..., 3, 3) array
-    t : (..., 3) array
-        ``target ~ source @ R.T + t``.
+    ``target ~ source @ R.T + t``, both (..., N, 3), mm.
 
     References
     ----------

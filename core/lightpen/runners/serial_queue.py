@@ -21,12 +21,8 @@ class SerialQueue:
     """Runs queued functions one after the other in its own thread.
 
     The thread outlives a bug: the act in which it happened is not completed, the crash
-    goes to `threading.excepthook`, and the next act is done.
-
-    Parameters
-    ----------
-    on_bug : callable
-        Done next after an act that ended by a bug; not after a bug in itself.
+    goes to `threading.excepthook`, and ``on_bug`` is done next, except after a bug in
+    itself.
     """
 
     def __init__(self, name: str, on_bug: Act) -> None:
@@ -196,12 +192,8 @@ class StartThread(Protocol):
 class BackgroundTask:
     """At most one computation in the background; its result is queued.
 
-    Parameters
-    ----------
-    on_bug : callable
-        Done when the computation ended by a bug; it is then still there.
-    on_progress : callable
-        Takes the fraction done, 0 to 1, on the thread of the computation.
+    ``on_bug`` is done when it ended by a bug; it is then still there. ``on_progress``
+    takes the fraction done, 0 to 1, on the thread of the computation.
     """
 
     def __init__(self, start: StartThread, on_bug: Act, on_progress: Report) -> None:

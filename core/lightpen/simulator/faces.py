@@ -105,20 +105,11 @@ def face_patches(
     sigma: float,
     margin: int,
 ) -> list[Patch]:
-    """Return the images of LEDs with faces, blurred and integrated by the pixels.
+    """Return the images of lit LEDs, blurred and integrated by the pixels.
 
-    Parameters
-    ----------
-    rotations, translations : (S, 3, 3) and (S, 3) array
-        cam_from_pen at S times during the exposure; mm.
-    faces : tuple of Face
-        One per LED of the pen.
-    lit : list of int
-        LEDs to draw.
-    sigma : float
-        Of the Gaussian blur, px.
-    margin : int
-        Dark pixels to add all round.
+    Rotations (S, 3, 3) and translations (S, 3), mm, of cam_from_pen are those at S
+    times during the exposure, the faces those of all LEDs. Sigma of the Gaussian blur
+    is in px, ``margin`` the number of dark pixels to add all round.
     """
     across = orthogonal(pen.normals)
     axes = np.stack([across, np.cross(pen.normals, across), pen.normals], axis=-1)

@@ -16,10 +16,7 @@ LEAN_TIME = 0.6  # s until the next one
 class GuidedOperator:
     """Moves the hand of a simulated operator by the states of a swing.
 
-    Parameters
-    ----------
-    heading : float
-        The operator's right as the camera sees it, rad.
+    The heading is the operator's right as the camera sees it, rad.
     """
 
     def __init__(self, operator: Operator, heading: float = 0.0) -> None:

@@ -100,14 +100,8 @@ class Operator:
 
     The commands may come from any thread. They are taken up at the time that the clock
     shows, which makes the movement a function of the seed, the commands and their
-    times. Angles are those of `lightpen.simulator.postures`.
-
-    Parameters
-    ----------
-    seed : int
-        Chooses the swing, the tremor and where slips go.
-    seated : bool
-        Whether the tip is in the cone at first; else the pen is out of the image.
+    times. Angles are those of `lightpen.simulator.postures`. Unless seated in the cone,
+    the pen is out of the image at first.
     """
 
     def __init__(

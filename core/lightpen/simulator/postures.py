@@ -59,12 +59,9 @@ def random_postures(n: int, rng: np.random.Generator) -> Postures:
 def draw_postures(n: int, rng: np.random.Generator, kind: SwingKind) -> Postures:
     """Return ``n`` postures of a kind of swing.
 
-    Parameters
-    ----------
-    kind : str
-        ``field``: random all round. ``cone``: constant tilt that goes round once, with
-        roll. ``operator``: a hand's smooth movement at `FRAME_RATE`. ``one-axis`` and
-        ``upright`` (hardly tilted) do not fix the tip.
+    ``field``: random all round. ``cone``: constant tilt that goes round once, with
+    roll. ``operator``: a hand's smooth movement at `FRAME_RATE`. ``one-axis`` and
+    ``upright`` (hardly tilted) do not fix the tip.
     """
     steps = (np.arange(n) + 0.5) / max(n, 1)
     start = rng.uniform(0, 2 * np.pi)

@@ -129,14 +129,10 @@ class _Seen:
 
 
 class PoseStream:
-    """Streams poses while it is open.
+    """Streams poses while it is open, timed by the clock of the camera.
 
-    Parameters
-    ----------
-    clock : Clock, optional
-        The clock of the camera.
-    on_change : callable
-        Called with the new status by whatever thread changes it; must return at once.
+    ``on_change`` is called with the new status by whatever thread changes it; it must
+    return at once.
     """
 
     def __init__(

@@ -25,14 +25,7 @@ class SwingRunner:
     """Captures, solves and accepts one swing after another.
 
     Every method returns at once, except `take` and `await_end`. A command that is not
-    possible in the state of the swing by then is ignored.
-
-    Parameters
-    ----------
-    records : Path
-        Folder that a new swing's record is made in.
-    logbook : LazyLogbook, optional
-        Archive for the outcome of swings; without it the outcome is only in files.
+    possible in the state of the swing by then is ignored. See `SwingWorkflow`.
     """
 
     def __init__(

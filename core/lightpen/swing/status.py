@@ -13,6 +13,7 @@ from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
+from lightpen.runners.faults import FaultListener
 from lightpen.swing.capture.state import (
     Pause,
     Phase,
@@ -96,7 +97,7 @@ class SwingStatus:
         return self.state is not None and self.state.pause is Pause.BY_USER
 
 
-class SwingListener(Protocol):
+class SwingListener(FaultListener, Protocol):
     """Listener, called on runner threads; must return soon."""
 
     def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
@@ -104,12 +105,6 @@ class SwingListener(Protocol):
 
     def on_progress(self, fraction: float) -> None:
         """Handle the progress of the solution, 0 to 1."""
-
-    def on_fault(self, message: Message) -> None:
-        """Handle a fault: something could not be done, nothing is lost."""
-
-    def on_fault_cleared(self, message: Message) -> None:
-        """Handle a fault that is cleared."""
 
 
 def log_change(

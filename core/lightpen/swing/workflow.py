@@ -5,7 +5,7 @@ computations elsewhere.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TypeVar
@@ -75,14 +75,8 @@ PRESS_UNCERTAINTY = 1.0  # mm: U of that tip ends no swing
 class SwingWorkflow:
     """Successive swings, from the first image to acceptance.
 
-    A command that is not possible in the present state is ignored.
-
-    Parameters
-    ----------
-    records : Path
-        Folder that a new swing's record is made in.
-    logbook : LazyLogbook or None
-        Archive for the outcome of swings; without it the outcome is only in files.
+    A command that is not possible in the present state is ignored. A new swing's record
+    is made in the folder ``records``; without a logbook the outcome is only in files.
     """
 
     def __init__(
@@ -478,9 +472,9 @@ class SwingWorkflow:
         archive, record = self._archive, self._record
         assert record is not None
 
-        def solved(report: Report) -> _Solved:
+        def solved(report: Report) -> tuple[Solution, SwingAssessment]:
             solution = work(report)
-            return _Solved(solution, assess(archive, record, solution))
+            return solution, assess(archive, record, solution)
 
         self._tried = self._wanted
         self._start(Activity.SOLVING, solved, self._on_solved, self._on_unsolved)
@@ -504,8 +498,8 @@ class SwingWorkflow:
             self._wanted = self._status.solution.taken_out
         self._publish(replace(self._status, activity=Activity.NONE))
 
-    def _on_solved(self, solved: "_Solved") -> None:
-        solution = solved.solution
+    def _on_solved(self, solved: tuple[Solution, SwingAssessment]) -> None:
+        solution, assessment = solved
         if self._first is not None:
             self._end_press(solution)
             return
@@ -522,13 +516,13 @@ class SwingWorkflow:
                 self._keep_solution(before, error.message)
                 return
         self._faults.end()
-        verdict = solved.assessment.verdict
+        verdict = assessment.verdict
         goes_on = self._wanted != solution.taken_out
         activity = Activity.SOLVING if goes_on else Activity.NONE
         status = replace(
             status,
             solution=solution,
-            assessment=solved.assessment,
+            assessment=assessment,
             failed=None,
             result=None,
             activity=activity,
@@ -647,11 +641,3 @@ class SwingWorkflow:
         if self._catching_up is not None:
             self._catching_up.cancel()
         self._faults.trying(self._logbook.close)
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """A solution and its assessment."""
-
-    solution: Solution
-    assessment: SwingAssessment

@@ -8,8 +8,6 @@ from msgspec import structs
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
-from lightpen.estimation.bundle.self_check import SelfCheck
-from lightpen.estimation.bundle.tip_frames import TipFrames
 from lightpen.estimation.calibrate import Calibration, CameraImages
 from lightpen.estimation.reports.calibration_record import (
     AdjustedParameter,
@@ -59,17 +57,12 @@ from lightpen.model.limits import SwingLimits
 def calibration_record(
     calibration: Calibration, inputs: Inputs, method: Method, limits: SwingLimits
 ) -> CalibrationRecord:
-    """Return the record of a calibration.
-
-    Parameters
-    ----------
-    method : str
-        ``"joint"`` or ``"two-stage"``, of the tip.
-    """
+    """Return the record of a calibration, with the tip by one of the methods."""
     result = result_of(calibration, method)
     tip, nominal = result.tip_pen, inputs.nominal_tip
     budget = calibration.budget
     several = len(calibration.cameras) > 1
+    frames, check = calibration.tip_frames, calibration.self_check
     return CalibrationRecord(
         program=THIS_PROGRAM,
         created=local_now().replace(microsecond=0),
@@ -106,8 +99,8 @@ def calibration_record(
         ),
         coverage=_coverage(calibration),
         leds=_leds(calibration),
-        tip_frames=_tip_frames(calibration.tip_frames),
-        self_check=_self_check(calibration.self_check),
+        tip_frames=None if frames is None else TipFramesRecord(*plain(tuple(frames))),
+        self_check=None if check is None else SelfCheckRecord(*check),
         rig=_rig(calibration) if several else None,
         inputs=_inputs(inputs, calibration.observations.interval_ms),
         frames=tuple(_frames(calibration)),
@@ -242,14 +235,6 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
             for each in calibration.effects
         ),
     )
-
-
-def _self_check(check: SelfCheck | None) -> SelfCheckRecord | None:
-    return None if check is None else SelfCheckRecord(*check)
-
-
-def _tip_frames(frames: TipFrames | None) -> TipFramesRecord | None:
-    return None if frames is None else TipFramesRecord(*plain(tuple(frames)))
 
 
 def _lamps(calibration: Calibration) -> tuple[LampRecord, ...]:

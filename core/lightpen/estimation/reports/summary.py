@@ -23,13 +23,7 @@ def calibration_text(
     verdict: Verdict,
     origin: Origin | None = None,
 ) -> str:
-    """Return a calibration as text for the screen, the verdict on it last.
-
-    Parameters
-    ----------
-    origin : Origin, optional
-        Origin of the images, if known.
-    """
+    """Return a calibration as text for the screen, the verdict on it last."""
     results = {name: result_of(calibration, name) for name in METHODS}
     chosen = results[method]
     lines = [_heading("Tip in the pen frame, mm", "xyz")]

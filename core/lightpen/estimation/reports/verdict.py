@@ -206,13 +206,7 @@ def change_since(
 
 
 def change_doubt(change: Change, date: str, limit: float | None) -> Message | None:
-    """Return why a change needs checking; None if it does not.
-
-    Parameters
-    ----------
-    limit : float or None
-        Of the tip for the distance from there, mm; None if it has none.
-    """
+    """Return why a change needs checking, by a limit of its distance, mm, or None."""
     if limit is not None and change.distance > limit:
         return message(
             Code.CHANGE_BEYOND_LIMIT, distance=change.distance, date=date, limit=limit
@@ -223,16 +217,9 @@ def change_doubt(change: Change, date: str, limit: float | None) -> Message | No
 def judge_change(
     verdict: Verdict, change: Change | None, date: str, limit: float | None = None
 ) -> Verdict:
-    """Judge a passing tip by its change from the previous one.
+    """Judge a passing tip by its change since the current result, if there is one.
 
-    Parameters
-    ----------
-    verdict : Verdict
-        Verdict on the tip alone; its findings take precedence.
-    change : Change or None
-        Since the current result; None if there is none.
-    limit : float, optional
-        See `change_doubt`.
+    Findings of the verdict on the tip alone take precedence; see `change_doubt`.
     """
     if verdict.grade is not Grade.PASS or change is None:
         return verdict

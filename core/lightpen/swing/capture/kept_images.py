@@ -105,14 +105,8 @@ def kept_before(
 ) -> AcceptedImages:
     """Return the images accepted before an interruption, with their fit.
 
-    Parameters
-    ----------
-    numbers : (N,) array of int
-        In the swing's record.
-    pixels : (N, C, L, 2) array
-        px; NaN where an LED was not seen.
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        rig_from_pen, mm.
+    They have numbers (N,) in the swing's record, pixels (N, C, L, 2), NaN where an LED
+    was not seen, and rotations (N, 3, 3) and translations (N, 3), mm, of rig_from_pen.
     """
     if not len(numbers):
         return none_kept(rig.n_cameras, pen.n_leds, assumed)

@@ -45,12 +45,8 @@ def fit_moments(
 ) -> SimultaneousPoses:
     """Fit the pose of each moment to the LEDs in one camera, as when captured.
 
-    Parameters
-    ----------
-    pixels : (N, C, L, 2) array
-        px; NaN where an LED was not seen.
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Start, rig_from_pen, mm.
+    The fit to pixels (N, C, L, 2), NaN where an LED was not seen, starts at rotations
+    (N, 3, 3) and translations (N, 3), mm, of rig_from_pen.
     """
     n_seen = np.isfinite(pixels[..., 0]).sum(axis=2)
     enough = n_seen >= certain_leds(pen)

@@ -177,22 +177,27 @@ class SwingState:
     time: float  # of the last image, s
     message: Message  # for the operator
     kept: AcceptedImages
-    next_number: int  # of the next image in the swing's record
-    n_dropped: Mapping[Reason, int]  # postures that were new but of no use
-    seat: Seat | None
-    recent: tuple[RecentDetection, ...]
     last_seen: float  # when the pen was seen last, s
-    pause: Pause
-    strayed_since: float | None  # when the tip left the cone, s; None while it is in it
-    stray_rotations: FloatArray  # (M, 3, 3), postures held since then
-    flawed_rotations: FloatArray  # (M, 3, 3), new postures without a good image yet
-    heading: float | None  # operator's right in the image, rad; None until learnt
-    was_upright: bool  # since the capture began: a tilt then teaches the heading
-    target: Posture | None  # to guide to
     target_since: float  # when the target was chosen, s
-    slipped_at: float | None  # when the tip slipped or images were dropped last, s
-    still_since: float | None  # upright and still, s
-    trace: Trace
+    next_number: int = 1  # of the next image in the swing's record
+    # Postures that were new but of no use.
+    n_dropped: Mapping[Reason, int] = field(default_factory=Counter)
+    seat: Seat | None = None
+    recent: tuple[RecentDetection, ...] = ()
+    pause: Pause = Pause.NONE
+    strayed_since: float | None = None  # when the tip left the cone, s
+    # (M, 3, 3), postures held since then
+    stray_rotations: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    # (M, 3, 3), new postures without a good image yet
+    flawed_rotations: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    heading: float | None = None  # operator's right in the image, rad, once learnt
+    was_upright: bool = (
+        False  # since the capture began: a tilt then teaches the heading
+    )
+    target: Posture | None = None  # to guide to
+    slipped_at: float | None = None  # when the tip slipped or images were dropped, s
+    still_since: float | None = None  # upright and still, s
+    trace: Trace = NO_TRACE
     progress: Progress = Progress()
 
     @property
@@ -222,20 +227,6 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         if is_recording
         else SHOW_PEN,
         kept=none_kept(setup.rig.n_cameras, setup.pen.n_leds, setup.assumptions),
-        next_number=1,
-        n_dropped=Counter(),
-        seat=None,
-        recent=(),
         last_seen=time,
-        pause=Pause.NONE,
-        strayed_since=None,
-        stray_rotations=np.zeros((0, 3, 3)),
-        flawed_rotations=np.zeros((0, 3, 3)),
-        heading=None,
-        was_upright=False,
-        target=None,
         target_since=time,
-        slipped_at=None,
-        still_since=None,
-        trace=NO_TRACE,
     )
