@@ -1,11 +1,14 @@
-"""Images of an operator's endless swing, at any time."""
+"""Images of an operator's endless swing, at any time, and of a pen at rest."""
 
 import numpy as np
 
+from lightpen.arrays import FloatArray
+from lightpen.model.pen import Pen
 from lightpen.model.rigid import vector_from_rotation
 from lightpen.simulator.image_plans import ImagePlan, plan_in_motion
 from lightpen.simulator.postures import operator_postures
 from lightpen.simulator.scenes import Scene
+from lightpen.simulator.view import View
 
 
 def live_plan(
@@ -30,3 +33,8 @@ def live_plan(
     turn = vector_from_rotation(last @ first.T)
     translation = scene.cone_cam - middle @ scene.tip_pen
     return plan_in_motion(scene, index, middle, translation, turn)
+
+
+def still_view(pen: Pen, rotation: FloatArray, translation: FloatArray) -> View:
+    """Return the view of a pen at rest with every LED lit and nothing else."""
+    return View(rotation[None], translation[None], np.ones(pen.n_leds))

@@ -7,7 +7,6 @@ a tip that `lightpen.estimation` does adjusts everything, with priors that leave
 the length to the images.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -80,8 +79,11 @@ class _Swing:
 
     @property
     def numbers(self) -> IntArray:
-        """Spot of each LED in the sightings, (N, L); -1 without one."""
-        return _in_sightings(self.found.spots, self.kept)
+        """Spot of each LED in the sightings, with lamps, (N, L); -1 without one."""
+        own = self.found.spots.copy()
+        for row, numbers in zip(own, self.kept, strict=True):
+            row[row >= 0] = numbers[row[row >= 0]]
+        return own
 
 
 def discover(
@@ -238,14 +240,6 @@ def _with_second(
         sightings, there, swing.found.images, swing.numbers
     )
     return start, SecondSwing(observations, separation)
-
-
-def _in_sightings(labels: IntArray, kept: Sequence[IntArray]) -> IntArray:
-    """Return labels (N, L) by the numbers of the spots with the lamps."""
-    own = labels.copy()
-    for row, numbers in zip(own, kept, strict=True):
-        row[row >= 0] = numbers[row[row >= 0]]
-    return own
 
 
 def _calibrated(

@@ -112,13 +112,15 @@ def discovery_of(
         found=_camera_before(bundle.unknowns.start.rig.cameras[0], marks),
     )
     diameter_sigma = float(np.sqrt(covariance[at.diameter, at.diameter][0, 0]))
+    before = bundle.unknowns.start.pen
+    assert before.led_covariance is not None
     pen = replace(
         with_led_covariance(state.pen, covariance[at.leds, at.leds]),
         diameter_sigma=diameter_sigma,
         normal_covariance=axes.T @ of_turn @ axes,
         nominal_tip=None,
         expansion=None,
-        found=_pen_before(bundle.unknowns.start.pen, marks),
+        found=FoundPen(marks, before.diameter, before.led_covariance),
     )
     if not (lengths or is_relative):
         pen = _with_length_found(pen)
@@ -144,11 +146,6 @@ def _camera_before(start: Camera, marks: FloatArray) -> FoundCamera:
     if earlier is not None:
         return replace(earlier, marks=np.concatenate([earlier.marks, marks]))
     return FoundCamera(marks, start.intrinsics, start.covariance)
-
-
-def _pen_before(start: Pen, marks: FloatArray) -> FoundPen:
-    assert start.led_covariance is not None
-    return FoundPen(marks, start.diameter, start.led_covariance)
 
 
 def _with_length_found(pen: Pen) -> Pen:

@@ -14,6 +14,7 @@ References
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -49,7 +50,6 @@ SIZES = {
     Of.LENGTH: {FeatureKind.SLOT},
     Of.CONE_ANGLE: {FeatureKind.CONE},
 }
-IS_ANGLE = {Of.ANGLE, Of.CONE_ANGLE}
 DEVIATIONS = {
     *FORMS,
     Of.POSITION,
@@ -299,9 +299,19 @@ def _position(
         way = values[PLACE] + shift * values[AXIS] - place
         return np.asarray(way - (way @ axis) * axis)
 
+    return _at_ends(one, across, (one.in_part,), inputs)
+
+
+def _at_ends(
+    one: Measured,
+    offset: Callable[..., FloatArray],
+    quantities: tuple[Quantity, ...],
+    inputs: FloatArray,
+) -> Value:
+    """Return twice the larger offset at both ends of an axis, or at a centre."""
     half = _extent(one) / 2 if one.kind in AXIAL else 0.0
     ends = [
-        _length(derive(lambda v, s=shift: across(v, s), one.in_part), 2.0, inputs)
+        _length(derive(partial(offset, shift=shift), *quantities), 2.0, inputs)
         for shift in {half, -half}
     ]
     return max(ends, key=lambda end: end.value)
@@ -314,7 +324,6 @@ def _concentricity(
     if one.kind not in CENTRED | AXIAL or datum.kind not in CENTRED | AXIAL:
         raise _refused(planned)
     is_about_axis = datum.kind in AXIAL | {FeatureKind.CIRCLE, FeatureKind.SLOT}
-    half = _extent(one) / 2 if one.kind in AXIAL else 0.0
 
     def offset(own: FloatArray, other: FloatArray, shift: float) -> FloatArray:
         way = own[PLACE] + shift * own[AXIS] - other[PLACE]
@@ -322,16 +331,5 @@ def _concentricity(
             way = way - (way @ other[AXIS]) * other[AXIS]
         return np.asarray(way)
 
-    ends = [
-        _length(
-            derive(
-                lambda a, b, s=shift: offset(a, b, s),
-                one.surface.quantity,
-                datum.surface.quantity,
-            ),
-            2.0,
-            inputs,
-        )
-        for shift in {half, -half}
-    ]
-    return max(ends, key=lambda end: end.value)
+    quantities = one.surface.quantity, datum.surface.quantity
+    return _at_ends(one, offset, quantities, inputs)

@@ -14,20 +14,14 @@ import numpy as np
 from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.file_format import FileFormat
 from lightpen.local_time import local_now
-from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.characteristics import Measured
 from lightpen.measuring.drawing import outline_of
-from lightpen.measuring.part import CharacteristicResult, MeasuredPart
+from lightpen.measuring.part import MeasuredPart
 from lightpen.measuring.qif import qif_text
 from lightpen.messages import message, printable
 
 N_DECIMALS = 6
 ENDS = ("10", "20", "30", "11", "21", "31")  # codes of x, y, z of a line in DXF
-DEGREE, MILLIMETRE = "degree", "mm"
-
-
-def unit_of(result: CharacteristicResult) -> str:
-    """Return the unit of a characteristic."""
-    return DEGREE if result.planned.quantity in IS_ANGLE else MILLIMETRE
 
 
 def _csv(part: MeasuredPart) -> str:
@@ -41,7 +35,7 @@ def _csv(part: MeasuredPart) -> str:
         rows.append(
             [
                 *(planned.label, planned.quantity.value, " ".join(planned.of)),
-                *(unit_of(result), planned.nominal, *limits),
+                *(planned.unit, planned.nominal, *limits),
                 *(result.value.value, result.deviation, result.value.uncertainty),
                 "" if result.decision is None else result.decision.value,
                 result.probability,
@@ -57,7 +51,7 @@ def _qdas(part: MeasuredPart) -> str:
     for i, result in enumerate(part.results, start=1):
         planned = result.planned
         lines += [f"K2001/{i} {i}", f"K2002/{i} {printable(planned.label)}"]
-        lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} {unit_of(result)}"]
+        lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} {planned.unit}"]
         if planned.nominal is not None:
             lines.append(f"K2101/{i} {planned.nominal:.{N_DECIMALS}f}")
         for key, limit in zip(("K2110", "K2111"), planned.limits, strict=True):

@@ -85,6 +85,7 @@ class CharacteristicKind(StrEnum):
     CONCENTRICITY = "concentricity"
 
 
+IS_ANGLE = {CharacteristicKind.ANGLE, CharacteristicKind.CONE_ANGLE}
 QUANTITIES = {  # the others are letters
     CharacteristicKind.DIAMETER: message("measuring.diameter"),
     CharacteristicKind.RADIUS: message("measuring.radius"),
@@ -200,6 +201,12 @@ class PlannedCharacteristic(_Entry, frozen=True):
         return message("measuring.characteristic", quantity=quantity, of=of)
 
     @property
+    def unit(self) -> str:
+        """Unit of its value."""
+        is_angle = self.quantity in IS_ANGLE
+        return "degree" if is_angle else "mm"
+
+    @property
     def features(self) -> tuple[str, ...]:
         """Features that it needs."""
         return (*self.of, *filter(None, [self.datum]))
@@ -209,15 +216,10 @@ class PlannedCharacteristic(_Entry, frozen=True):
         """Lower and upper limit, mm or degrees; infinite without a tolerance."""
         if self.tolerance is None:
             return -inf, inf
+        ends = self.tolerance
+        below, above = (-ends, ends) if isinstance(ends, float) else ends
         if self.nominal is None:
-            return -inf, self.tolerance if isinstance(
-                self.tolerance, float
-            ) else self.tolerance[1]
-        below, above = (
-            (-self.tolerance, self.tolerance)
-            if isinstance(self.tolerance, float)
-            else self.tolerance
-        )
+            return -inf, above
         return self.nominal + below, self.nominal + above
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from lightpen import __version__
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.characteristics import Measured
 from lightpen.measuring.features import AXIS, PLACE
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.quantities import derive
@@ -119,7 +119,7 @@ def _add_characteristic(
 ) -> None:
     """Add definition, nominal, item and measurement, each referring to the last."""
     planned = result.planned
-    kind = "Angular" if planned.quantity in IS_ANGLE else "Linear"
+    kind = "Linear" if planned.unit == "mm" else "Angular"
     definition, nominal, item, measured = (
         ET.SubElement(parent, f"UserDefined{kind}Characteristic{part}", {"id": id_})
         for parent, part, id_ in zip(parents, PARTS, ids, strict=True)

@@ -7,10 +7,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from lightpen.measuring.characteristics import IS_ANGLE, Measured
+from lightpen.measuring.characteristics import Measured
 from lightpen.measuring.compensation import ROUND, Evidence
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
-from lightpen.measuring.plan import Nominal, PlannedCharacteristic, Side
+from lightpen.measuring.plan import PlannedCharacteristic, Side
 from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
@@ -155,16 +155,12 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
                 if one.feature is None
                 else one.feature.form_error,
                 "n_touches": 0 if one.feature is None else len(one.feature.distances),
-                "nominal": _nominal(one.nominal),
+                "nominal": msgspec.to_builtins(one.nominal),
             }
             for name, one in part.features.items()
         ],
         "characteristics": [_result_entries(result) for result in part.results],
     }
-
-
-def _nominal(nominal: Nominal | None) -> Any:
-    return None if nominal is None else msgspec.to_builtins(nominal)
 
 
 def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
@@ -174,7 +170,7 @@ def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
         "name": planned.label,
         "quantity": planned.quantity.value,
         "of": list(planned.of),
-        "unit": "degree" if planned.quantity in IS_ANGLE else "mm",
+        "unit": planned.unit,
         "nominal": planned.nominal,
         "actual": result.value.value,
         "deviation": result.deviation,

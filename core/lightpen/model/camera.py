@@ -210,23 +210,20 @@ class Camera:
         x, y = normalised[..., 0], normalised[..., 1]
         r2 = x * x + y * y
         gain = self._gain(r2)
+        focal_points = normalised * np.array([self.fx, self.fy])
+        J = np.zeros((*normalised.shape, 4 + len(self.distortion)))
+        J[..., 0, 2] = J[..., 1, 3] = 1
         if self.lens is LensModel.KANNALA_BRANDT:
-            J = np.zeros((*normalised.shape, 4 + len(self.distortion)))
             J[..., 0, 0], J[..., 1, 1] = x * gain, y * gain
-            J[..., 0, 2] = J[..., 1, 3] = 1
-            focal_points = normalised * np.array([self.fx, self.fy])
             J[..., 4:] = (
                 focal_points[..., None] * fisheye.gain_jacobian(r2)[..., None, :]
             )
             return J
         k4, k5, k6 = _rational(self.distortion)
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
-        J = np.zeros((*normalised.shape, 4 + len(self.distortion)))
         p1, p2 = self.distortion[2:4]
         J[..., 0, 0] = x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
         J[..., 1, 1] = y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-        J[..., 0, 2] = J[..., 1, 3] = 1
-        focal_points = normalised * np.array([self.fx, self.fy])
         for power, column in ((1, 4), (2, 5), (3, 8)):
             J[..., column] = focal_points * (r2**power / denominator)[..., None]
         J[..., 0, 6], J[..., 1, 6] = 2 * self.fx * x * y, self.fy * (r2 + 2 * y * y)

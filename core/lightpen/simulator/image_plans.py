@@ -172,18 +172,14 @@ def _random_hot_spot(rng: np.random.Generator) -> HotSpot:
 
 def _turned(swing: Swing, scene: Scene) -> Swing:
     """Return a swing as seen by a camera that turns between images."""
-    turns = np.array([_turn(scene, index) for index in range(len(swing))])
+    shares = [_share(scene, index) for index in range(len(swing))]
+    turns = np.array([camera_turn(scene, share) for share in shares])
     return replace(
         swing,
         rotations=turns @ swing.rotations,
         translations=np.einsum("nij,nj->ni", turns, swing.translations),
         tips_cam=np.einsum("nij,nj->ni", turns, swing.tips_cam),
     )
-
-
-def _turn(scene: Scene, index: int) -> FloatArray:
-    """Return the rotation of the camera in an image, (3, 3)."""
-    return camera_turn(scene, _share(scene, index))
 
 
 def _share(scene: Scene, index: int) -> float:
@@ -195,10 +191,6 @@ def camera_turn(scene: Scene, share: float) -> FloatArray:
     """Return a share of the rotation of the camera of a scene, (3, 3)."""
     right, down = scene.camera_turn * share * np.array(TURN) / scene.camera.fx
     return rotation_from_vector(np.array([-down, right, 0.0]))
-
-
-def _lamps(scene: Scene, index: int) -> tuple[Lamp, ...]:
-    return lamps_beside(scene, _share(scene, index))
 
 
 def lamps_beside(scene: Scene, share: float) -> tuple[Lamp, ...]:
@@ -360,7 +352,7 @@ def plan_in_motion(
         rotations,
         translations,
         led_gains(scene),
-        lamps=_lamps(scene, index),
+        lamps=lamps_beside(scene, _share(scene, index)),
         faces=led_faces(scene),
     )
     return ImagePlan(index, view, scene.optics, rotation, translation)

@@ -35,6 +35,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import edge_gaps, leds_in_camera
 
 Json: TypeAlias = dict[str, Any]
+Report: TypeAlias = Callable[[float], None]
 
 N_THREADS = 2  # one renders while another compresses
 NOTES = (
@@ -57,7 +58,7 @@ class SampleFiles:
 
 
 def write_scene(
-    scene: Scene, folder: Path, report: Callable[[float], None] | None = None
+    scene: Scene, folder: Path, report: Report = lambda fraction: None
 ) -> FloatArray:
     """Write a simulated set: ``camera.yaml``, ``leds.csv``, ``images``, ``truth.json``.
 
@@ -73,14 +74,14 @@ def write_scene(
     plan = plan_scene(scene)
     write_camera(scene.camera, folder / "camera.yaml")
     _write_measured_pen(plan, folder)
-    _write_images(plan, images, names, report or _silent)
+    _write_images(plan, images, names, report)
     truth = {"set": folder.name, **scene_truth(plan)}
     write_whole(folder / "truth.json", json.dumps(truth, indent=1).encode())
     return _tip_in_file_frame(plan)
 
 
 def write_rig_scene(
-    scene: Scene, rig: Rig, folder: Path, report: Callable[[float], None] | None = None
+    scene: Scene, rig: Rig, folder: Path, report: Report = lambda fraction: None
 ) -> FloatArray:
     """Write the images of a swing by several cameras; see `write_scene`.
 
@@ -102,7 +103,7 @@ def write_rig_scene(
     for c, (name, plan) in enumerate(zip(rig.names, plans, strict=True)):
 
         def part(fraction: float, c: int = c) -> None:
-            (report or _silent)((c + fraction) / rig.n_cameras)
+            report((c + fraction) / rig.n_cameras)
 
         _write_images(plan, folder / name, names, part)
         cam_from_rig = {
@@ -128,7 +129,7 @@ def _write_measured_pen(plan: ScenePlan, folder: Path) -> None:
 
 
 def _write_images(
-    plan: ScenePlan, folder: Path, names: list[str], report: Callable[[float], None]
+    plan: ScenePlan, folder: Path, names: list[str], report: Report
 ) -> None:
     with ThreadPoolExecutor(N_THREADS) as pool:
         encoded = _in_order(
@@ -139,10 +140,6 @@ def _write_images(
         for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
             write_whole(folder / name, data)
             report(done / len(names))
-
-
-def _silent(fraction: float) -> None:
-    """Ignore the progress."""
 
 
 def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.contours import MIN_SIGMA
 from lightpen.simulator.faces import Face
@@ -87,11 +86,6 @@ class View:
     glares: tuple[Glare, ...] = ()
     fingers: tuple[Finger, ...] = ()
     faces: tuple[Face, ...] = ()  # of each LED; empty for evenly lit ones
-
-
-def still_view(pen: Pen, rotation: FloatArray, translation: FloatArray) -> View:
-    """Return the view of a pen at rest with every LED lit and nothing else."""
-    return View(rotation[None], translation[None], np.ones(pen.n_leds))
 
 
 def moving_poses(

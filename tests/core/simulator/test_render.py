@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from tests.simulated_plans import still_view
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
@@ -24,15 +25,7 @@ from lightpen.simulator.swings import (
     paper_pen,
     swing_poses,
 )
-from lightpen.simulator.view import (
-    Finger,
-    Glare,
-    Lamp,
-    Optics,
-    View,
-    moving_poses,
-    still_view,
-)
+from lightpen.simulator.view import Finger, Glare, Lamp, Optics, View, moving_poses
 
 CAMERA = paper_camera()
 PEN = paper_pen()

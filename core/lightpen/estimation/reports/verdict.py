@@ -37,21 +37,6 @@ CHANGE_GATE = 1.2  # times U (k = 2) of a change: 95 % of three axes by chance a
 AXES = "xyz"
 TINY = 1e-12  # mm
 
-_ADVICE = {
-    ContributionName.CENTERS: message("share.centers"),
-    ContributionName.LEDS: message("share.leds"),
-    ContributionName.SCALE: message("share.scale"),
-    ContributionName.FORM: message("share.form"),
-    ContributionName.TEMPERATURE: message("share.temperature"),
-    ContributionName.DISTANCE: message("share.distance"),
-    ContributionName.DIAMETER: message("share.diameter"),
-    ContributionName.CAMERA: message("share.camera"),
-    ContributionName.EXTRINSICS: message("share.rig"),
-    ContributionName.LENS: message("share.lens"),
-    ContributionName.COMPLIANCE: message("share.compliance"),
-    ContributionName.TIMING: message("share.timing"),
-}
-
 
 class Grade(StrEnum):
     """Grade of a calibration."""
@@ -114,19 +99,24 @@ class Verdict:
         return next(filter(None, causes), _NEXT_STEPS[Code(self.reason.code)])
 
 
+# What makes U large, with what to do about it.
+_CAUSES = {
+    ContributionName.CENTERS: (message("share.centers"), NextStep.SEE_TO_CAUSE),
+    ContributionName.LEDS: (message("share.leds"), NextStep.CHECK_LEDS),
+    ContributionName.SCALE: (message("share.scale"), NextStep.CHECK_LEDS),
+    ContributionName.FORM: (message("share.form"), NextStep.SEE_TO_CAUSE),
+    ContributionName.TEMPERATURE: (message("share.temperature"), NextStep.SEE_TO_CAUSE),
+    ContributionName.DISTANCE: (message("share.distance"), NextStep.SEE_TO_CAUSE),
+    ContributionName.DIAMETER: (message("share.diameter"), NextStep.CHECK_LEDS),
+    ContributionName.CAMERA: (message("share.camera"), NextStep.CHECK_CAMERA),
+    ContributionName.EXTRINSICS: (message("share.rig"), NextStep.CHECK_RIG),
+    ContributionName.LENS: (message("share.lens"), NextStep.CHECK_CAMERA),
+    ContributionName.COMPLIANCE: (message("share.compliance"), NextStep.SEE_TO_CAUSE),
+    ContributionName.TIMING: (message("share.timing"), NextStep.CHECK_FILES),
+}
 # By what a reason names, which its code alone does not show.
 _BY_CAUSE = {
-    _ADVICE[ContributionName.CAMERA].code: NextStep.CHECK_CAMERA,
-    _ADVICE[ContributionName.EXTRINSICS].code: NextStep.CHECK_RIG,
-    _ADVICE[ContributionName.LEDS].code: NextStep.CHECK_LEDS,
-    _ADVICE[ContributionName.SCALE].code: NextStep.CHECK_LEDS,
-    _ADVICE[ContributionName.DIAMETER].code: NextStep.CHECK_LEDS,
-    _ADVICE[ContributionName.CENTERS].code: NextStep.SEE_TO_CAUSE,
-    _ADVICE[ContributionName.FORM].code: NextStep.SEE_TO_CAUSE,
-    _ADVICE[ContributionName.TEMPERATURE].code: NextStep.SEE_TO_CAUSE,
-    _ADVICE[ContributionName.LENS].code: NextStep.CHECK_CAMERA,
-    _ADVICE[ContributionName.COMPLIANCE].code: NextStep.SEE_TO_CAUSE,
-    _ADVICE[ContributionName.DISTANCE].code: NextStep.SEE_TO_CAUSE,
+    **{advice.code: step for advice, step in _CAUSES.values()},
     "warning.camera-file-contradicted": NextStep.CHECK_CAMERA,
     "warning.camera-file-of-rig-contradicted": NextStep.CHECK_CAMERA,
     "warning.rig-file-contradicted": NextStep.CHECK_RIG,
@@ -277,7 +267,7 @@ def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
     share, sigma = budget.weakest_share(largest), calibration.led_sigma
     if largest.name is ContributionName.LEDS and sigma > DISPLACED:
         return message(Code.LEDS_OFF, sigma=sigma, uncertainty=share)
-    advice = _ADVICE[largest.name]
+    advice, _ = _CAUSES[largest.name]
     return file_uncertain(uncertainty, limit, share, advice, largest.assumed)
 
 

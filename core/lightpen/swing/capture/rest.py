@@ -30,66 +30,55 @@ def steady_seat(pen: Pen, state: SwingState) -> Seat | None:
     With a nominal tip the pen may stand still. Without one it must swing a little, or
     any still pen would do.
     """
-    recent_detections = state.recent
-    if (
-        len(recent_detections) < MIN_BATCH
-        or state.time - recent_detections[0].time < FULL * BATCH
-    ):
+    recent = state.recent
+    if len(recent) < MIN_BATCH or state.time - recent[0].time < FULL * BATCH:
         return None
-    rotations, translations = _poses(recent_detections)
+    rotations, translations = _poses(recent)
     if pen.nominal_tip is None and posture_spread(rotations)[0][1] < MIN_SPREAD:
         return None
-    covariances = _covariances(state, recent_detections)
+    covariances = _covariances(state, recent)
     seat = fit_seat(pen, rotations, translations, covariances)
     distances = tip_distances(seat, rotations, translations, covariances)
     return seat if np.median(distances) < STEADY else None
 
 
-def in_place(
-    state: SwingState, recent_detections: Sequence[RecentDetection]
-) -> BoolArray:
+def in_place(state: SwingState, recent: Sequence[RecentDetection]) -> BoolArray:
     """Return in which detections the tip is in the cone, (N,)."""
     seat = seat_of(state)
-    if seat is None or not recent_detections:
-        return np.zeros(len(recent_detections), dtype=bool)
-    rotations, translations = _poses(recent_detections)
-    covariances = _covariances(state, recent_detections)
+    if seat is None or not recent:
+        return np.zeros(len(recent), dtype=bool)
+    rotations, translations = _poses(recent)
+    covariances = _covariances(state, recent)
     distances = tip_distances(seat, rotations, translations, covariances)
     return np.asarray(distances <= outlier_distance() * distance_unit(state.kept))
 
 
 def rests_in_place(state: SwingState, seconds: float) -> bool:
     """Return whether the tip was in the cone for this time."""
-    recent_detections = [g for g in state.recent if g.time >= state.time - seconds]
-    enough = len(recent_detections) > 1 and recent_detections[
-        -1
-    ].time - recent_detections[0].time > (FULL * seconds)
-    return enough and bool(np.mean(in_place(state, recent_detections)) > FULL)
+    recent = [each for each in state.recent if each.time >= state.time - seconds]
+    if not recent or recent[-1].time - recent[0].time <= FULL * seconds:
+        return False
+    return bool(np.mean(in_place(state, recent)) > FULL)
 
 
 def offset(state: SwingState, seconds: float = 0.0) -> float:
     """Return the median distance of the tip from the cone over a time, mm."""
     seat = seat_of(state)
-    recent_detections = [g for g in state.recent if g.time >= state.time - seconds]
-    if seat is None or not recent_detections:
+    recent = [each for each in state.recent if each.time >= state.time - seconds]
+    if seat is None or not recent:
         return 0.0
-    lengths = np.linalg.norm(tip_offsets(seat, *_poses(recent_detections)), axis=1)
+    lengths = np.linalg.norm(tip_offsets(seat, *_poses(recent)), axis=1)
     return float(np.median(lengths))
 
 
-def _poses(
-    recent_detections: Sequence[RecentDetection],
-) -> tuple[FloatArray, FloatArray]:
-    return (
-        np.array([g.detection.rotation for g in recent_detections]),
-        np.array([g.detection.translation for g in recent_detections]),
-    )
+def _poses(recent: Sequence[RecentDetection]) -> tuple[FloatArray, FloatArray]:
+    detections = [each.detection for each in recent]
+    rotations = np.array([each.rotation for each in detections])
+    return rotations, np.array([each.translation for each in detections])
 
 
-def _covariances(
-    state: SwingState, recent_detections: Sequence[RecentDetection]
-) -> FloatArray:
+def _covariances(state: SwingState, recent: Sequence[RecentDetection]) -> FloatArray:
     sigma = state.kept.sigma
     if state.n_kept < MIN_KEPT:
         sigma = float(np.median([g.detection.sigma for g in state.recent]))
-    return np.array([g.detection.cofactors for g in recent_detections]) * sigma**2
+    return np.array([each.detection.cofactors for each in recent]) * sigma**2

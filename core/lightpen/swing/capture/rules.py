@@ -193,11 +193,7 @@ def _noticed(
     setup: SwingSetup, state: SwingState, detection: PenDetection, time: float
 ) -> SwingState:
     """Return the state with the detection added."""
-    recent = [
-        recent_detection
-        for recent_detection in state.recent
-        if recent_detection.time > time - BATCH
-    ]
+    recent = [each for each in state.recent if each.time > time - BATCH]
     if not detection.has_pose:
         return replace(state, time=time, recent=tuple(recent), still_since=None)
     still_since = state.still_since
@@ -282,9 +278,8 @@ def _unsettled(setup: SwingSetup, state: SwingState) -> Transition | None:
     lost = (SwingEvent(SwingEventKind.LOST),)
     if _is_lost(state):
         return Transition(_await_seat(state), lost)
-    if in_place(
-        state, [g for g in state.recent if g.time > state.time - LEAVING]
-    ).any():
+    just_now = [each for each in state.recent if each.time > state.time - LEAVING]
+    if in_place(state, just_now).any():
         return None
     return Transition(
         replace(_enter(state, Phase.SEEN, _seating(setup)), recent=()), lost

@@ -33,6 +33,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from tests.app.pictures import colors_in
 from tests.app.undressed import undressed
+from tests.simulated_plans import still_view
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_pen
@@ -58,7 +59,6 @@ from lightpen.simulator.postures import Postures
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
-from lightpen.simulator.view import still_view
 from lightpen.swing.capture.shortfall import N_MORE
 from lightpen.swing.capture.state import SwingState
 from lightpen.swing.preparation import Preparation
