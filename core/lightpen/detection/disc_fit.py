@@ -73,6 +73,8 @@ class DiscFits(NamedTuple):
     # (N,), standard deviation of one coordinate, px, larger for discs whose shape
     # differs from the others.
     sigmas: FloatArray
+    # (N,), by how much more than usual each shape differs from the median.
+    misshapen: FloatArray
 
 
 class _Windows(NamedTuple):
@@ -145,9 +147,9 @@ def fit_discs(
     field = np.zeros((len(light), 2, light[0].size))
     np.put_along_axis(field, chosen[:, None], pulls, axis=2)
     squares = squares * _correlated(field.reshape(-1, *light.shape[1:]))
-    return DiscFits(
-        values[:, CENTER], np.sqrt(squares + (_misshapen(values) * radii) ** 2)
-    )
+    misshapen = _misshapen(values)
+    sigmas = np.sqrt(squares + (misshapen * radii) ** 2)
+    return DiscFits(values[:, CENTER], sigmas, misshapen)
 
 
 def _fitted(

@@ -47,12 +47,13 @@ NEAR = 0.5  # radii, of a place that may be brighter than the middle of a region
 LARGER = 1.5  # times the usual radius of the spots that are measured together
 BRIGHTER = 1.05  # than the middle, of a place that is the LED's rather
 RING = (2.0, 2.5)  # half-level radii, round a spot
-LIT_SHARE = 0.2  # of a ring, and
+LIT_SHARE = 0.1  # of a ring, and
 DARK = 0.08  # of the light, round a spot that is alone
 MIN_WIDTH = 4.0  # px, at half level; less shows no centre
 LEAST_TINY = 1.2  # px; what is smaller is a hot pixel
 LARGEST_TINY = 12  # px, of the box at the foot
 MAX_TINY = 4000  # contours examined
+MISSHAPEN = 0.1  # more stretched than the others, of an LED that is not whole
 LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
 
 
@@ -126,7 +127,7 @@ def measure_small(
         peaks=windows.tops,
         sigmas=sigmas,
         noises=noises,
-        are_whole=is_near & (lopsided < LOPSIDED),
+        are_whole=is_near & (lopsided < LOPSIDED) & (fits.misshapen < MISSHAPEN),
         saturated=saturated,
         alone=_are_alone(windows, narrow),
     )

@@ -64,6 +64,32 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
     assert np.mean(flaws > 0) <= 0.1
 
 
+@pytest.mark.parametrize("gains", [(0.4, 3.0), (2.0, 6.0)])
+def test_reflections_beside_leds_do_not_flag_them(gains: tuple[float, float]) -> None:
+    found = found_on(replace(EASY, width=8.0, gains=gains), 6)
+    assert np.mean((found.flaws & ~SpotFlaw.SATURATED) > 0) < 0.03
+
+
+@pytest.mark.parametrize("panel", [CLEAN, EASY, HARD])
+@pytest.mark.parametrize("width", [5.0, 8.0])
+def test_small_leds_of_which_a_part_is_hidden_are_flagged(
+    panel: Panel, width: float
+) -> None:
+    shown = panel_image(replace(panel, width=width), np.random.default_rng(5))
+    hidden = np.arange(0, len(shown.centers), 6)
+    x, y = np.meshgrid(*(np.arange(n) for n in shown.image.shape[::-1]))
+    visible = np.ones(shown.image.shape)
+    for u, v in shown.centers[hidden]:
+        beside = (x > u + width / 6) & (x < u + 1.2 * width)
+        visible[beside & (np.abs(y - v) < width)] = 0
+    image = shown.image * cv2.GaussianBlur(visible, (0, 0), 1.2)
+    spots = detect_spots(image.astype(np.uint8))
+    gaps = np.linalg.norm(spots.centers - shown.centers[hidden][:, None], axis=2)
+    which = gaps.argmin(axis=1)[gaps.min(axis=1) < width / 2]
+    assert len(which)
+    assert ((spots.flaws[which] & (SpotFlaw.CUT | SpotFlaw.MERGED)) > 0).all()
+
+
 @pytest.mark.parametrize(
     ("panel", "limit"),
     # A Gaussian fit from the true place reaches 0.013 to 0.048 px on them.
