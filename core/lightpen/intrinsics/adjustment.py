@@ -78,6 +78,7 @@ def adjust_board(
     start: BoardState,
     tolerances: BoardTolerances,
     stated: tuple[FloatArray | None, ...] = (),
+    converged: float = CONVERGED,
 ) -> BoardFit:
     """Fit everything to the points of all views.
 
@@ -87,6 +88,8 @@ def adjust_board(
         Start values; intrinsics as in the files where ``stated`` is set.
     stated : tuple of (4 + n, 4 + n) array or None
         Information of the intrinsics of each camera beside the views; none where None.
+    converged : float
+        Share of the sum of squares that the last step may gain.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def adjust_board(
     origin, state = start, start
     sigma = max(_rms(board_residuals(views, state)), FINEST)
     for _ in range(NOISE_ROUNDS):
-        state, system = _settled(views, state, origin, prior, sigma)
+        state, system = _settled(views, state, origin, prior, sigma, converged)
         information, scores = _eliminated(system)
         both = information.sum(axis=0) / sigma**2 + prior
         covariance = _inverse(both)
@@ -136,7 +139,7 @@ def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
     """
     n = sum(len(camera.intrinsics) for camera in state.cameras)
     held = np.diag(np.full(n + N_POSE * (len(state.cameras) - 1) + N_SHAPE, 1e20))
-    _, system = _settled(views, state, state, held, 1.0)
+    _, system = _settled(views, state, state, held, 1.0, CONVERGED)
     return system.residuals
 
 
@@ -165,7 +168,12 @@ def view_information(
 
 
 def _settled(
-    views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
+    views: Views,
+    start: BoardState,
+    origin: BoardState,
+    prior: FloatArray,
+    sigma: float,
+    converged: float,
 ) -> tuple[BoardState, _System]:
     state, damping = start, FIRST_DAMPING
     residuals = board_residuals(views, state)
@@ -186,7 +194,7 @@ def _settled(
         gained = cost - reached
         state, cost, damping = moved, reached, max(damping / 10, 1e-12)
         system = _system(views, state, there)
-        if gained <= CONVERGED * (cost + 1e-12):
+        if gained <= converged * (cost + 1e-12):
             return state, system
     raise CalibrationError("intrinsics.not-settled", n_steps=MAX_STEPS)
 

@@ -68,14 +68,22 @@ def find_apart(mixed: MixedFit, taken: BoolArray) -> BoolArray | None:
         Which views took part in the fit; the others stay with the first.
     """
     at = mixed.adjustment.of_intrinsics(0)
-    n_views = len(mixed.scores.scores)
-    way = np.eye(at.stop - at.start)[:, :4]
+    few = slice(at.start, at.start + 4)
+    scores = mixed.scores.scores[:, few]
+    columns = mixed.scores.information[..., few]
+    known = columns[:, few]
+    # As `ViewScores.change` has it, pair by pair.
+    drawn = np.einsum(
+        "vqs,qr,wrt->vwst", columns, mixed.scores.covariance, columns, optimize=True
+    )
+    n_views = len(scores)
 
     def size(which: BoolArray) -> float:
         if min(which.sum(), (~which).sum()) < FEWEST:
             return 0.0
-        score, information = mixed.scores.change(which.astype(np.float64))
-        return _fitted_change(score[at], information[at, at], way)[1]
+        information = known[which].sum(axis=0)
+        information = information - drawn[which][:, which].sum(axis=(0, 1))
+        return _fitted_change(scores[which].sum(axis=0), information, np.eye(4))[1]
 
     order = np.arange(n_views)
     sigmas = np.sqrt(np.diag(mixed.scores.covariance)[at])

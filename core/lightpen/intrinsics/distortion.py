@@ -14,7 +14,12 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.formats.camera_checks import folds
-from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
+from lightpen.intrinsics.adjustment import (
+    CONVERGED,
+    FINEST,
+    adjust_board,
+    fit_board_poses,
+)
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
@@ -33,6 +38,7 @@ USUAL_SIZE = 0.5  # of a coefficient that is drawn towards 0, rms
 N_FOLDS = 5
 WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
 ALIKE = 1.5  # times the held-out error: another model that is near to the views
+ROUGHLY = 1e-5  # of the sum of squares; open coefficients would drift on for long
 EVEN = np.zeros(3)  # mm: all points lie where the board has them
 SIGMAS = 2.0  # of the gain of all views
 MUCH = 1.0  # gain of all views together, of the logarithm of their errors
@@ -171,7 +177,7 @@ def choose_distortion(
     others: list[Callable[[], _Drawn | None]]
     if not has_k3:
         plain = convert_lens(first.camera, FEW) or first.camera
-        others = [lambda: _converted(views, tolerances, first.camera, FISHEYE)]
+        others = [lambda: _converted(views, tolerances, first.fitted, FISHEYE)]
         if len(plain.distortion) == FEW:
             first = _Drawn(fit_camera(views, tolerances, plain, NO_K3), NO_K3)
     elif first.camera.lens is LensModel.BROWN:
@@ -179,11 +185,11 @@ def choose_distortion(
             first = _unfolded(views, tolerances, first.camera) or first
         others = [lambda: _richer(views, tolerances, first.camera)]
         if _is_wide(first.camera, views):
-            others.append(lambda: _converted(views, tolerances, first.camera, FISHEYE))
+            others.append(lambda: _converted(views, tolerances, first.fitted, FISHEYE))
     else:
         others = [
-            lambda: _converted(views, tolerances, first.camera, FEW),
-            lambda: _rational(views, tolerances, first.camera),
+            lambda: _converted(views, tolerances, first.fitted, FEW),
+            lambda: _rational(views, tolerances, first.fitted),
         ]
     best, errors = first, _held_out(views, tolerances, first)
     held_out = {best.n_coefficients: rms_together(errors, views)}
@@ -244,36 +250,42 @@ def _is_wide(camera: Camera, views: Views) -> bool:
 
 
 def _converted(
-    views: Views, tolerances: BoardTolerances, camera: Camera, n_coefficients: int
+    views: Views, tolerances: BoardTolerances, fitted: BoardFit, n_coefficients: int
 ) -> "_Drawn | None":
-    """Return the fit of another lens model."""
-    near = convert_lens(camera, n_coefficients)
-    return None if near is None else _fit_whole(views, tolerances, near)
+    """Return the fit of another lens model than that of a fit."""
+    near = convert_lens(fitted.state.cameras[0], n_coefficients)
+    most = ALIKE * fitted.rms
+    return None if near is None else _fit_whole(views, tolerances, near, most)
 
 
 def _rational(
-    views: Views, tolerances: BoardTolerances, fisheye: Camera
+    views: Views, tolerances: BoardTolerances, fisheye: BoardFit
 ) -> "_Drawn | None":
     """Return the fit with all coefficients, from a fisheye near to it."""
-    few = convert_lens(fisheye, FEW)
+    few = convert_lens(fisheye.state.cameras[0], FEW)
     if few is None:
         return _converted(views, tolerances, fisheye, MANY)
     return _richer(views, tolerances, few)
 
 
 def _fit_whole(
-    views: Views, tolerances: BoardTolerances, near: Camera
+    views: Views, tolerances: BoardTolerances, near: Camera, most: float = np.inf
 ) -> "_Drawn | None":
-    """Return the fit that does not fold the image, the prior as weak as it may be."""
+    """Return the fit that does not fold the image, the prior as weak as it may be.
+
+    Just the strongest one if the residuals are more than `most` without any, px rms.
+    """
+    pulls: tuple[float, ...] = PULLS
     try:
         free = _Drawn(fit_camera(views, tolerances, near), None)
         if not folds(free.camera):
             return free
+        pulls = PULLS if free.fitted.rms < most else PULLS[-1:]
     except CalibrationError:  # the views do not determine so many coefficients
         if len(near.distortion) != MANY:
             raise
     is_fisheye = near.lens is LensModel.KANNALA_BRANDT
-    return None if is_fisheye else _unfolded(views, tolerances, near)
+    return None if is_fisheye else _unfolded(views, tolerances, near, pulls)
 
 
 def fit_camera(
@@ -282,6 +294,7 @@ def fit_camera(
     near: Camera,
     pull: float | None = None,
     offsets: FloatArray = EVEN,
+    poses: BoardPoses | None = None,
 ) -> BoardFit:
     """Fit camera, poses and board from an initial camera; see `Choice` for the pull.
 
@@ -289,9 +302,12 @@ def fit_camera(
     ----------
     offsets : (3,) or (N, 3) array
         Of the points of the board, mm.
+    poses : BoardPoses, optional
+        Initial poses, of a fit to more views: this one then ends at larger steps.
     """
     known = None
-    poses = rough_poses(near, views)
+    converged = ROUGHLY if poses else CONVERGED
+    poses = poses or rough_poses(near, views)
     if pull is not None:
         distortion = near.distortion.copy()
         folding = FOLDING[len(distortion)]
@@ -303,7 +319,7 @@ def fit_camera(
     state = BoardState(
         (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE), offsets
     )
-    return adjust_board(views, state, tolerances, (known,))
+    return adjust_board(views, state, tolerances, (known,), converged)
 
 
 def fit_determined(
@@ -312,14 +328,15 @@ def fit_determined(
     near: Camera,
     pull: float | None = None,
     offsets: FloatArray = EVEN,
+    poses: BoardPoses | None = None,
 ) -> BoardFit:
     """Fit as `fit_camera`, by the weakest prior where the views leave a lens open."""
     try:
-        return fit_camera(views, tolerances, near, pull, offsets)
+        return fit_camera(views, tolerances, near, pull, offsets, poses)
     except CalibrationError:
         if pull is not None or len(near.distortion) != MANY:
             raise
-        return fit_camera(views, tolerances, near, PULLS[0], offsets)
+        return fit_camera(views, tolerances, near, PULLS[0], offsets, poses)
 
 
 def rms_together(errors: FloatArray, views: Views) -> float:
@@ -344,9 +361,14 @@ class _Drawn:
         return len(self.camera.distortion)
 
 
-def _unfolded(views: Views, tolerances: BoardTolerances, near: Camera) -> _Drawn | None:
+def _unfolded(
+    views: Views,
+    tolerances: BoardTolerances,
+    near: Camera,
+    pulls: tuple[float, ...] = PULLS,
+) -> _Drawn | None:
     """Return the fit with the weakest regularisation that does not fold the image."""
-    for pull in PULLS:
+    for pull in pulls:
         try:
             drawn = _Drawn(fit_camera(views, tolerances, near, pull), pull)
         except CalibrationError:  # so weakly it does not settle
@@ -369,16 +391,24 @@ def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> Float
     """
     errors = np.full(views.n_views, np.nan)
     fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
+    fitted = found.fitted
+    poses = fitted.state.poses
     for fold in range(int(fold_of.max()) + 1):
-        others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
-        fitted = fit_determined(others, tolerances, found.camera, found.pull)
-        uneven, _ = fit_unevenness((others,), [fitted])
-        near, pull = fitted.state.cameras[0], found.pull
-        state = fit_determined(others, tolerances, near, pull, uneven).state
-        poses = rough_poses(found.camera, own)
-        residuals = fit_board_poses(own, replace(state, poses=poses))
+        own = fold_of == fold
+        others, start = views.chosen(~own), poses.chosen(~own)
+        near = replace(
+            fitted,
+            state=replace(fitted.state, poses=start),
+            residuals=fitted.residuals[~own],
+        )
+        uneven, _ = fit_unevenness((others,), [near])
+        state = fit_determined(
+            others, tolerances, found.camera, found.pull, uneven, start
+        ).state
+        state = replace(state, poses=poses.chosen(own))
+        residuals = fit_board_poses(views.chosen(own), state)
         squares = np.square(residuals).sum(axis=-1)
-        errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
+        errors[own] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
     return errors
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.fisheye import N_COEFFICIENTS
@@ -34,6 +34,10 @@ class BoardPoses(NamedTuple):
 
     rotations: FloatArray
     translations: FloatArray
+
+    def chosen(self, which: BoolArray) -> "BoardPoses":
+        """Return those of some of the views, (V,)."""
+        return BoardPoses(self.rotations[which], self.translations[which])
 
 
 def start_camera(views: Views, n_coefficients: int) -> Camera:
@@ -130,12 +134,11 @@ def start_board_poses(camera: Camera, views: Views, which: int = 0) -> BoardPose
     rotations = np.full((views.n_views, 3, 3), np.nan)
     translations = np.full((views.n_views, 3), np.nan)
     points = views.board.points
-    for v, (pixels, seen) in enumerate(
-        zip(views.pixels[:, which], views.seen[:, which], strict=True)
-    ):
+    directions = camera.unproject(views.pixels[:, which])
+    for v, seen in enumerate(views.seen[:, which]):
         if not seen.any():
             continue
-        rays = camera.unproject(pixels[seen])
+        rays = directions[v, seen]
         near = np.linalg.norm(rays, axis=-1) < FARTHEST
         if near.sum() < MIN_POINTS:
             near[:] = True
