@@ -182,10 +182,7 @@ class DiscoveryRun(QObject):
             self._job = None
             take(result)
 
-        # Connections
-        job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(on_succeeded, self._on_failed)
 
     def _drop_job(self) -> None:
         if self._job is not None:

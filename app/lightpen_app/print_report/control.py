@@ -110,11 +110,7 @@ class PrintReportControl(QObject):
     def _read(self, read: Callable[[], T], show: Callable[[T], None]) -> None:
         self.shut_down()
         self._reading = job = Job(lambda _: read(), self)
-
-        # Connections
-        job.succeeded.connect(show)
-        job.failed.connect(self.failed)
-        job.start()
+        job.start(show, self.failed)
 
     def shut_down(self) -> None:
         """Cancel previews that are not shown yet."""

@@ -105,12 +105,9 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._place.remember(path.parent)
         pdf = pdf_of(self._paper)
         self._saving = job = Job(lambda _: write_whole(path, pdf), self)
-
-        # Connections
-        job.succeeded.connect(lambda _: self.saved.emit(path))
-        job.failed.connect(self.failed)
-        job.ended.connect(self._on_saving_ended)
-        job.start()
+        job.start(
+            lambda _: self.saved.emit(path), self.failed, ended=self._on_saving_ended
+        )
 
     def _on_saving_ended(self) -> None:
         self._saving = None

@@ -49,10 +49,7 @@ class ArchiveWriter(QObject):
             logbook.enter_owed()
 
         job = Job(keep, self)
-
-        # Connections
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(failed=self._on_failed)
 
     def _on_failed(self, why: str) -> None:
         self._notifications.notify(self, why)

@@ -133,10 +133,7 @@ class FilesOfCameras(QObject):
             if self._serials == serials:
                 take(opened)
 
-        # Connections
-        job.succeeded.connect(on_read)
-        job.failed.connect(self._on_unread)
-        job.start()
+        job.start(on_read, self._on_unread)
 
     def _on_file_read(self, file: CameraFile) -> None:
         now = self._selection.preparation

@@ -86,12 +86,11 @@ class CameraSetup(QObject):
             return find(producer)
 
         self._search = job = Job(search, self)
-
-        # Connections
-        job.succeeded.connect(self.cameras_found)
-        job.failed.connect(self.search_failed)
-        job.ended.connect(partial(self._on_search_ended, job, was_open=was_open))
-        job.start()
+        job.start(
+            self.cameras_found,
+            self.search_failed,
+            ended=partial(self._on_search_ended, job, was_open=was_open),
+        )
 
     def _on_search_ended(self, job: Job, *, was_open: bool) -> None:
         if job is not self._search:

@@ -119,10 +119,7 @@ class ChosenFiles(QObject):
             take(_of_source(opened, source, self._selection.preparation))
             self._show_faults(*map(worded, opened.faults))
 
-        # Connections
-        job.succeeded.connect(on_read)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(on_read, self._on_failed)
 
     def _fill_in_samples(self) -> None:
         now = self._selection.preparation

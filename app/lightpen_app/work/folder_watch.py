@@ -55,11 +55,7 @@ class FolderWatch(QObject):
     def _check(self) -> None:
         folder = self._folder
         job = Job(lambda _: check_writable(folder), self)
-
-        # Connections
-        job.succeeded.connect(self._on_writable)
-        job.failed.connect(self._set_fault)
-        job.start()
+        job.start(self._on_writable, self._set_fault)
 
     def _on_writable(self, _: None) -> None:
         self._set_fault("")
@@ -72,10 +68,7 @@ class FolderWatch(QObject):
     def _count(self) -> None:
         presence = self._presence
         self._counter = job = Job(lambda _: presence.count_others(), self)
-
-        # Connections
-        job.succeeded.connect(self._on_counted)
-        job.start()
+        job.start(self._on_counted)
 
     def _on_counted(self, n_others: int) -> None:
         self._counter = None

@@ -6,13 +6,14 @@ from functools import partial
 from threading import Event
 from typing import TypeAlias
 
-from PySide6.QtCore import QObject, QThreadPool, Signal
+from PySide6.QtCore import QObject, QThreadPool, Signal, SignalInstance
 
 from lightpen.errors import Cancelled, LightpenError
 from lightpen.messages import Message
 from lightpen_app.look.sentences import worded
 
 Report: TypeAlias = Callable[[float], None]
+Slot: TypeAlias = Callable[..., object] | SignalInstance
 
 _logger = logging.getLogger(__name__)
 
@@ -53,8 +54,25 @@ class Job(QObject):
         self._broke.connect(self._on_broke)
         self._finished.connect(self._on_finished)
 
-    def start(self) -> None:
-        """Queue the job."""
+    def start(
+        self,
+        succeeded: Slot | None = None,
+        failed: Slot | None = None,
+        *,
+        progressed: Slot | None = None,
+        crashed: Slot | None = None,
+        ended: Slot | None = None,
+    ) -> None:
+        """Connect the slots to the signals of these names, and queue the job."""
+        for signal, slot in (
+            (self.succeeded, succeeded),
+            (self.failed, failed),
+            (self.progressed, progressed),
+            (self.crashed, crashed),
+            (self.ended, ended),
+        ):
+            if slot is not None:
+                signal.connect(slot)
         QThreadPool.globalInstance().start(self._run)
 
     def cancel(self) -> None:

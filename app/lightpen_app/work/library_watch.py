@@ -113,11 +113,7 @@ class LibraryWatch(QObject):
             return StationStatus(library)
 
         self._reading = job = Job(read, self)
-
-        # Connections
-        job.succeeded.connect(self._on_read)
-        job.failed.connect(self._on_read_failed)
-        job.start()
+        job.start(self._on_read, self._on_read_failed)
 
     def look_at_shared(self) -> None:
         """Report changes copied from other stations, and read them."""
@@ -149,13 +145,12 @@ class LibraryWatch(QObject):
                 logbook.opened().enter_owed()
 
         self._changing = job = Job(make, self)
-
-        # Connections
-        job.succeeded.connect(lambda _: self._on_changed(asked))
-        job.failed.connect(lambda why: self.change_failed.emit(asked, why))
-        job.crashed.connect(lambda: self.change_failed.emit(asked, ""))
-        job.ended.connect(self._on_change_ended)
-        job.start()
+        job.start(
+            lambda _: self._on_changed(asked),
+            lambda why: self.change_failed.emit(asked, why),
+            crashed=lambda: self.change_failed.emit(asked, ""),
+            ended=self._on_change_ended,
+        )
 
     def shut_down(self) -> None:
         """Cancel reading."""

@@ -128,11 +128,10 @@ class PenFiles(QObject):
             return
         path, units = Path(own.path), own.units or None
         self._job = job = Job(lambda _: PenFile.read(path, units), self)
-
-        # Connections
-        job.succeeded.connect(lambda file: self._on_read(pen, own, file))
-        job.failed.connect(lambda why: self._notifications.notify(self, why))
-        job.start()
+        job.start(
+            lambda file: self._on_read(pen, own, file),
+            lambda why: self._notifications.notify(self, why),
+        )
 
     def _on_read(self, pen: str, own: LedFile, file: PenFile) -> None:
         now = self._selection.preparation

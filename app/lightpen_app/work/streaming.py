@@ -79,11 +79,7 @@ class Streaming(QObject):
             return
         archive, preparation = self._archive, self._preparation
         self._reading = job = Job(lambda _: _tip(archive, preparation), self)
-
-        # Connections
-        job.succeeded.connect(self._on_tip_read)
-        job.ended.connect(partial(self._on_reading_ended, job))
-        job.start()
+        job.start(self._on_tip_read, ended=partial(self._on_reading_ended, job))
 
     def shut_down(self) -> None:
         """Close the stream after all jobs have ended."""
@@ -105,11 +101,7 @@ class Streaming(QObject):
 
         self._set_fault("")
         self._opening = job = Job(follow, self)
-
-        # Connections
-        job.failed.connect(self._set_fault)
-        job.ended.connect(self._on_opening_ended)
-        job.start()
+        job.start(failed=self._set_fault, ended=self._on_opening_ended)
 
     def _set_fault(self, fault: str) -> None:
         self._fault = fault

@@ -166,11 +166,7 @@ class Workbench(QObject):
     def _read_supervision(self) -> None:
         folder = self.folder
         job = Job(lambda _: read_supervision(folder), self)
-
-        # Connections
-        job.succeeded.connect(self._on_supervision_read)
-        job.failed.connect(self._on_supervision_unread)
-        job.start()
+        job.start(self._on_supervision_read, self._on_supervision_unread)
 
     def _on_supervision_read(self, supervision: Supervision) -> None:
         if supervision.is_guarded:
@@ -192,9 +188,7 @@ class Workbench(QObject):
         named = self.settings.update_file()
         if named:
             job = Job(lambda _: read_update(Path(named)), self)
-            job.succeeded.connect(self._on_update_read)
-            job.failed.connect(partial(self.notifications.notify, UPDATE))
-            job.start()
+            job.start(self._on_update_read, partial(self.notifications.notify, UPDATE))
 
     def _on_update_read(self, update: Update | None) -> None:
         if update is not None:

@@ -100,22 +100,15 @@ class BoardCalibration(QObject):
         self._is_saved = True  # unless that is denied
         camera = replace(found.camera, serial=trial.serial)
         job = Job(partial(save_camera, camera, path), self)
-
-        # Connections
-        job.succeeded.connect(partial(self._on_saved, trial))
-        job.failed.connect(partial(self._on_save_refused, trial))
-        job.start()
+        job.start(partial(self._on_saved, trial), partial(self._on_save_refused, trial))
 
     def print_board(self, board: Board, path: Path) -> None:
         """Write a board as a PDF page at true scale, and report it."""
         job = Job(lambda _: write_whole(path, board_page(board)), self)
-
-        # Connections
-        job.succeeded.connect(
-            lambda _: self.set_remark(partial(self._printed_message, path))
+        job.start(
+            lambda _: self.set_remark(partial(self._printed_message, path)),
+            self._on_refused,
         )
-        job.failed.connect(self._on_refused)
-        job.start()
 
     def _printed_message(self, path: Path) -> StatusMessage:
         words = self.tr("Saved: {0}. Print it at 100 % and mount it on a flat plate.")
@@ -140,12 +133,7 @@ class BoardCalibration(QObject):
     def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
         self._give_up()
         self._job = job = Job(calibrate, self)
-
-        # Connections
-        job.progressed.connect(self._on_progressed)
-        job.succeeded.connect(self._on_found)
-        job.failed.connect(self._on_refused)
-        job.start()
+        job.start(self._on_found, self._on_refused, progressed=self._on_progressed)
 
     def _on_progressed(self, fraction: float) -> None:
         self.set_remark(partial(self._progress_message, fraction))

@@ -109,11 +109,10 @@ class BoardCapture(QObject):
             self._state = replace(state, seen_s=time_s)
         look = partial(look_for_board, frame.image, capture.board, asks_why)
         self._searching = job = Job(look, self)
-
-        # Connections
-        job.succeeded.connect(lambda seen: self._on_looked(seen, time_s))
-        job.ended.connect(partial(self._on_search_ended, job))
-        job.start()
+        job.start(
+            lambda seen: self._on_looked(seen, time_s),
+            ended=partial(self._on_search_ended, job),
+        )
 
     def _become(self, state: CaptureState) -> None:
         self._state = state
@@ -143,11 +142,9 @@ class BoardCapture(QObject):
         if capture is None or self._leading is not None:
             return
         self._leading = job = Job(partial(find_outline, capture), self)
-
-        # Connections
-        job.succeeded.connect(self._on_led)
-        job.ended.connect(partial(self._on_leading_ended, job, len(capture.kept)))
-        job.start()
+        job.start(
+            self._on_led, ended=partial(self._on_leading_ended, job, len(capture.kept))
+        )
 
     def _on_led(self, wanted: SuggestedOutline) -> None:
         if self._state.sought is not None:

@@ -55,11 +55,7 @@ class IntrinsicsControl(QObject):
     def _on_path_chosen(self, path: str) -> None:
         self._drop_reading()
         self._reading = job = Job(lambda _: CameraFile.read(Path(path)), self)
-
-        # Connections
-        job.succeeded.connect(self._on_file_read)
-        job.failed.connect(self._on_file_refused)
-        job.start()
+        job.start(self._on_file_read, self._on_file_refused)
 
     def _on_calibration_requested(self) -> None:
         if self._board is None:

@@ -100,11 +100,7 @@ class SecondCameraChoice(QWidget):
     def _on_path_chosen(self, path: str) -> None:
         self.shut_down()
         self._reading = job = Job(lambda _: read_rig(Path(path)), self)
-
-        # Connections
-        job.succeeded.connect(self._on_rig_read)
-        job.failed.connect(self._on_rig_refused)
-        job.start()
+        job.start(self._on_rig_read, self._on_rig_refused)
 
     def _on_rig_read(self, rig_file: RigFile) -> None:
         self._reading = None

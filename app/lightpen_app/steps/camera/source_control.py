@@ -85,10 +85,7 @@ class BesideControl(QObject):
         if source.kind != SourceKind.RECORDED or not source.place:
             return
         self._looking = job = Job(lambda _: files_beside(source.place), self)
-
-        # Connections
-        job.succeeded.connect(self._on_found)
-        job.start()
+        job.start(self._on_found)
 
     def _on_found(self, files: FilesBeside) -> None:
         self._found = files

@@ -120,13 +120,12 @@ class ArchiveControl(QObject):
             return
         self._work = job = Job(function, self)
         self._panel.set_working(True)
-
-        # Connections
-        job.progressed.connect(self._panel.set_progress)
-        job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._on_failed)
-        job.ended.connect(self._on_done)
-        job.start()
+        job.start(
+            on_succeeded,
+            self._on_failed,
+            progressed=self._panel.set_progress,
+            ended=self._on_done,
+        )
 
     def _on_failed(self, sentence: str) -> None:
         self._notices.notify(NOTICE, sentence)

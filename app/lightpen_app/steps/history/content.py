@@ -231,12 +231,9 @@ class HistoryContent(Translated, QWidget):
             self._on_not_adjusted(self.tr("Open the files of camera and LEDs first."))
             return
         job = Job(partial(adjust_together, archive, prepared, chosen, now), self)
-
-        # Connections
-        job.progressed.connect(self._on_adjusting)
-        job.succeeded.connect(self._on_adjusted)
-        job.failed.connect(self._on_not_adjusted)
-        job.start()
+        job.start(
+            self._on_adjusted, self._on_not_adjusted, progressed=self._on_adjusting
+        )
 
     def _on_adjusting(self, fraction: float) -> None:
         words = self.tr("Computing: {0:.0%}").format(fraction)
@@ -281,11 +278,7 @@ class HistoryContent(Translated, QWidget):
     ) -> None:
         """Enter something, also during operations on the whole archive."""
         job = Job(function, self)
-
-        # Connections
-        job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._show_fault)
-        job.start()
+        job.start(on_succeeded, self._show_fault)
 
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
@@ -323,11 +316,8 @@ class HistoryContent(Translated, QWidget):
 
         job = Job(keep, self)
 
-        # Connections
         job.succeeded.connect(self._paper.show_verification)
-        job.succeeded.connect(lambda _: self.read_anew())
-        job.failed.connect(self._show_fault)
-        job.start()
+        job.start(lambda _: self.read_anew(), self._show_fault)
 
     def _on_paper_saved(self, path: Path) -> None:
         self._notices.show_status(self.tr("Saved in {0}").format(path.parent))

@@ -149,12 +149,7 @@ class HistoryReader(QObject):
     ) -> None:
         self._drop(what)
         self._jobs[what] = job = Job(function, self)
-
-        # Connections
-        job.succeeded.connect(on_succeeded)
-        job.failed.connect(self.failed)
-        job.ended.connect(partial(self._on_ended, what, job))
-        job.start()
+        job.start(on_succeeded, self.failed, ended=partial(self._on_ended, what, job))
 
     def _on_ended(self, what: str, job: Job) -> None:
         if self._jobs.get(what) is job:

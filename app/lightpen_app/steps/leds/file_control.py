@@ -196,11 +196,7 @@ class LedFileControl(QObject):
         """Read or write a file, and ignore the outcome of an earlier one."""
         self.drop_job()
         self._job = job = Job(function, self)
-
-        # Connections
-        job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(on_succeeded, self._on_failed)
 
     def _on_failed(self, sentence: str) -> None:
         self._set_problem(lambda: sentence)

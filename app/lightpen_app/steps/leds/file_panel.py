@@ -192,10 +192,7 @@ class LedFilePanel(Translated, QWidget):
     def _on_save_path_picked(self, text: str) -> None:
         path = Path(text)
         job = Job(lambda _: path.exists(), self)
-
-        # Connections
-        job.succeeded.connect(partial(self._on_save_path_seen, path))
-        job.start()
+        job.start(partial(self._on_save_path_seen, path))
 
     def _on_save_path_seen(self, path: Path, exists: bool) -> None:
         if not exists:

@@ -89,11 +89,7 @@ class PenWatch(QObject):
             return
         self._compared = views
         self._job = job = Job(lambda report: match_pen(camera, pen, views), self)
-
-        # Connections
-        job.succeeded.connect(self._on_compared)
-        job.crashed.connect(self._on_crashed)
-        job.start()
+        job.start(self._on_compared, crashed=self._on_crashed)
 
     def _on_compared(self, match: PenMatch) -> None:
         self._job, self._last = None, match

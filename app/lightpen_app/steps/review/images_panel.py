@@ -283,12 +283,7 @@ class ImagesPanel(Translated, QWidget):
             return
         _, number, camera = self._loading
         self._job = job = Job(partial(_decoded, self._solution, number, camera), self)
-
-        # Connections
-        job.succeeded.connect(self._on_decoded)
-        job.failed.connect(self._on_undecoded)
-        job.crashed.connect(self._on_crashed)
-        job.start()
+        job.start(self._on_decoded, self._on_undecoded, crashed=self._on_crashed)
 
     def _on_decoded(self, image: _Decoded) -> None:
         self._job = None

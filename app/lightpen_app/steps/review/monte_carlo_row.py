@@ -96,13 +96,12 @@ class MonteCarloRow(Translated, QWidget):
         self._found, self._fault = None, ""
         self._progress.setValue(0)
         self._job = job = Job(compute, self)
-
-        # Connections
-        job.progressed.connect(self._on_progressed)
-        job.succeeded.connect(self._on_found)
-        job.failed.connect(self._on_failed)
-        job.crashed.connect(self._on_cancel_clicked)
-        job.start()
+        job.start(
+            self._on_found,
+            self._on_failed,
+            progressed=self._on_progressed,
+            crashed=self._on_cancel_clicked,
+        )
         self._refresh()
         self._cancel.setFocus()
 

@@ -127,10 +127,7 @@ class NextTipsControl(QObject):
             return
         archive = self._run.archive
         self._search = job = Job(lambda _: next_tips(archive, result), self)
-
-        # Connections
-        job.succeeded.connect(self._row.set_value)
-        job.start()
+        job.start(self._row.set_value)
 
     def shut_down(self) -> None:
         """Stop."""

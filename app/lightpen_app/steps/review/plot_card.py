@@ -107,12 +107,8 @@ class PlotCard(Translated, QFrame):
         is_table = path.suffix.lower() == ".csv"
         data = self._plot.csv() if is_table else self._plot.png(self._mark())
         job = Job(lambda _: write_whole(path, data), self)
-
-        # Connections
         text = self.tr("Saved as {0}").format(path)
-        job.succeeded.connect(lambda _: self.saved.emit(text))
-        job.failed.connect(self.failed)
-        job.start()
+        job.start(lambda _: self.saved.emit(text), self.failed)
 
     @override
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

@@ -45,11 +45,7 @@ class PressTestControl(QObject):
             return press_test(one, other)
 
         self._job = job = Job(compared, self)
-
-        # Connections
-        job.succeeded.connect(self._result.set_pressed)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(self._result.set_pressed, self._on_failed)
 
     def shut_down(self) -> None:
         """Compare no more."""

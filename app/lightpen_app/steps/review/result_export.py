@@ -126,11 +126,7 @@ class ResultExport(QObject):
                 save_new(folder, stem + each.suffix, each.content(found, laboratory))
 
         self._saving = job = Job(write, self)
-
-        # Connections
-        job.succeeded.connect(lambda _: self._report_saved(folder))
-        job.failed.connect(self.failed)
-        job.start()
+        job.start(lambda _: self._report_saved(folder), self.failed)
 
     def _show_paper(self) -> None:
         """Open the report of the stored result."""

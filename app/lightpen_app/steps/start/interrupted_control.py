@@ -106,9 +106,7 @@ class InterruptedControl(QObject):
             return Interrupted(swings, find_interrupted(data))
 
         self._search = Job(search, self)
-        self._search.succeeded.connect(self._on_found)
-        self._search.failed.connect(self._show_fault)
-        self._search.start()
+        self._search.start(self._on_found, self._show_fault)
 
     def _on_found(self, found: "Interrupted") -> None:
         swings = found.swings
@@ -131,13 +129,12 @@ class InterruptedControl(QObject):
         """Apply an action to an item; the list is disabled until it ends."""
         self._panel.set_waiting(waiting)
         self._work = Job(function, self)
-
-        # Connections
-        self._work.succeeded.connect(on_succeeded)
-        self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._on_work_crashed)
-        self._work.ended.connect(partial(self._on_work_ended, self._work))
-        self._work.start()
+        self._work.start(
+            on_succeeded,
+            self._on_work_failed,
+            crashed=self._on_work_crashed,
+            ended=partial(self._on_work_ended, self._work),
+        )
 
     def _show_fault(self, sentence: str) -> None:
         self._notices.notify(NOTICE, sentence)

@@ -51,11 +51,7 @@ class LargeScreenPanel(QWidget):
             return trend_of(logbook.opened().database, wanted)
 
         self._job = job = Job(read, self)
-
-        # Connections
-        job.succeeded.connect(self._show)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(self._show, self._on_failed)
 
     def shut_down(self) -> None:
         """Cancel running jobs."""

@@ -80,11 +80,7 @@ class LastResultPresenter(QObject):
             self._panel.set_value(LastResult(result, is_simulated=is_simulated))
             use(result)
 
-        # Connections
-        job.succeeded.connect(show)
-        job.failed.connect(self._on_failed)
-        job.crashed.connect(self._on_crashed)
-        job.start()
+        job.start(show, self._on_failed, crashed=self._on_crashed)
 
     def _fill_in(self, result: Result | None) -> None:
         now = self._selection.preparation

@@ -226,21 +226,14 @@ class LimitsControl(QObject):
             ),
             self,
         )
-
-        # Connections
-        job.succeeded.connect(self._on_saved)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(self._on_saved, self._on_failed)
 
     def _on_failed(self, why: str) -> None:
         """Report it, and read the limits again: another window may have set them."""
         folder = self._folder
         self._dialog.show_fault(why)
         job = Job(lambda _: read_supervision(folder), self)
-
-        # Connections
-        job.succeeded.connect(self._selection.set_supervision)
-        job.start()
+        job.start(self._selection.set_supervision)
 
     def _on_saved(self, supervision: Supervision) -> None:
         self._dialog.close()

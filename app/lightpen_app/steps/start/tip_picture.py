@@ -39,11 +39,7 @@ class TipPicture(Translated, QLabel):
             return
         place, density = self.size(), self.devicePixelRatioF()
         self._job = job = Job(lambda _: _scaled(read, place, density), self)
-
-        # Connections
-        job.succeeded.connect(self._on_read)
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(self._on_read, self._on_failed)
 
     def _on_read(self, image: QImage) -> None:
         self._job = None

@@ -155,11 +155,7 @@ class PenPanel(Translated, QWidget):
             return
         work = partial(read_pen_over_time, archive, now)
         self._reading = job = Job(work, self)
-
-        # Connections
-        job.succeeded.connect(self._on_read)
-        job.failed.connect(self._on_unread)
-        job.start()
+        job.start(self._on_read, self._on_unread)
         self._refresh()
 
     def _on_read(self, found: PenOverTime) -> None:
@@ -185,13 +181,12 @@ class PenPanel(Translated, QWidget):
         now, scale = self._clock(), self._scale()
         work = partial(improve_led_file, self._folder, pen, scale, now)
         self._improving = job = Job(work, self)
-
-        # Connections
-        job.progressed.connect(self._on_progressed)
-        job.succeeded.connect(self._on_improved)
-        job.failed.connect(self._on_improving_failed)
-        job.crashed.connect(self._on_cancel_clicked)
-        job.start()
+        job.start(
+            self._on_improved,
+            self._on_improving_failed,
+            progressed=self._on_progressed,
+            crashed=self._on_cancel_clicked,
+        )
         self._refresh()
         self._cancel.setFocus()
 
@@ -227,11 +222,7 @@ class PenPanel(Translated, QWidget):
             return
         path: Path = self._new.path
         self._opening = job = Job(lambda _: PenFile.read(path), self)
-
-        # Connections
-        job.succeeded.connect(partial(self._on_new_read, self._read_of))
-        job.failed.connect(self._on_failed)
-        job.start()
+        job.start(partial(self._on_new_read, self._read_of), self._on_failed)
 
     def _on_new_read(self, made_for: tuple[object, ...], pen_file: PenFile) -> None:
         now = self._selection.preparation

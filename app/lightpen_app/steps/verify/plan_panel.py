@@ -181,12 +181,10 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
     def open_plan(self, path: Path) -> None:
         """Read a plan and measure by it, or tell why that is impossible."""
         job = Job(lambda _: read_plan(path), self)
-
-        # Connections
         job.succeeded.connect(self.choose)
-        job.succeeded.connect(lambda _: self._notices.withdraw(self))
-        job.failed.connect(partial(self._notices.notify, self))
-        job.start()
+        job.start(
+            lambda _: self._notices.withdraw(self), partial(self._notices.notify, self)
+        )
 
     def _folder(self) -> str:
         """Return the folder of the last saved files."""
@@ -260,11 +258,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
     def _save(self, work: Callable[[Report], object], path: Path) -> None:
         self._workbench.save_place.remember(path.parent)
         job = Job(work, self)
-
-        # Connections
-        job.failed.connect(partial(self._notices.notify, self))
-        job.succeeded.connect(lambda _: self._on_saved(path))
-        job.start()
+        job.start(lambda _: self._on_saved(path), partial(self._notices.notify, self))
 
     def _on_saved(self, path: Path) -> None:
         self._notices.show_status(self.tr("Saved: {0}").format(path))
