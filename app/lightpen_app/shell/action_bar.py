@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QDeadlineTimer, Qt, Signal
 from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QFrame, QWidget
+from PySide6.QtWidgets import QFrame
 from typing_extensions import override
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
@@ -29,8 +29,8 @@ class ActionBar(Translated, QFrame):
     main_pressed = Signal()
     back_pressed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setObjectName("bottom_bar")
         self._status_holds: Callable[[], bool] | None = None
         self._guard = QDeadlineTimer()  # expired

@@ -94,9 +94,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         preferences: Preferences,
         notifications: Notifications,
         later: Iterator[Page] | None = None,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         if not pages:
             raise ValueError("`pages` must hold at least one page.")
         self.setObjectName("main")

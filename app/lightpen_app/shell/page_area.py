@@ -20,8 +20,8 @@ class NoticeBar(Translated, QFrame):
 
     value_changed = Signal(str)  # what it says; empty once it says nothing any more
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setProperty("area", "notice")
         self._unwritable = self._fault = ""  # the data folder, and why
 
@@ -99,8 +99,8 @@ class PageArea(QFrame):
     A notice stands above it and covers nothing; it takes no focus.
     """
 
-    def __init__(self, page: QWidget, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, page: QWidget) -> None:
+        super().__init__()
         self.setObjectName("page_area")
 
         # Widgets: the order of making them is the order of the Tab key

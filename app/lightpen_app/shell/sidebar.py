@@ -60,8 +60,8 @@ class Sidebar(Translated, QFrame):
     # of it must not be used for measuring.
     subject_changed = Signal(str, bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setObjectName("sidebar")
         self._room = SizeClass()
 

@@ -197,8 +197,8 @@ class StepList(Translated, QWidget):
 
     step_chosen = Signal(int)  # index of the step, which may be closed
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._buttons: list[StepButton] = []
         self._is_narrow = False
         self._layout = vertical_layout(self, spacing=GRID // 2)

@@ -15,8 +15,8 @@ class CameraSwitch(Translated, QWidget):
 
     value_changed = Signal(int)  # another camera is to be shown, by its number from 0
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._buttons = [PushButton() for _ in range(N_CAMERAS)]

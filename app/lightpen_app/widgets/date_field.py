@@ -3,7 +3,6 @@
 from datetime import date
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QWidget
 
 from lightpen_app.look.theme import Tone, set_tone
 from lightpen_app.widgets.path_field import EnterEdit
@@ -20,8 +19,8 @@ class DateField(Translated, EnterEdit):
 
     value_changed = Signal()  # another day is typed, or none
 
-    def __init__(self, example: date = EXAMPLE, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, example: date = EXAMPLE) -> None:
+        super().__init__()
         self._value: date | None = None
         self._example = example
         self.setPlaceholderText(f"{example}")

@@ -36,9 +36,8 @@ class FittedText(QWidget):
         least: float = 0.0,
         *,
         wraps: bool = True,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._least = least
         self._largest = largest
         self._n_lines = n_lines

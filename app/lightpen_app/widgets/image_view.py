@@ -60,8 +60,8 @@ class ImageView(Translated, QWidget):
     # Its centre x, y and its radius, image px.
     circle_drawn = Signal(float, float, float)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._buffer: Image | None = None  # keeps the memory of _shown alive
         self._shown = QImage()
         self._size = QSize()

@@ -18,8 +18,8 @@ class LazyWidget(QWidget, Generic[W]):
 
     made = Signal(object)  # QWidget
 
-    def __init__(self, make: Callable[[], W], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, make: Callable[[], W]) -> None:
+        super().__init__()
         self._make = make
         self._content: W | None = None
 

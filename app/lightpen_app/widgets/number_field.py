@@ -4,7 +4,7 @@ import re
 
 from PySide6.QtCore import QLocale, Qt
 from PySide6.QtGui import QValidator, QWheelEvent
-from PySide6.QtWidgets import QDoubleSpinBox, QWidget
+from PySide6.QtWidgets import QDoubleSpinBox
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
@@ -23,14 +23,8 @@ class NumberField(LeavesPageKeys, QDoubleSpinBox):
     it is typed; else its last digit would be passed over, and "400" be taken for 40.
     """
 
-    def __init__(
-        self,
-        unit: str,
-        limits: tuple[float, float],
-        n_decimals: int,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, unit: str, limits: tuple[float, float], n_decimals: int) -> None:
+        super().__init__()
         self.setLocale(QLocale.c())
         self.setDecimals(n_decimals)
         self.setRange(*limits)

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QSizePolicy,
     QTableWidget,
     QTableWidgetItem,
-    QWidget,
 )
 from typing_extensions import override
 
@@ -31,8 +30,8 @@ class Figures:
 class NumberTable(QTableWidget):
     """Shows a table without scrolling; Ctrl+C copies the selection."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = Figures()
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setTabKeyNavigation(False)

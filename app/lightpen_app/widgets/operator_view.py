@@ -50,8 +50,8 @@ class OperatorView(Translated, QWidget):
     advance_requested = Signal()  # Enter or PageDown
     pause_requested = Signal()  # Space
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent, Qt.WindowType.Window)
+    def __init__(self) -> None:
+        super().__init__(None, Qt.WindowType.Window)
         self._value = OperatorValue()
         self._distance_m = 3.0
         self.setAutoFillBackground(True)

@@ -16,8 +16,8 @@ class PageScroll(QScrollArea):
 
     height_changed = Signal(int)  # of what is seen at once, px
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setWidgetResizable(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._revealed: QWidget | None = None  # until its user scrolls

@@ -61,8 +61,8 @@ class PathField(QWidget):
     value_changed = Signal(str)
     path_chosen = Signal(str)  # so it was, and it is not empty
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = self._last = ""
         self._is_faulty = False
 

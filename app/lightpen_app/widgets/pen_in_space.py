@@ -40,8 +40,8 @@ class DisplayedPosture:
 class PenInSpace(Translated, QWidget):
     """Draws a pen in its cone and the outline of the target posture."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: DisplayedPosture | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._retranslate()

@@ -79,8 +79,8 @@ class PenView(Translated, QWidget):
 
     led_chosen = Signal(int)  # the LED of this number was clicked
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = PenPicture()
         self._chosen = 0
         self._yaw, self._pitch = START_YAW, START_PITCH

@@ -71,8 +71,8 @@ class Plot(QWidget):
 
     titled = Signal()  # title or labels changed
 
-    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, axes: Axes) -> None:
+        super().__init__()
         self._columns: dict[str, Column] = {}
         self._title_px = 0
         self._y_range = (0.0, 0.0)  # shown by `_fit`
@@ -291,12 +291,11 @@ class TracePlot(Plot):
         y_zero: bool = False,
         y_log: bool = False,
         tail: float = 1.0,
-        parent: QWidget | None = None,
     ) -> None:
         self._curves: list[pg.PlotCurveItem] = []
         self._legend: tuple[str, ...] = ()
         self._limit: pg.InfiniteLine | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._names = tuple(curve.column for curve in curves)
         self._y_zero = y_zero
         self._y_log = y_log

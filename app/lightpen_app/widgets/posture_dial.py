@@ -109,8 +109,8 @@ def posture_at(place: tuple[float, float], turn: float, heading: float) -> Postu
 class PostureDial(Translated, QWidget):
     """Two rings of eight directions, a middle, and a bar for the turn."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = DialValue()
         self._ground = QPixmap()
         self._ground_shows: tuple[object, ...] = ()

@@ -1,7 +1,7 @@
 """A button that is never narrower than its text."""
 
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QPushButton
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
@@ -18,13 +18,9 @@ class PushButton(QPushButton):
     """
 
     def __init__(
-        self,
-        least_width: int = LEAST_WIDTH,
-        parent: QWidget | None = None,
-        *,
-        checkable: bool = False,
+        self, least_width: int = LEAST_WIDTH, *, checkable: bool = False
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self.setCheckable(checkable)
         self._least_width = least_width
 

@@ -40,8 +40,8 @@ class SignLabel(QWidget):
         Whether its words may take more than one line.
     """
 
-    def __init__(self, *, wraps: bool = True, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, *, wraps: bool = True) -> None:
+        super().__init__()
         self._value = StatusMessage()
 
         # Widgets

@@ -52,13 +52,9 @@ class StateBanner(QWidget):
     announced = Signal(str)  # text for screen readers
 
     def __init__(
-        self,
-        word_size: float = TextSize.DISPLAY,
-        parent: QWidget | None = None,
-        *,
-        speaks: bool = True,
+        self, word_size: float = TextSize.DISPLAY, *, speaks: bool = True
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._value = State()
         self._long_height = 0  # px; 0 while the sentence is short
         self._detail_px = 0.0

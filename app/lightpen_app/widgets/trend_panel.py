@@ -24,9 +24,9 @@ LEAST_HEIGHT = 13 * GRID
 class TrendPlot(Plot):
     """A value with its uncertainty over calibrations, between limits."""
 
-    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+    def __init__(self, axes: Axes) -> None:
         self._dots: pg.ScatterPlotItem | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._bars = pg.ErrorBarItem(x=np.zeros(0), y=np.zeros(0), height=np.zeros(0))
         self._line = pg.PlotCurveItem()
         self._dots = pg.ScatterPlotItem(size=DOT)
@@ -96,8 +96,8 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
 
     narrow_below = 110 * GRID  # px
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = Trend()
 
         # Widgets

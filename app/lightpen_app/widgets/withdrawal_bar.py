@@ -1,7 +1,6 @@
 """Asks why an acceptance is revoked, and a supervisor to sign."""
 
 from PySide6.QtCore import QCoreApplication, QEvent
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.widgets.reason_bar import ReasonBar
@@ -10,8 +9,8 @@ from lightpen_app.widgets.reason_bar import ReasonBar
 class WithdrawalBar(ReasonBar):
     """A `ReasonBar` for revoking the acceptance of a tip."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._retranslate()
 
     @override

@@ -54,8 +54,8 @@ PICTURE_HEIGHT = 12 * GRID  # px
 class BoardPicture(QWidget):
     """Draws a board as it looks from the front."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._board: Board | None = None
         self.setFixedHeight(PICTURE_HEIGHT)
 
@@ -115,8 +115,8 @@ class BoardForm(Translated, QWidget):
 
     changed = Signal()  # the board in the fields has changed
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._kind = ChoiceField()

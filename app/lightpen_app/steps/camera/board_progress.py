@@ -15,8 +15,8 @@ from lightpen_app.widgets.translated import Translated
 class BoardProgress(Translated, QWidget):
     """Shows position, size and skew of the views as bars, with a verdict."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = ViewProgress()
 
         # Widgets

@@ -1,7 +1,7 @@
 """A field for a camera: from the search, or a serial number or address."""
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy
 
 from lightpen.cameras.source import FoundDevice
 from lightpen_app.look.theme import Tone, set_tone
@@ -15,8 +15,8 @@ class DeviceField(ChoiceField):
     # Another camera was given, or the same one again by Enter.
     value_changed = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = ""
         self.setEditable(True)
         self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)

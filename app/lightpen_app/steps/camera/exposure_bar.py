@@ -18,8 +18,8 @@ MOST_NAMED = 6  # LEDs in one line
 class ExposureBar(Translated, QWidget):
     """A scale with one tick per LED, and the verdict as text."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = Exposure()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._retranslate()

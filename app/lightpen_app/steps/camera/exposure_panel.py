@@ -3,7 +3,7 @@
 from collections import deque
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QLabel, QWidget
+from PySide6.QtWidgets import QFrame, QLabel
 
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
 from lightpen.detection.auto_exposure import AutoExposure, ExposureState
@@ -30,8 +30,8 @@ class ExposurePanel(Translated, QFrame):
     # The program is to set both by the LEDs, or to stop doing so.
     adjustment_requested = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setProperty("area", "panel")
         self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
@@ -228,8 +228,8 @@ def _holds(adjustment: AutoExposure, exposure: Exposure) -> bool:
 class FocusPanel(Translated, QFrame):
     """The sharpness of the LEDs, and what to do."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setProperty("area", "panel")
         self._widths: deque[float] = deque(maxlen=N_TRACED)
         self._is_saturated = self._is_recorded = False

@@ -29,8 +29,8 @@ LEAST_TOP = 1.5 * SHARP_EDGE  # px, of the trace
 class FocusMeter(Translated, QWidget):
     """Edge width, px: the smaller, the sharper."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: tuple[float, ...] = ()
         self._is_saturated = False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)

@@ -2,7 +2,7 @@
 
 import numpy as np
 from PySide6.QtCore import QDate, QLocale, Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QLabel, QWidget
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QLabel
 
 from lightpen.formats.opened_files import CameraFile
 from lightpen.local_time import local_now
@@ -32,8 +32,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
     # There is no such file: the camera is to be found by a swing.
     discovery_requested = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._file: CameraFile | None = None
         self._image_size: tuple[int, int] | None = None
         self._serial = ""

@@ -39,8 +39,8 @@ class LivePanel(Translated, QWidget):
     # The other of two cameras is to be shown, by its number from 0.
     camera_chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._connection = Connection.CLOSED
         self._sentence = ""
         self._recorded: Origin | None = None

@@ -1,6 +1,5 @@
 """The step Camera: source, exposure, focus and intrinsics."""
 
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.cameras.worker_events import Connection
@@ -29,10 +28,8 @@ class CameraPage(Page):
     key = "camera"
     shows_images = True
 
-    def __init__(
-        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
+        super().__init__()
         self._sounds = sounds
         self._selection, self._run = workbench.selection, workbench.run
         self._camera, self._live = workbench.camera, workbench.live

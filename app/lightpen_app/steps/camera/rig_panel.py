@@ -2,7 +2,7 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox
 
 from lightpen.formats.rig_files import RigFile
 from lightpen.messages import Message
@@ -26,8 +26,8 @@ class RigPanel(Translated, QGroupBox):
     wanted = Signal(bool)  # whether two cameras are to look at once
     path_chosen = Signal(str)  # a rig file is to be read
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._file: RigFile | None = None
         self._late: Message | None = None
         self._n_unpaired: int | None = None

@@ -22,13 +22,9 @@ class SecondCameraChoice(QWidget):
     """Shows and changes the second camera of the preparation."""
 
     def __init__(
-        self,
-        selection: Selection,
-        camera: CameraSetup,
-        files: ChosenFiles,
-        parent: QWidget | None = None,
+        self, selection: Selection, camera: CameraSetup, files: ChosenFiles
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._selection, self._chosen_files = selection, files
         self._live = camera.live
         self._reading: Job | None = None

@@ -31,8 +31,8 @@ class SettingsPanel(Translated, QGroupBox):
     # CameraSettings: what is requested; all else is None
     settings_changed = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
         self._stats = Stats()

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu, QWidget
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu
 
 from lightpen.cameras.source import FoundDevice, SourceNeeds
 from lightpen.cameras.sources import SOURCES
@@ -39,10 +39,8 @@ class SourcePanel(Translated, QGroupBox):
     # FilesBeside: the files beside the recorded images are to be used
     files_requested = Signal(object)
 
-    def __init__(
-        self, *, is_second: bool = False, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, *, is_second: bool = False) -> None:
+        super().__init__()
         self._is_second = is_second
         self._value = SourceChoice()
         self._absent: Mapping[str, Message] = {}

@@ -2,7 +2,7 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QWidget
+from PySide6.QtWidgets import QGroupBox
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.inspection import SEARCHED_IMAGES, StraySearch
@@ -26,8 +26,8 @@ class StrayLightPanel(Translated, QGroupBox):
     cover_requested = Signal(bool)
     drawing_toggled = Signal(bool)  # the mask is to be drawn on the image, or no longer
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._search: StraySearch | None = None
         self._knows_pen = False
         self._n_masked = 0

@@ -29,13 +29,9 @@ class CameraPanels(ResponsiveLayout, QWidget):
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
     def __init__(
-        self,
-        selection: Selection,
-        camera: CameraSetup,
-        files: ChosenFiles,
-        parent: QWidget | None = None,
+        self, selection: Selection, camera: CameraSetup, files: ChosenFiles
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
 
         # Widgets
         self.swing_message = SignLabel()

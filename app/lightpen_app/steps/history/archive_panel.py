@@ -45,8 +45,8 @@ class ArchivePanel(Translated, QWidget):
     import_requested = Signal()
     save_requested = Signal(object)  # Saving
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._checked: ArchiveCheckResult | None = None
         self._delivery: ReplicationState | None = None
 

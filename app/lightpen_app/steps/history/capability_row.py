@@ -23,8 +23,8 @@ class CapabilityRow(Translated, QWidget):
 
     value_changed = Signal()  # the user chose otherwise
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._shown: tuple[Capability | None, int] = (None, 0)
 
         # Widgets

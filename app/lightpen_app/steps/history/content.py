@@ -51,8 +51,8 @@ class HistoryContent(Translated, QWidget):
 
     checked = Signal()  # the archive was checked
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
         self._chosen, self._tips = workbench.selection, workbench.library
         self._streaming, self._notices = workbench.streaming, workbench.notifications
         self._folder, self._now = workbench.folder, workbench.around.now

@@ -27,10 +27,8 @@ class DuePanel(Translated, QWidget):
 
     rule_changed = Signal(object)  # DueRule: the user chose another rule
 
-    def __init__(
-        self, now: Callable[[], datetime], parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, now: Callable[[], datetime]) -> None:
+        super().__init__()
         self._now = now
         self._tips: tuple[DueTip, ...] = ()
         self._is_guarded = False

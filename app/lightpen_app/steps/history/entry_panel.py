@@ -45,8 +45,8 @@ class EntryPanel(Translated, QWidget):
     # Written: the record on paper of an entry's tip shall be shown
     paper_requested = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._line: Line | None = None
         self._asked: StoredEntry | None = None
         self._home = ""

@@ -28,8 +28,8 @@ class FilterBar(Translated, QWidget):
 
     value_changed = Signal()  # other entries are to be shown
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._known = KnownNames()
 
         # Widgets: the order of making them is the order of the Tab key

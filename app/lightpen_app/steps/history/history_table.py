@@ -51,8 +51,8 @@ class HistoryModel(TitledModel):
     # Number of the first line of a block that is to be shown.
     block_wanted = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._n_lines = 0
         self._blocks: OrderedDict[int, tuple[Line, ...]] = OrderedDict()
         self._asked: set[int] = set()
@@ -148,9 +148,9 @@ class HistoryTable(Translated, RowTable):
     # Other lines are current or selected, or were read by now.
     selection_changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         self._model = HistoryModel()
-        super().__init__(self._model, parent)
+        super().__init__(self._model)
         self._model.setParent(self)
         self._is_of_one_station = False
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)

@@ -21,8 +21,8 @@ class HistoryPage(Page):
 
     key = "history"
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
         self._workbench = workbench
         self._run = workbench.run
 

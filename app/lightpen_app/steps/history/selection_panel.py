@@ -43,8 +43,8 @@ class SelectionPanel(Translated, QWidget):
     adjust_requested = Signal()
     report_requested = Signal()  # the report of the repeatability is requested
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._selected: tuple[StoredEntry, ...] = ()
         self._trend = Trend()
 

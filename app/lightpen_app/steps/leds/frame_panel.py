@@ -3,7 +3,7 @@
 import math
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGroupBox, QWidget
+from PySide6.QtWidgets import QGroupBox
 
 from lightpen.pen_check.frame import FrameCheck, Rule, RuleCheck, RuleStatus
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
@@ -28,8 +28,8 @@ class FramePanel(Translated, QGroupBox):
     led_chosen = Signal(int)  # the LED of this number was clicked
     move_requested = Signal()  # the coordinates are to be put into the pen frame
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: FrameCheck | None = None
 
         # Widgets

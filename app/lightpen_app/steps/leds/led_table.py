@@ -41,8 +41,8 @@ class LedTable(Translated, QTableView):
     # The number of the LED whose row is now current; 0 for none.
     led_chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setObjectName("led_table")
 
         # Widgets

@@ -35,8 +35,8 @@ class FixableMessage(Translated, QWidget):
 
     mend_requested = Signal(object)  # Finding: the button was pressed
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._finding: Finding | None = None
 
         # Widgets
@@ -91,8 +91,8 @@ class MatchPanel(Translated, QGroupBox):
     # Finding: the table is to be mended as this finding says
     mend_requested = Signal(object)
 
-    def __init__(self, foot: QWidget, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, foot: QWidget) -> None:
+        super().__init__()
         self._match: PenMatch | None = None
         self._detection: PenDetection | None = None
         self._sigmas: deque[float] = deque(maxlen=N_SMOOTHED)

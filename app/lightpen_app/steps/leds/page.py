@@ -1,7 +1,6 @@
 """The step LEDs: coordinates, checked against pen frame and live images."""
 
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.pen_check.draft import PenDraft, exchanged, mended
@@ -42,8 +41,8 @@ class LedsPage(ResponsiveLayout, Page):
     low_below = 62 * GRID  # px; then it scrolls
     vast_from = QSize(240 * GRID, 130 * GRID)  # px; then the live image is larger
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
         self._selection = workbench.selection
         self._leds = LedDraft(self._selection, self)
 

@@ -1,7 +1,6 @@
 """Buttons that tilt and cover the simulated pen."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.simulator.hand import Operator
@@ -17,8 +16,8 @@ COVER_S = 3.0
 class LedSimulatorControls(SimulatorControls):
     """Has the simulated operator show the pen; hidden with a real one."""
 
-    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
-        super().__init__(live, parent)
+    def __init__(self, live: LiveView) -> None:
+        super().__init__(live)
 
         # Widgets
         self._lean = PushButton(checkable=True)

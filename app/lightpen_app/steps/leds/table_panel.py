@@ -35,8 +35,8 @@ class LedTablePanel(Translated, QGroupBox):
     discard_requested = Signal()  # the changes are to be given up
     led_chosen = Signal(int)  # the number of the LED that is now current, 0 for none
 
-    def __init__(self, undo: QWidget, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, undo: QWidget) -> None:
+        super().__init__()
         self._value = PenDraft()
         self._changes = Changes.NONE
         self._override = ""

@@ -4,7 +4,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QTabWidget, QWidget
+from PySide6.QtWidgets import QTabWidget
 
 from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
@@ -26,10 +26,8 @@ class DetailTabs(QTabWidget):
     saved = Signal(str)
     failed = Signal(str)
 
-    def __init__(
-        self, run: SwingRun, place: SavePlace, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, run: SwingRun, place: SavePlace) -> None:
+        super().__init__()
         self._run = run
         self._place = place
         self._images = LazyWidget(_make_images_panel)

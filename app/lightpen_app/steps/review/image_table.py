@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt, Signal
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.detection.reasons import Reason
@@ -23,8 +22,8 @@ class ImageModel(TitledModel):
 
     n_columns = STATE + 1
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._rows: tuple[ImageRow, ...] = ()
         self._decimals = 3
 
@@ -93,9 +92,9 @@ class ImageTable(Translated, RowTable):
     # Other images are selected, or what they are has changed.
     selection_changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         self._model = ImageModel()
-        super().__init__(self._model, parent)
+        super().__init__(self._model)
         self._model.setParent(self)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         for column, width in ((NUMBER, 7.5), (MISFIT, 11.5), (LEDS, 6.5)):

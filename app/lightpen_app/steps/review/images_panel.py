@@ -61,8 +61,8 @@ class ImagesPanel(Translated, QWidget):
     saved = Signal(str)
     failed = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._solution: Solution | None = None
         self._why_locked = ""
         self._job: Job | None = None

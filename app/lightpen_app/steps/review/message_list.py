@@ -17,8 +17,8 @@ MOST = 10 * GRID  # px of height; more is scrolled
 class StatusMessageList(PageScroll):
     """Shows messages; hidden while there are none."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: tuple[StatusMessage, ...] = ()
         self._labels: list[SignLabel] = []
         self.setFrameShape(QFrame.Shape.NoFrame)

@@ -29,8 +29,8 @@ PROGRESS_STEPS = 1000
 class MonteCarloRow(Translated, QWidget):
     """Checks the budget of a solution by simulated calibrations, in other processes."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._solution: Solution | None = None
         self._found: MonteCarlo | None = None
         self._fault = ""

@@ -30,8 +30,8 @@ class NextTipsRow(Translated, QWidget):
 
     chosen = Signal(object)  # NextTip: it is to be calibrated
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: tuple[NextTip, ...] = ()
         self._buttons: list[PushButton] = []
         self._statuses = StationStatus()

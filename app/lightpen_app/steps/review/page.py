@@ -44,8 +44,8 @@ class ReviewPage(Page):
 
     key = "review"
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
         self._selection = workbench.selection
         self._run, self._runner = workbench.run, workbench.run.runner
         self._shown = SwingStatus()

@@ -37,10 +37,8 @@ class PlotCard(Translated, QFrame):
     saved = Signal(str)  # a sentence that says where
     failed = Signal(str)  # a sentence to be read: nothing was saved
 
-    def __init__(
-        self, plot: Plot, file_stem: str, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, plot: Plot, file_stem: str) -> None:
+        super().__init__()
         self._plot = plot
         self._file_stem = file_stem
         self._place: SavePlace | None = None
@@ -143,13 +141,8 @@ class PlotGrid(QWidget):
     saved = Signal(str)  # as of any of the cards
     failed = Signal(str)
 
-    def __init__(
-        self,
-        cards: Sequence[PlotCard],
-        n_columns: int = 2,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, cards: Sequence[PlotCard], n_columns: int = 2) -> None:
+        super().__init__()
         self._cards = tuple(cards)
 
         # Layout

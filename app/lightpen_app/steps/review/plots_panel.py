@@ -38,10 +38,8 @@ class PlotsPanel(Translated, QWidget):
     saved = Signal(str)
     failed = Signal(str)
 
-    def __init__(
-        self, cards: Sequence[PlotCard], parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, cards: Sequence[PlotCard]) -> None:
+        super().__init__()
         self._solution: Solution | None = None
 
         # Widgets
@@ -84,7 +82,7 @@ class PlotsPanel(Translated, QWidget):
 class ResidualsPanel(PlotsPanel):
     """Residuals over the image, by axis, by LED, and how they are distributed."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         # Widgets
         self._arrows = ArrowPlot(Axes(""))
         self._lens = ArrowPlot(Axes(""))
@@ -100,8 +98,7 @@ class ResidualsPanel(PlotsPanel):
                 PlotCard(self._dots, "residuals-by-axis"),
                 PlotCard(self._histogram, "residuals-histogram"),
                 PlotCard(self._lens, "lens-field"),
-            ],
-            parent,
+            ]
         )
         self._lens_card = self.cards()[-1]
         self._lens_card.set_needed(False)
@@ -208,7 +205,7 @@ class ResidualsPanel(PlotsPanel):
 class UncertaintyPanel(PlotsPanel):
     """Uncertainty budget of the tip, and the postures."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         # Widgets
         self._budget = BarPlot(
             Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES], "part"
@@ -218,8 +215,7 @@ class UncertaintyPanel(PlotsPanel):
             [
                 PlotCard(self._budget, "uncertainty-budget"),
                 PlotCard(self._postures, "postures"),
-            ],
-            parent,
+            ]
         )
         self._remark = text_label(TextSize.SMALL, Tone.QUIET)
         self._monte_carlo = MonteCarloRow()
@@ -279,7 +275,7 @@ class UncertaintyPanel(PlotsPanel):
 class MethodsPanel(PlotsPanel):
     """Convergence of the paper's method, compared with the joint fit."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         # Widgets
         self._objective = LinePlot(Axes(""), [Curve("objective_mm2")], "iteration")
         self._change = LinePlot(
@@ -289,8 +285,7 @@ class MethodsPanel(PlotsPanel):
             [
                 PlotCard(self._objective, "convergence-objective"),
                 PlotCard(self._change, "convergence-tip"),
-            ],
-            parent,
+            ]
         )
         self._table = NumberTable()
 

@@ -32,9 +32,9 @@ class MisfitPlot(Plot):
     # list of int: numbers of the images above which the line was left
     limit_set = Signal(list)
 
-    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+    def __init__(self, axes: Axes) -> None:
         self._used: pg.ScatterPlotItem | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._places: dict[int, tuple[float, float]] = {}
         self._number: int | None = None
         self._in_use: dict[int, tuple[float, float]] = {}
@@ -196,8 +196,8 @@ class MisfitPlot(Plot):
 class SquarePlot(Plot):
     """A plot with equal units of x and y that keeps a range visible."""
 
-    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
-        super().__init__(axes, parent)
+    def __init__(self, axes: Axes) -> None:
+        super().__init__(axes)
         self._range = QRectF(0, 0, 1, 1)
         self._item.setAspectLocked(True)
 
@@ -219,11 +219,9 @@ class DotPlot(SquarePlot):
     ``names`` are the columns of the CSV file.
     """
 
-    def __init__(
-        self, axes: Axes, names: tuple[str, str], parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, axes: Axes, names: tuple[str, str]) -> None:
         self._dots: pg.ScatterPlotItem | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._names = names
         self._dots = pg.ScatterPlotItem(pxMode=True, size=4)
         self._item.addItem(self._dots)
@@ -254,9 +252,9 @@ class ArrowPlot(SquarePlot):
     the noise then. The CSV file holds them all.
     """
 
-    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+    def __init__(self, axes: Axes) -> None:
         self._shafts: pg.PlotCurveItem | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._scale = 1.0
         self._item.invertY(True)
         self._frame = QGraphicsRectItem()
@@ -313,9 +311,9 @@ class Histogram(Plot):
     ``name`` is the column of the CSV file that holds the middles of the bins.
     """
 
-    def __init__(self, axes: Axes, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, axes: Axes, name: str) -> None:
         self._bars: pg.BarGraphItem | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._name = name
         self._bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
         self._normal = pg.PlotCurveItem()

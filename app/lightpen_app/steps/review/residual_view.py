@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -32,9 +31,9 @@ NO_ARROWS = Arrows(np.zeros((0, 2)), np.zeros((0, 2)))
 class ResidualView(ImageView):
     """Shows a recorded image with markers and arrows."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         self._arrows = NO_ARROWS
-        super().__init__(parent)
+        super().__init__()
 
     def arrows(self) -> Arrows:
         """Return the arrows that are drawn."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtWidgets import QFrame, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.self_check import SelfCheck
@@ -53,8 +53,8 @@ class ReviewedResult:
 class ResultPanel(Translated, QFrame):
     """Shows an outcome."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: ReviewedResult | None = None
         self.setProperty("area", "panel")
 

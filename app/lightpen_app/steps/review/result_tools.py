@@ -34,8 +34,8 @@ class ResultTools(Translated, QWidget):
     paper_requested = Signal()  # the record on paper is to be shown
     press_requested = Signal()  # the tip is to be swung with firm pressure
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._copy = PushButton()

@@ -7,7 +7,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QFontMetricsF
-from PySide6.QtWidgets import QGraphicsEllipseItem, QWidget
+from PySide6.QtWidgets import QGraphicsEllipseItem
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -25,12 +25,10 @@ FARTHEST = 36.0  # degrees of tilt that are always shown
 class NamedPlot(Plot):
     """A plot of one or more series; several are named beside the title."""
 
-    def __init__(
-        self, axes: Axes, series: Sequence[Curve], parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, axes: Axes, series: Sequence[Curve]) -> None:
         self._columns_of_series = tuple(each.column for each in series)
         self._names = tuple(each.name for each in series)
-        super().__init__(axes, parent)
+        super().__init__(axes)
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the series."""
@@ -56,17 +54,11 @@ class BarPlot(NamedPlot):
     ``label_column`` is the column of labels in the CSV file.
     """
 
-    def __init__(
-        self,
-        axes: Axes,
-        series: Sequence[Curve],
-        label_column: str,
-        parent: QWidget | None = None,
-    ) -> None:
+    def __init__(self, axes: Axes, series: Sequence[Curve], label_column: str) -> None:
         self._bars: list[pg.BarGraphItem] = []
         self._labels: tuple[str, ...] = ()
         self._labels_on_lines: tuple[str, ...] = ()
-        super().__init__(axes, series, parent)
+        super().__init__(axes, series)
         self._label_column = label_column
         self._item.getAxis("bottom").setStyle(hideOverlappingLabels=False)
         for _ in series:
@@ -134,15 +126,9 @@ class LinePlot(NamedPlot):
     At most three; ``x_column`` is the column of x in the CSV file.
     """
 
-    def __init__(
-        self,
-        axes: Axes,
-        curves: Sequence[Curve],
-        x_column: str,
-        parent: QWidget | None = None,
-    ) -> None:
+    def __init__(self, axes: Axes, curves: Sequence[Curve], x_column: str) -> None:
         self._curves: list[pg.PlotDataItem] = []
-        super().__init__(axes, curves, parent)
+        super().__init__(axes, curves)
         self._x_column = x_column
         for _, symbol in zip(curves, SYMBOLS, strict=False):
             curve = pg.PlotDataItem(symbol=symbol, symbolSize=6)
@@ -175,9 +161,9 @@ class LinePlot(NamedPlot):
 class PosturePlot(SquarePlot):
     """Tilt of the pen in each image, seen from above with the camera below."""
 
-    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+    def __init__(self, axes: Axes) -> None:
         self._dots: pg.ScatterPlotItem | None = None
-        super().__init__(axes, parent)
+        super().__init__(axes)
         self._rings = []
         for tilt in (*np.degrees(TILT_RINGS), FARTHEST):
             ring = QGraphicsEllipseItem(-tilt, -tilt, 2 * tilt, 2 * tilt)

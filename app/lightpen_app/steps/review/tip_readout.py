@@ -35,8 +35,8 @@ class TipValue:
 class TipReadout(Translated, QWidget):
     """Shows a tip to the digit that its uncertainty warrants, a row for each axis."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: TipValue | None = None
 
         # Widgets

@@ -34,10 +34,8 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     narrow_below = 112 * GRID  # px; then it has the result in a tab
     vast_from = QSize(190 * GRID, 100 * GRID)  # px; then the result is larger
 
-    def __init__(
-        self, run: SwingRun, place: SavePlace, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, run: SwingRun, place: SavePlace) -> None:
+        super().__init__()
 
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)

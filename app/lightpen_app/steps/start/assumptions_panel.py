@@ -186,8 +186,8 @@ class AssumptionsPanel(Translated, QGroupBox):
 
     value_changed = Signal()  # the user chose other assumptions
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._words = text_label(TextSize.SMALL, Tone.QUIET)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QWidget
+from PySide6.QtWidgets import QGroupBox
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.signs import Sign
@@ -21,10 +21,8 @@ class DataFolderPanel(Translated, QGroupBox):
 
     change_requested = Signal()  # another one is to be chosen
 
-    def __init__(
-        self, folder: Path, notifications: Notifications, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, folder: Path, notifications: Notifications) -> None:
+        super().__init__()
         self._folder = folder
         self._notices = notifications
         self._n_others = 0

@@ -77,8 +77,8 @@ class DayView(Translated, QWidget):
     swing_requested = Signal()  # the plain buttons
     setup_requested = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._rows: tuple[TipRow, ...] = ()
         self._shown: tuple[TipRow, ...] = ()
         self._chosen = ("", "")

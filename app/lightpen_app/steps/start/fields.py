@@ -38,8 +38,8 @@ class ItemButton(Translated, PushButton):
     chosen = Signal(str)  # the id of an item
     library_requested = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(0, parent)
+    def __init__(self) -> None:
+        super().__init__(0)
         self._choices: tuple[ItemChoice, ...] = ()
         self._menu = QMenu(self)
         self.setMenu(self._menu)
@@ -92,8 +92,8 @@ class StationField(ChoiceField):
     value_changed = Signal(str)  # the name is finished, or chosen from the list
     entered = Signal()  # it was finished by the Enter key
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = ""
         self._edit = _NameEdit()
         self._edit.setMaxLength(LONGEST_NAME)
@@ -166,8 +166,8 @@ class PointField(Translated, QWidget):
 
     value_changed = Signal()  # the user chose another point
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._of_file: FloatArray | None = None
 
         # Widgets

@@ -56,8 +56,8 @@ class NamesForm(Translated, QWidget):
     item_chosen = Signal(object, str)
     library_requested = Signal(object)  # ItemKind: the tip library shall be shown
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets: the order of making them is the order of the Tab key
         self._place = QGroupBox()
@@ -222,8 +222,8 @@ class LimitsForm(Translated, QGroupBox):
     value_changed = Signal()  # the user chose other limits
     all_requested = Signal()  # all limits of the station shall be shown
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = SwingLimits()
 
         # Widgets

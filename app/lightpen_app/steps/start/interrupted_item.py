@@ -44,8 +44,8 @@ class InterruptedItem(Translated, QFrame):
     resume_requested = Signal()
     discard_requested = Signal()
 
-    def __init__(self, kind: RowKind, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, kind: RowKind) -> None:
+        super().__init__()
         self._kind = kind
         self._had_focus: PushButton | None = None
 

@@ -30,16 +30,13 @@ class InterruptedRow(InterruptedItem):
     """One swing without a verdict."""
 
     def __init__(
-        self,
-        swing: Record | DamagedSwing,
-        is_under_way: bool = False,
-        parent: QWidget | None = None,
+        self, swing: Record | DamagedSwing, is_under_way: bool = False
     ) -> None:
         self._swing = swing
         kind = RowKind.UNDER_WAY if is_under_way else RowKind.OFFERED
         if isinstance(swing, DamagedSwing):
             kind = RowKind.DAMAGED
-        super().__init__(kind, parent)
+        super().__init__(kind)
 
     @override
     def _words(self) -> RowWords:
@@ -73,12 +70,10 @@ class InterruptedRow(InterruptedItem):
 class VerificationRow(InterruptedItem):
     """One verification that was interrupted."""
 
-    def __init__(
-        self, found: InterruptedVerification, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, found: InterruptedVerification) -> None:
         self._found = found
         is_damaged = found.under_way is None
-        super().__init__(RowKind.DAMAGED if is_damaged else RowKind.OFFERED, parent)
+        super().__init__(RowKind.DAMAGED if is_damaged else RowKind.OFFERED)
 
     @override
     def _words(self) -> RowWords:
@@ -119,8 +114,8 @@ class InterruptedPanel(Translated, QGroupBox):
     close_requested = Signal(object)  # InterruptedVerification
     search_requested = Signal()  # they are to be looked for again
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = InterruptedSwings()
         self._verifications: tuple[InterruptedVerification, ...] = ()
         self._rows: list[InterruptedItem] = []

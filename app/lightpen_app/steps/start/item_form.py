@@ -53,8 +53,8 @@ class ItemForm(Translated, QWidget):
     # The axis is to be found by spinning the pen, or this has ended.
     spin_toggled = Signal(bool)
 
-    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
         self._folder = folder
         self._item: AnyItem = ListedTip(id="?")
 

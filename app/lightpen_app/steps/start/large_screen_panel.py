@@ -20,8 +20,8 @@ LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
 class LargeScreenPanel(QWidget):
     """Shows the trend of a tip, or an introduction without one."""
 
-    def __init__(self, logbook: LazyLogbook, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, logbook: LazyLogbook) -> None:
+        super().__init__()
         self._logbook = logbook
         self._job: Job | None = None
 

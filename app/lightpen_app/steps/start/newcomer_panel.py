@@ -59,8 +59,8 @@ class NewcomerPanel(Translated, QGroupBox):
 
     trial_requested = Signal()  # a simulated pen is to be calibrated
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._words = text_label(TextSize.BODY, Tone.QUIET)

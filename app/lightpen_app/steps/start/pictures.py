@@ -26,8 +26,8 @@ translate = QCoreApplication.translate
 class Pictures(Translated, QWidget):
     """Shows item, method and steps."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._heading = text_label(TextSize.TITLE)

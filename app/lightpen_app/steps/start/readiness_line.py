@@ -5,7 +5,7 @@ from functools import partial
 
 from PySide6.QtCore import QEvent, Signal
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QBoxLayout, QFrame, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame
 from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
@@ -21,8 +21,8 @@ class ReadinessLine(QFrame):
 
     step_requested = Signal(str)  # where an item is put right
 
-    def __init__(self, n_items: int, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, n_items: int) -> None:
+        super().__init__()
         self.setProperty("area", "panel")
         self._items: tuple[ReadinessItem, ...] = ()
 

@@ -59,10 +59,8 @@ class LastResultPanel(Translated, QGroupBox):
     take_back_requested = Signal(object, str, object)
     verification_requested = Signal()  # the tip that is shown shall be verified
 
-    def __init__(
-        self, now: Callable[[], datetime], parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, now: Callable[[], datetime]) -> None:
+        super().__init__()
         self._now = now
         self._value = LastResult()
         self._rule = DueRule()

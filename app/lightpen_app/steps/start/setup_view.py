@@ -21,15 +21,8 @@ class SetupView(Translated, QWidget):
 
     done = Signal()  # the day page shall be shown
 
-    def __init__(
-        self,
-        workbench: Workbench,
-        sounds: Sounds,
-        *,
-        is_known: bool,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench, sounds: Sounds, *, is_known: bool) -> None:
+        super().__init__()
         self._is_known = is_known
 
         # Widgets: the order of making them is the order of the Tab key

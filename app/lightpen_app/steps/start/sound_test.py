@@ -18,10 +18,8 @@ STEP_MS = 1000  # from one sound to the next; none is longer
 class SoundTest(Translated, QWidget):
     """Plays the sounds one after the other, or reports why audio is unavailable."""
 
-    def __init__(
-        self, sounds: Sounds, step_ms: int = STEP_MS, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, sounds: Sounds, step_ms: int = STEP_MS) -> None:
+        super().__init__()
         self._sounds = sounds
         self._waiting: list[Sound] = []
         self._is_silent = False  # as last reported

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QSize, Qt
 from PySide6.QtGui import QImage, QImageReader, QPixmap
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel
 
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
@@ -18,8 +18,8 @@ class TipPicture(Translated, QLabel):
     ``place`` is where it is shown as large as it can be, px.
     """
 
-    def __init__(self, place: QSize, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, place: QSize) -> None:
+        super().__init__()
         self._job: Job | None = None
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setWordWrap(True)

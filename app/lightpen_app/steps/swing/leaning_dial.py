@@ -14,7 +14,6 @@ from PySide6.QtGui import (
     QPen,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.model.posture import Posture
@@ -41,8 +40,8 @@ class LeaningDial(PostureDial):
 
     leaned = Signal(object)  # Posture: the user wants the pen held so
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._is_interactive = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._wish: Posture | None = None  # what the user wanted last

@@ -22,8 +22,8 @@ LEAST_HEIGHT = 10 * GRID
 class SwingPlots(Translated, QWidget):
     """Misfit and tip of each image, the estimate of the tip, and its uncertainty."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._shown: dict[TracePlot, SwingState] = {}
         self._limit: float | None = None  # of U, µm
 

@@ -89,8 +89,8 @@ POSTURES = TaskPicture(_dial, posture_value)
 class FiguresView(Translated, QWidget):
     """A table of figures below its title, and sentences below it."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value: ResultTable | None = None
 
         # Widgets
@@ -137,8 +137,8 @@ class TaskFinding(ResponsiveLayout, QWidget):
     narrow_below = 116 * GRID  # px; then one table is below the other
     large_from = QSize(160 * GRID, 80 * GRID)  # px; then all is larger
 
-    def __init__(self, task: AnyTask, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, task: AnyTask) -> None:
+        super().__init__()
         self._task = task
         if task is PART:
             self.narrow_below = 125 * GRID

@@ -19,8 +19,8 @@ class ImagesRow(Translated, QWidget):
     read_requested = Signal(str, bool)
     cancel_requested = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
 
         # Widgets
         self._place = PathField()

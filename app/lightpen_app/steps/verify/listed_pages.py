@@ -51,8 +51,8 @@ class ListedPages(ResponsiveLayout, QWidget):
 
     narrow_below = 119 * GRID  # px; then the titles are in a field above the page
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._room = NO_ROOM
 
         # Widgets

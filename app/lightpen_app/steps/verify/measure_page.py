@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade
@@ -94,12 +93,10 @@ class MeasurePage(ProbingPage):
     key = "measure"
     narrow_below = 1000 * GRID  # px: the tables need the room of the live image
 
-    def __init__(
-        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
         run = workbench.measuring
         presenter = MeasurePresenter(workbench, run)
-        super().__init__(workbench, sounds, run, presenter, parent)
+        super().__init__(workbench, sounds, run, presenter)
 
         # Widgets
         self._plan = PlanPanel(workbench)

@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.sounds import Sounds
@@ -21,12 +20,10 @@ class VerifyPage(ProbingPage):
 
     key = "verify"
 
-    def __init__(
-        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
         run = workbench.verification
         presenter = VerifyPresenter(workbench, run)
-        super().__init__(workbench, sounds, run, presenter, parent)
+        super().__init__(workbench, sounds, run, presenter)
 
         # Widgets
         self._pen: LazyWidget[PenPanel] = LazyWidget(self._make_pen_panel)

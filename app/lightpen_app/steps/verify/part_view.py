@@ -81,8 +81,8 @@ def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartV
 class PartView(Translated, QWidget):
     """Draws a part in space; the mouse turns it."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = NOTHING
         self._turn = rotation_from_vector(FROM_ABOVE)
         self._pressed: QPointF | None = None

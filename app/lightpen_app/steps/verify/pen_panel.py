@@ -46,8 +46,8 @@ PPM = 1e6
 class PenPanel(Translated, QWidget):
     """Shows the pen that is chosen over its swings, and makes a better LED file."""
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
         self._selection, self._run = workbench.selection, workbench.run
         self._verification = workbench.verification
         self._folder, self._clock = workbench.folder, workbench.around.now

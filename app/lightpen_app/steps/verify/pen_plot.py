@@ -2,7 +2,6 @@
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -15,10 +14,10 @@ DOT = 6  # px
 class LedMovesPlot(Plot):
     """A line for each LED; a displaced one stands out."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         self._lines: list[pg.PlotDataItem] = []
         self._moved: tuple[int, ...] = ()
-        super().__init__(Axes(""), parent)
+        super().__init__(Axes(""))
 
     def set_data(self, moves: FloatArray, moved: tuple[int, ...]) -> None:
         """Show the shifts of LEDs (N, L) at each swing, mm, NaN where not seen.

@@ -42,8 +42,8 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
     narrow_below = 119 * GRID  # px; then all is in two rows
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
         self._workbench, self._run = workbench, workbench.measuring
         self._selection, self._live = workbench.selection, workbench.live
         self._notices = workbench.notifications

@@ -45,10 +45,8 @@ class VerifyPresenter(QObject):
 
     tasks: tuple[AnyTask, ...] = TASKS
 
-    def __init__(
-        self, workbench: Workbench, run: VerificationRun, parent: QObject | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench, run: VerificationRun) -> None:
+        super().__init__()
         self._selection, self._tips = workbench.selection, workbench.library
         self._verification, self._live = run, workbench.live
 

@@ -53,9 +53,8 @@ class ProbingPage(ResponsiveLayout, Page):
         sounds: Sounds,
         run: VerificationRun,
         presenter: VerifyPresenter,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._workbench, self._sounds = workbench, sounds
         self._selection, self._tips = workbench.selection, workbench.library
         self._run, self._live = run, workbench.live

@@ -52,10 +52,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
 
     narrow_below = 100 * GRID  # px; then the instruction stands above
 
-    def __init__(
-        self, workbench: Workbench, run: VerificationRun, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, workbench: Workbench, run: VerificationRun) -> None:
+        super().__init__()
         self._workbench, self._run = workbench, run
         self._runner = self._run.runner
         self._room = NO_ROOM

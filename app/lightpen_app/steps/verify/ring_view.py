@@ -44,8 +44,8 @@ class RingValue:
 class RingView(Translated, QWidget):
     """Draws probed points on a ring and the covered angle."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._value = RingValue()
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from PySide6.QtWidgets import QToolButton, QWidget
+from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
 from lightpen.simulator.hand import Operator
@@ -20,10 +20,8 @@ from lightpen_app.work.live_view import LiveView
 class ProbingSimulatorControls(SimulatorControls):
     """Lets the simulated operator touch, or lift the pen; hidden with a real pen."""
 
-    def __init__(
-        self, live: LiveView, tasks: Collection[AnyTask], parent: QWidget | None = None
-    ) -> None:
-        super().__init__(live, parent)
+    def __init__(self, live: LiveView, tasks: Collection[AnyTask]) -> None:
+        super().__init__(live)
         self._has_ring = CIRCLE in tasks
         self.setProperty("area", "panel")
 

@@ -78,10 +78,8 @@ class TaskForm(Translated, QWidget):
 
     value_changed = Signal()  # the user chose otherwise
 
-    def __init__(
-        self, task: AnyTask, *beside: QWidget, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, task: AnyTask, *beside: QWidget) -> None:
+        super().__init__()
         self._task = task
         self._value = VerificationChoices()
 

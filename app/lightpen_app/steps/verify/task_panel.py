@@ -25,10 +25,8 @@ class TaskPanel(Translated, QWidget):
 
     value_changed = Signal(object)  # VerificationChoices: the user chose otherwise
 
-    def __init__(
-        self, task: AnyTask, runner: VerificationRunner, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, task: AnyTask, runner: VerificationRunner) -> None:
+        super().__init__()
         self._task, self._runner = task, runner
 
         # Widgets
