@@ -221,7 +221,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             words = self.tr("Computing: {0:.0%}").format(state.progress)
             return StatusMessage(words, Sign.WAIT, Tone.QUIET)
         if state.fault:
-            return StatusMessage(state.fault, Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(state.fault)
         limit = self._workbench.selection.preparation.limits.max_uncertainty
         if state.found is not None and state.is_final:
             U = float(state.found.expanded_uncertainty.max())
@@ -230,12 +230,11 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
                     "U of the tip is {0:.3f} mm; the limit is {1:g} mm. Swing again "
                     "with more images and tilt, or measure the length better."
                 )
-                words = words.format(U, limit)
-                return StatusMessage(words, Sign.WARNING, Tone.WARN)
+                return StatusMessage.warning(words.format(U, limit))
             words = self.tr(
                 "Pen and camera found. The image shows the projection uncertainty / px."
             )
-            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+            return StatusMessage.good(words)
         if not state.is_capturing and state.found is not None:
             words = self.tr("Enter the distance between the two marked LEDs.")
             if self._length.value():

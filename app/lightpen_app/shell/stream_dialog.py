@@ -8,7 +8,6 @@ from typing_extensions import override
 
 from lightpen.streaming.server import LAST_PORT, LOOPBACK, StreamPlace, StreamStatus
 from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
@@ -105,14 +104,14 @@ class StreamDialog(FittedWindow, Translated, QDialog):
                 "Every computer in this network can receive the data without "
                 "signing in. A firewall may ask for permission."
             )
-            reach = StatusMessage(text, Sign.WARNING, Tone.WARN)
+            reach = StatusMessage.warning(text)
         self._reach.set_value(reach)
         self._state_label.set_value(self._state_message() if is_on else StatusMessage())
 
     def _state_message(self) -> StatusMessage:
         state = self._state
         if state.fault:
-            return StatusMessage(state.fault, Sign.CROSS, Tone.BAD)
+            return StatusMessage.fault(state.fault)
         if state.status.place is None:
             return StatusMessage()
         text = self.tr("Active at {0}. Clients: {1}").format(
@@ -120,7 +119,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         )
         if not state.has_tip:
             text += " " + self.tr("Only the pose is sent; there is no current tip.")
-        return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+        return StatusMessage.good(text)
 
     def _on_toggled(self, is_on: bool) -> None:
         self._refresh()

@@ -1,6 +1,7 @@
 """A symbol with its text."""
 
 from dataclasses import dataclass
+from typing import Self
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
@@ -29,6 +30,21 @@ class StatusMessage:
     text: str = ""  # empty for nothing to remark
     sign: Sign = Sign.NONE
     tone: Tone = Tone.PLAIN
+
+    @classmethod
+    def good(cls, text: str) -> Self:
+        """Return a message on what is as it should be."""
+        return cls(text, Sign.CHECK, Tone.GOOD)
+
+    @classmethod
+    def warning(cls, text: str) -> Self:
+        """Return a message on what needs attention."""
+        return cls(text, Sign.WARNING, Tone.WARN)
+
+    @classmethod
+    def fault(cls, text: str) -> Self:
+        """Return a message on what failed."""
+        return cls(text, Sign.CROSS, Tone.BAD)
 
 
 class SignLabel(QWidget):

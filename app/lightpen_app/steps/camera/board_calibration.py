@@ -112,7 +112,7 @@ class BoardCalibration(QObject):
 
     def _printed_message(self, path: Path) -> StatusMessage:
         words = self.tr("Saved: {0}. Print it at 100 % and mount it on a flat plate.")
-        return StatusMessage(words.format(path), Sign.CHECK, Tone.GOOD)
+        return StatusMessage.good(words.format(path))
 
     def conclude(self) -> None:
         """Discard the result, and report the outcome of the attempt."""
@@ -144,7 +144,7 @@ class BoardCalibration(QObject):
 
     def _on_refused(self, sentence: str) -> None:
         self._job = None
-        self.set_remark(partial(StatusMessage, sentence, Sign.CROSS, Tone.BAD))
+        self.set_remark(partial(StatusMessage.fault, sentence))
 
     def _on_found(self, computed: ComputedCamera) -> None:
         self._job, self._computed, self._is_saved = None, computed, False
@@ -153,8 +153,9 @@ class BoardCalibration(QObject):
 
     def _found_message(self, found: CameraCalibration) -> StatusMessage:
         words = " ".join(map(worded, found.remarks))
-        sign, tone = (Sign.WARNING, Tone.WARN) if words else (Sign.CHECK, Tone.GOOD)
-        return StatusMessage(words or self.tr("Camera calibrated."), sign, tone)
+        if words:
+            return StatusMessage.warning(words)
+        return StatusMessage.good(self.tr("Camera calibrated."))
 
     def _on_saved(self, trial: CameraTrial, file: InputFile) -> None:
         self.set_remark(partial(self._saved_message, file))
@@ -162,11 +163,10 @@ class BoardCalibration(QObject):
         self.saved.emit(str(file.path))
 
     def _saved_message(self, file: InputFile) -> StatusMessage:
-        words = self.tr("Saved and in use: {0}").format(file.path)
-        return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+        return StatusMessage.good(self.tr("Saved and in use: {0}").format(file.path))
 
     def _on_save_refused(self, trial: CameraTrial, sentence: str) -> None:
-        self.set_remark(partial(StatusMessage, sentence, Sign.CROSS, Tone.BAD))
+        self.set_remark(partial(StatusMessage.fault, sentence))
         if trial.found is self.found:
             self._is_saved = False
         else:  # it was left meanwhile

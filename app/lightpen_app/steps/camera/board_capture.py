@@ -206,4 +206,4 @@ def sight_message(state: CaptureState) -> StatusMessage | None:
 
 def fault_message(message: Message) -> StatusMessage:
     """Return a message marked as a fault."""
-    return StatusMessage(worded(message), Sign.CROSS, Tone.BAD)
+    return StatusMessage.fault(worded(message))

@@ -73,4 +73,4 @@ class BoardProgress(Translated, QWidget):
             self._verdict.set_value(StatusMessage(text, Sign.RING, Tone.PLAIN))
         else:
             text = self.tr("Good: the views vary enough.")
-            self._verdict.set_value(StatusMessage(text, Sign.CHECK, Tone.GOOD))
+            self._verdict.set_value(StatusMessage.good(text))

@@ -116,7 +116,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
     def set_problem(self, sentence: str) -> None:
         """Show why the selected file is not used; empty if it is."""
         self._path.set_faulty(bool(sentence))
-        self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
+        self._problem.set_value(StatusMessage.fault(sentence))
         self._refresh()
 
     def _on_open_clicked(self) -> None:
@@ -166,10 +166,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
     def _checked(self, camera: Camera | None) -> StatusMessage:
         """Return whether the file matches the live images."""
         if camera is None:
-            return StatusMessage(
-                self.tr("Open the intrinsics file of this camera and lens."),
-                Sign.WARNING,
-                Tone.WARN,
+            return StatusMessage.warning(
+                self.tr("Open the intrinsics file of this camera and lens.")
             )
         made_for = self._size_text(*camera.image_size)
         if self._image_size is None:
@@ -177,7 +175,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             return StatusMessage(words.format(made_for), Sign.WAIT, Tone.QUIET)
         if self._image_size == camera.image_size:
             words = self.tr("Matches the live images: {0}")
-            return StatusMessage(words.format(made_for), Sign.CHECK, Tone.GOOD)
+            return StatusMessage.good(words.format(made_for))
         words = self.tr(
             "Image size is {0}; the intrinsics file is for {1}. Choose the file of "
             "this camera, set the region to the whole sensor, or turn off binning."
@@ -190,8 +188,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         if camera is None:
             return StatusMessage()
         doubts = unmodelled_effects_of(camera, local_now().date(), serial=self._serial)
-        words = " ".join(map(worded, doubts))
-        return StatusMessage(words, Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(" ".join(map(worded, doubts)))
 
     def _checked_by_pen(self, camera: Camera | None) -> StatusMessage:
         """Return whether the swing still agrees with the file that it was taken by."""
@@ -202,9 +199,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
             return StatusMessage()
         for denied in self._swing.calibration.contradictions:
             if not denied.of_pen:
-                return StatusMessage(worded(denied.message), Sign.WARNING, Tone.WARN)
-        words = self.tr("Checked by a swing: file and camera agree.")
-        return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+                return StatusMessage.warning(worded(denied.message))
+        return StatusMessage.good(self.tr("Checked by a swing: file and camera agree."))
 
     def _fact_texts(self, camera: Camera) -> list[str]:
         """Return the content of the file, one text for each name."""

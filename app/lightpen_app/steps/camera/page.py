@@ -8,9 +8,7 @@ from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing, missing_input_text
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sound, Sounds
-from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.exposure_control import ExposureControl
 from lightpen_app.steps.camera.intrinsics_control import IntrinsicsControl
 from lightpen_app.steps.camera.mask_control import MaskControl
@@ -229,6 +227,6 @@ class CameraPage(Page):
                 "A swing is in progress. Changing the source ends it; a change of "
                 "intrinsics or mask applies from the next swing."
             )
-            remark = StatusMessage(words, Sign.WARNING, Tone.WARN)
+            remark = StatusMessage.warning(words)
         self._view.swing_message.set_value(remark)
         self._view.intrinsics.set_swing(status.solution)

@@ -9,8 +9,6 @@ from lightpen.messages import Message
 from lightpen.model.rig import Rig
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
@@ -89,7 +87,7 @@ class RigPanel(Translated, QGroupBox):
     def set_problem(self, why: str) -> None:
         """Show why the selected file is not used; empty if it is."""
         self._path.set_faulty(bool(why))
-        self._problem.set_value(StatusMessage(why, Sign.CROSS, Tone.BAD))
+        self._problem.set_value(StatusMessage.fault(why))
         self._refresh()
 
     def set_step(self, late: Message | None, n_unpaired: int | None) -> None:
@@ -136,7 +134,7 @@ class RigPanel(Translated, QGroupBox):
                 'board images with "lightpen extrinsics LEFT RIGHT --board BOARD '
                 '--out rig.json".'
             )
-            return StatusMessage(words, Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(words)
         rig = self._file.rig
         words = self.tr("Baseline {2} ({0}-{1})").format(
             rig.names[0], rig.names[1], _baseline(rig)
@@ -145,20 +143,20 @@ class RigPanel(Translated, QGroupBox):
             words = self.tr("{0} remains in use: {1}").format(
                 self._file.path.name, words
             )
-        return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+        return StatusMessage.good(words)
 
     def _refresh_step(self) -> None:
         remark = StatusMessage()
         if self._second.isChecked() and self._n_unpaired is not None:
             if self._late is not None:
-                remark = StatusMessage(worded(self._late), Sign.WARNING, Tone.WARN)
+                remark = StatusMessage.warning(worded(self._late))
             else:
                 words = self.tr("The cameras are synchronised.")
-                remark = StatusMessage(words, Sign.CHECK, Tone.GOOD)
+                remark = StatusMessage.good(words)
             if self._n_unpaired:
                 words = self.tr("{0} Unpaired images: {1}.")
                 text = words.format(remark.text, self._n_unpaired)
-                remark = StatusMessage(text, Sign.WARNING, Tone.WARN)
+                remark = StatusMessage.warning(text)
         self._step.set_value(remark)
 
 

@@ -13,7 +13,6 @@ from lightpen.cameras.protocol import (
     TriggerMode,
 )
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, on_one_line
 from lightpen_app.steps.camera.setting_field import SettingField
@@ -201,7 +200,7 @@ class SettingsPanel(Translated, QGroupBox):
             "Colour images are converted to grey, which reduces accuracy. Use a "
             "grey format such as Mono8, or better a monochrome camera."
         )
-        return StatusMessage(words, Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(words)
 
     def _retranslate_counts(self) -> None:
         stats = self._stats

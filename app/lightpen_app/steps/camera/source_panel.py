@@ -145,7 +145,7 @@ class SourcePanel(Translated, QGroupBox):
 
     def set_search_problem(self, why: str) -> None:
         """Show why cameras cannot be searched."""
-        self._outcome = partial(StatusMessage, why, Sign.CROSS, Tone.BAD)
+        self._outcome = partial(StatusMessage.fault, why)
         self._refresh()
 
     def set_beside(self, files: FilesBeside) -> None:
@@ -242,7 +242,7 @@ class SourcePanel(Translated, QGroupBox):
         if not self._has_device:
             return StatusMessage()
         if absent is not None:
-            return StatusMessage(worded(absent), Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(worded(absent))
         if self._is_searching:
             words = self.tr("Searching for cameras")
             return StatusMessage(words, Sign.WAIT, Tone.ACTIVE)
@@ -250,13 +250,12 @@ class SourcePanel(Translated, QGroupBox):
 
     def _found_message(self, n_found: int) -> StatusMessage:
         if n_found:
-            words = self.tr("Cameras found: {0}").format(n_found)
-            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+            return StatusMessage.good(self.tr("Cameras found: {0}").format(n_found))
         words = self.tr(
             "No camera found. Check power and cable, or enter its serial number or "
             "address."
         )
-        return StatusMessage(words, Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(words)
 
     def _refresh_beside(self) -> None:
         files = [f for f in (self._beside.camera, self._beside.pen) if f is not None]

@@ -185,7 +185,7 @@ class StrayLightPanel(Translated, QGroupBox):
             if not self._n_masked:
                 return StatusMessage()
             words = self.tr("Masked areas: {0}").format(self._n_masked)
-            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+            return StatusMessage.good(words)
         if not search.is_over:
             words = self.tr("Searching: image {0} of {1}")
             n_images = len(search.images)
@@ -197,16 +197,15 @@ class StrayLightPanel(Translated, QGroupBox):
                 "The pen is still visible; nothing was masked. Cover all LEDs, then "
                 "search again."
             )
-            return StatusMessage(words, Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(words)
         if not n_found and not search.is_dark:
             words = self.tr(
                 "The bright spots move and are not stray light. Cover the pen, then "
                 "search again."
             )
-            return StatusMessage(words, Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(words)
         if not n_found:
-            words = self.tr("No stray light found.")
-            return StatusMessage(words, Sign.CHECK, Tone.GOOD)
+            return StatusMessage.good(self.tr("No stray light found."))
         if self._knows_pen:
             words = self.tr("Stray spots: {0}. Mask them or remove their source.")
         else:
@@ -214,4 +213,4 @@ class StrayLightPanel(Translated, QGroupBox):
                 "Bright spots: {0}. Is the pen covered? Without its LED file, LEDs "
                 "cannot be distinguished from stray light."
             )
-        return StatusMessage(words.format(n_found), Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(words.format(n_found))

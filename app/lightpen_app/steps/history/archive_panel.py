@@ -156,25 +156,20 @@ class ArchivePanel(Translated, QWidget):
                 "Entries not yet on the server; they are stored here and delivered "
                 "when it responds. {0}"
             )
-            return StatusMessage(text.format(worded(fault)), Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(text.format(worded(fault)))
         if n_waiting == 0:
-            return StatusMessage(
-                self.tr("The server has all entries."), Sign.CHECK, Tone.GOOD
-            )
+            return StatusMessage.good(self.tr("The server has all entries."))
         return StatusMessage(self.tr("Delivering entries to the server"))
 
     def _show_outcome(self) -> None:
         checked = self._checked
         findings = () if checked is None else checked.findings
         notes = () if checked is None else checked.notes
-        messages = [
-            StatusMessage(worded(each), Sign.CROSS, Tone.BAD)
-            for each in findings[:MOST_SHOWN]
-        ]
+        messages = [StatusMessage.fault(worded(each)) for each in findings[:MOST_SHOWN]]
         if len(findings) > MOST_SHOWN:
             n_more = len(findings) - MOST_SHOWN
             text = self.tr("{0} more findings").format(n_more)
-            messages.append(StatusMessage(text, Sign.CROSS, Tone.BAD))
+            messages.append(StatusMessage.fault(text))
         messages += [
             StatusMessage(worded(each), Sign.WARNING, Tone.QUIET)
             for each in notes[:MOST_SHOWN]
@@ -193,6 +188,6 @@ class ArchivePanel(Translated, QWidget):
         counts = (checked.n_entries, checked.n_files)
         if checked.findings:
             text = self.tr("Changes detected. {0} entries and {1} files checked.")
-            return StatusMessage(text.format(*counts), Sign.WARNING, Tone.WARN)
+            return StatusMessage.warning(text.format(*counts))
         text = self.tr("No changes in {0} entries and {1} files")
-        return StatusMessage(text.format(*counts), Sign.CHECK, Tone.GOOD)
+        return StatusMessage.good(text.format(*counts))

@@ -9,8 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.verification.tasks.repeatability import CAPABLE, STUDY, Capability
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, number_text
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -104,10 +103,8 @@ class CapabilityRow(Translated, QWidget):
         if n_tips < STUDY:
             text = self.tr("A study needs {0} to 50 repeats; {1} are available.")
             words.append(text.format(STUDY, n_tips))
-        mark = (
-            (Sign.CHECK, Tone.GOOD) if found.is_capable else (Sign.WARNING, Tone.WARN)
-        )
-        self._message.set_value(StatusMessage(" ".join(words), *mark))
+        marked = StatusMessage.good if found.is_capable else StatusMessage.warning
+        self._message.set_value(marked(" ".join(words)))
 
     def _of_each(self, name: str, values: FloatArray) -> str:
         each = zip(AXES, values.tolist(), strict=True)

@@ -250,10 +250,10 @@ class HistoryContent(Translated, QWidget):
             new.camera_path.name,
             *(number_text(x, 4) for x in (improved.sigma_after, improved.sigma_before)),
         )
-        self._selection.set_adjusted(StatusMessage(words, Sign.CHECK, Tone.GOOD))
+        self._selection.set_adjusted(StatusMessage.good(words))
 
     def _on_not_adjusted(self, why: str) -> None:
-        self._selection.set_adjusted(StatusMessage(why, Sign.CROSS, Tone.BAD))
+        self._selection.set_adjusted(StatusMessage.fault(why))
 
     # What is entered
 

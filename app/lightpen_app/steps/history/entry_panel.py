@@ -17,7 +17,6 @@ from lightpen.record.library.supervision import Signature
 from lightpen.verification.history.trend import VERIFIED
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text
 from lightpen_app.steps.history.texts import (
@@ -164,7 +163,7 @@ class EntryPanel(Translated, QWidget):
                 "Entry {0} was modified after it was entered and is not reliable. "
                 "Restore the archive from a copy."
             ).format(line.number)
-            self._changed.set_value(StatusMessage(text, Sign.CROSS, Tone.BAD))
+            self._changed.set_value(StatusMessage.fault(text))
         for label, text in zip(self._texts, self._label_texts(line), strict=True):
             label.setText(breakable(text))
             label.setVisible(bool(text))

@@ -180,13 +180,13 @@ class SelectionPanel(Translated, QWidget):
         self._compared.set_value(Figures(columns, AXES, cells))
         if not found.is_same_tip:
             text = self.tr("The entries belong to different pens or tips.")
-            self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
+            self._change.set_value(StatusMessage.warning(text))
         elif found.change.is_unexplained:
             text = worded(found.change.remark(dates[0].partition(" ")[0]))
-            self._change.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
+            self._change.set_value(StatusMessage.warning(text))
         else:
             text = self.tr("The change is within the combined uncertainty.")
-            self._change.set_value(StatusMessage(text, Sign.CHECK, Tone.GOOD))
+            self._change.set_value(StatusMessage.good(text))
 
     def _show_repeatability(self, found: Repeatability | None) -> None:
         self._scattered.setVisible(found is not None)

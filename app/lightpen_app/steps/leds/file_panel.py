@@ -9,8 +9,7 @@ from PySide6.QtWidgets import QBoxLayout, QFileDialog, QLabel, QWidget
 
 from lightpen.formats.pen_content import UNITS
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.focus import give_focus
@@ -110,7 +109,7 @@ class LedFilePanel(Translated, QWidget):
     def set_problem(self, sentence: str) -> None:
         """Set or clear the message."""
         self._path.set_faulty(bool(sentence))
-        self._problem.set_value(StatusMessage(sentence, Sign.CROSS, Tone.BAD))
+        self._problem.set_value(StatusMessage.fault(sentence))
 
     def set_exchange(self, pair: tuple[int, int] | None) -> None:
         """Offer to swap two LEDs, by number; None hides the offer."""
@@ -272,6 +271,5 @@ class _UnitsRow(Translated, QWidget):
 
     def _retranslate(self) -> None:
         words = self.tr("{0} does not state the unit of its coordinates. Choose it:")
-        text = words.format(self._file_name)
-        self._words.set_value(StatusMessage(text, Sign.WARNING, Tone.WARN))
+        self._words.set_value(StatusMessage.warning(words.format(self._file_name)))
         self._choice.setAccessibleName(self.tr("Unit of the file"))

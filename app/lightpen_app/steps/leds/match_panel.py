@@ -264,12 +264,12 @@ class MatchPanel(Translated, QGroupBox):
     def _found(self) -> list[StatusMessage]:
         match = self._match
         if self._why_none:
-            return [StatusMessage(self._why_none, Sign.WARNING, Tone.WARN)]
+            return [StatusMessage.warning(self._why_none)]
         if match is None:
             return []
         if match.findings:
             remarks = [
-                StatusMessage(self._words(each, match), Sign.WARNING, Tone.WARN)
+                StatusMessage.warning(self._words(each, match))
                 for each in match.findings[:N_FINDINGS]
             ]
         elif not match.fits:
@@ -280,13 +280,13 @@ class MatchPanel(Translated, QGroupBox):
                 "The LEDs agree with the images but not with the pen frame. See the "
                 "message about the file."
             )
-            remarks = [StatusMessage(words, Sign.WARNING, Tone.WARN)]
+            remarks = [StatusMessage.warning(words)]
         else:
             words = self.tr(
                 "All LEDs are within {0} mm of their table positions, in {1} views."
             )
             text = words.format(f"{MIN_SHIFT:g}", match.n_views)
-            remarks = [StatusMessage(text, Sign.CHECK, Tone.GOOD)]
+            remarks = [StatusMessage.good(text)]
         return remarks
 
     def _mendable(self) -> list[Finding | None]:

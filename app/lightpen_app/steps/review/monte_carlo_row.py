@@ -13,7 +13,7 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -161,7 +161,7 @@ class MonteCarloRow(Translated, QWidget):
 
     def _message(self) -> StatusMessage:
         if self._fault:
-            return StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
+            return StatusMessage.fault(self._fault)
         if self._found is None:
             why_not = self._why_not()
             return StatusMessage(why_not, Sign.RING if why_not else Sign.NONE)

@@ -144,7 +144,7 @@ class ResultPanel(Translated, QFrame):
         text = self.tr("{0} of {1} images included").format(int(used.sum()), len(used))
         whole = bool(used.all())
         self._images.set_value(
-            StatusMessage(text, Sign.CHECK, Tone.GOOD)
+            StatusMessage.good(text)
             if whole
             else StatusMessage(text, Sign.RING, Tone.PLAIN)
         )
@@ -168,11 +168,7 @@ class ResultPanel(Translated, QFrame):
             "As found: {0} mm from the previous calibration, limit {1} mm"
         ).format(off, f"{limit:g}")
         is_within = change.distance <= limit
-        return (
-            StatusMessage(text, Sign.CHECK, Tone.GOOD)
-            if is_within
-            else StatusMessage(text, Sign.WARNING, Tone.WARN)
-        )
+        return StatusMessage.good(text) if is_within else StatusMessage.warning(text)
 
     def _halves_message(self, solution: Solution) -> StatusMessage:
         halves = solution.calibration.halves
@@ -185,8 +181,7 @@ class ResultPanel(Translated, QFrame):
         )
         parts = map("\xa0".join, zip(AXES, figures, strict=True))
         text = text.format(", ".join(parts) + "\xa0\xb5m")
-        sign, tone = (Sign.CHECK, Tone.GOOD) if agree else (Sign.WARNING, Tone.WARN)
-        return StatusMessage(text, sign, tone)
+        return StatusMessage.good(text) if agree else StatusMessage.warning(text)
 
     def _self_check_message(self, check: SelfCheck | None) -> StatusMessage:
         """Return the cross-validation of the LEDs: each predicted by the others."""
@@ -195,8 +190,8 @@ class ResultPanel(Translated, QFrame):
         text = self.tr("Self-check of the LEDs: {0}, limit {1}")
         text = text.format(f"{check.value:.2f}", f"{check.limit:.2f}")
         if check.is_passed:
-            return StatusMessage(text, Sign.CHECK, Tone.GOOD)
-        return StatusMessage(text, Sign.WARNING, Tone.WARN)
+            return StatusMessage.good(text)
+        return StatusMessage.warning(text)
 
 
 def _tip_value(outcome: ReviewedResult) -> TipValue:

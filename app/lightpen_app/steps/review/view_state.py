@@ -222,7 +222,7 @@ def remarks(status: SwingStatus, named: Names) -> tuple[StatusMessage, ...]:
     else:
         return ()
     texts = (_other_names(status.names, named), *map(worded, doubts))
-    return tuple(StatusMessage(text, Sign.WARNING, Tone.WARN) for text in texts if text)
+    return tuple(StatusMessage.warning(text) for text in texts if text)
 
 
 def next_step_text(status: SwingStatus) -> str:

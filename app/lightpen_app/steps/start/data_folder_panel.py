@@ -6,7 +6,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGroupBox
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.look.words import breakable
 from lightpen_app.widgets.opened_folder import open_folder
@@ -73,7 +72,7 @@ class DataFolderPanel(Translated, QGroupBox):
         )
         self._change.setProperty("inviting", bool(self._fault))
         self._change.style().polish(self._change)
-        doubt = StatusMessage(breakable(self._fault), Sign.CROSS, Tone.BAD)
+        doubt = StatusMessage.fault(breakable(self._fault))
         self._doubt.set_value(doubt if self._fault else StatusMessage())
         remark = StatusMessage()
         if self._n_others:
@@ -81,5 +80,5 @@ class DataFolderPanel(Translated, QGroupBox):
                 "The program is open in other windows using the same data folder "
                 "({0}). Results are shared."
             ).format(self._n_others)
-            remark = StatusMessage(text, Sign.WARNING, Tone.WARN)
+            remark = StatusMessage.warning(text)
         self._others.set_value(remark)

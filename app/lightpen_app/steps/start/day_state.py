@@ -196,8 +196,7 @@ def _age_text(calibrated: datetime, today: date) -> str:
 
 
 def _amber(*sentences: str) -> StatusMessage:
-    text = next(filter(None, sentences))
-    return StatusMessage(text, Sign.WARNING, Tone.WARN)
+    return StatusMessage.warning(next(filter(None, sentences)))
 
 
 def _first_of(missing: Iterable[MissingInput]) -> str:
@@ -213,7 +212,7 @@ def _camera_message(now: Preparation, camera: CameraState) -> StatusMessage:
     text = translate("DayPage", "Camera")
     if camera.rate is not None:
         text = translate("DayPage", "Camera {0:.0f} fps").format(camera.rate)
-    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+    return StatusMessage.good(text)
 
 
 def _leds_message(
@@ -230,7 +229,7 @@ def _leds_message(
     if statuses.of_item(ItemKind.PEN, pen) is TipStatus.OVERDUE:
         return _amber(translate("DayPage", "Pen {0} is overdue.").format(pen))
     text = translate("DayPage", "LEDs of pen {0}").format(shortened(pen))
-    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+    return StatusMessage.good(text)
 
 
 def _temperature_message(now: Preparation) -> StatusMessage:
@@ -242,7 +241,7 @@ def _temperature_message(now: Preparation) -> StatusMessage:
         text = translate("DayPage", "No temperature")
         return StatusMessage(text, Sign.RING, Tone.QUIET)
     text = translate("DayPage", "Pen at {0:.1f} \u00b0C").format(measured)
-    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+    return StatusMessage.good(text)
 
 
 def _reference_message(status: VerificationStatus) -> StatusMessage:
@@ -253,5 +252,4 @@ def _reference_message(status: VerificationStatus) -> StatusMessage:
     grade = drift.assessment.grade
     if grade is not Grade.PASS:
         return _amber(translate("DayPage", "The camera moved. Verify the tip."))
-    text = translate("DayPage", "Drift reference stable")
-    return StatusMessage(text, Sign.CHECK, Tone.GOOD)
+    return StatusMessage.good(translate("DayPage", "Drift reference stable"))

@@ -27,8 +27,7 @@ from lightpen.record.library.tip_library import (
     ListedTip,
 )
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.theme import GRID, TextSize, colors_of, text_label
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.start.item_form import ItemForm, kept_picture
 from lightpen_app.steps.start.tip_picture import TipPicture
@@ -204,7 +203,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         if asked is not self._asked:
             return False
         self._asked = None
-        self._fault.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
+        self._fault.set_value(StatusMessage.fault(fault))
         self._refresh()
         return True
 

@@ -9,7 +9,6 @@ from lightpen.record.library.supervision import Signature, Supervision, read_sup
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import phrases_whole
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -104,7 +103,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
     def show_fault(self, fault: str) -> None:
         """Say why nothing was set."""
         self._is_signed = False
-        self._fault.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
+        self._fault.set_value(StatusMessage.fault(fault))
         self._supervisor.clear_password()
 
     def _refresh(self) -> None:

@@ -21,7 +21,6 @@ from lightpen_app.look.layouts import (
 )
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, mm_text
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.origin_mark import origin_message
@@ -217,7 +216,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._table.hide()
         for remark in (self._origin, self._reason):
             remark.set_value(StatusMessage())
-        self._warning.set_value(StatusMessage(fault, Sign.CROSS, Tone.BAD))
+        self._warning.set_value(StatusMessage.fault(fault))
 
     def _show(self, result: Result) -> None:
         now = self._now()
@@ -249,7 +248,7 @@ class LastResultPanel(Translated, QGroupBox):
         if result.supervisor:
             text = self.tr("Accepted by supervisor {0}. Reason: {1}")
             text = text.format(shortened(result.supervisor), result.reason)
-        return StatusMessage(text, Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(text)
 
     def set_guarded(self, is_guarded: bool) -> None:
         """Ask for a supervisor before an acceptance is revoked, or for none."""
@@ -278,7 +277,7 @@ class LastResultPanel(Translated, QGroupBox):
             ).format(self._rule.max_days)
         else:
             return StatusMessage()
-        return StatusMessage(text, Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(text)
 
     def _age_text(self, result: Result, now: datetime) -> str:
         days = (now.date() - local_time(result.accepted).date()).days

@@ -207,7 +207,7 @@ class SwingWords(QObject):
         is_asked = not moment.setup.is_recording
         if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
             return StatusMessage()
-        return StatusMessage(worded(why), Sign.WARNING, Tone.WARN)
+        return StatusMessage.warning(worded(why))
 
     def stand(self, moment: SwingViewState) -> DisplayedPosture | None:
         """Return the view of the pen in space; None if its tip is unknown."""

@@ -255,7 +255,7 @@ class PenPanel(Translated, QWidget):
 
     def _health_message(self, health: PenHealth | None) -> StatusMessage:
         if self._unread:
-            return StatusMessage(self._unread, Sign.CROSS, Tone.BAD)
+            return StatusMessage.fault(self._unread)
         if health is not None:
             assessment = health.assessment
             words = f"{worded(assessment.reason)} {worded(BY_SIMPLE_ACCEPTANCE)}"
@@ -292,11 +292,7 @@ class PenPanel(Translated, QWidget):
 
     def _message(self) -> StatusMessage:
         if self._new is None:
-            return (
-                StatusMessage(self._fault, Sign.CROSS, Tone.BAD)
-                if self._fault
-                else (StatusMessage())
-            )
+            return StatusMessage.fault(self._fault) if self._fault else StatusMessage()
         improved = self._new.improved
         text = self.tr(
             "Saved as {0}: residuals of the swing held out {1} px, with the old file "
@@ -304,7 +300,7 @@ class PenPanel(Translated, QWidget):
         )
         after, before = improved.sigma_after, improved.sigma_before
         words = (self._new.path.name, number_text(after, 4), number_text(before, 4))
-        return StatusMessage(text.format(*words), Sign.CHECK, Tone.GOOD)
+        return StatusMessage.good(text.format(*words))
 
     def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
         """Return the shift of each LED and the growth of the pen, by swing."""
