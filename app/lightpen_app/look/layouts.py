@@ -104,6 +104,12 @@ def fill(layout: QBoxLayout, *cells: Cell) -> None:
             layout.addWidget(cell)
 
 
+def set_stacked(layout: QBoxLayout, stacked: bool) -> None:
+    """Arrange the cells from top to bottom, or from left to right."""
+    direction = QBoxLayout.Direction
+    layout.setDirection(direction.TopToBottom if stacked else direction.LeftToRight)
+
+
 def _attached(
     layout: L, place: Place, spacing: int, margins: Margins, stretch: int, at: GridPlace
 ) -> L:

@@ -1,18 +1,12 @@
 """Windows and dialogs that fit their screen."""
 
-from typing import TYPE_CHECKING
-
 from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
-
-if TYPE_CHECKING:
-    _Base = QWidget
-else:  # a class of Qt's cannot be a base twice
-    _Base = object
+from lightpen_app.widgets.translated import WidgetMixin
 
 FRAME = QSize(GRID, 5 * GRID)  # of a window, at most; not known before it is shown
 
@@ -37,7 +31,7 @@ def fit_screen(window: QWidget) -> None:
         window.setGeometry(fitted)
 
 
-class FittedWindow(_Base):
+class FittedWindow(WidgetMixin):
     """Put before the base of a window, it keeps that within the screen when shown."""
 
     # That close the window; a dialog is also closed as Qt does it.

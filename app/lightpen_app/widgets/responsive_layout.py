@@ -1,19 +1,13 @@
 """Responsive layout of widgets by the available size."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
-
-if TYPE_CHECKING:
-    _Base = QWidget
-else:  # a class of Qt's cannot be a base twice
-    _Base = object
+from lightpen_app.widgets.translated import WidgetMixin
 
 
 @dataclass(frozen=True)
@@ -35,7 +29,7 @@ class SizeClass:
 NO_ROOM = SizeClass(is_narrow=True, is_low=True)
 
 
-class ResponsiveLayout(_Base):
+class ResponsiveLayout(WidgetMixin):
     """Mixin before the base of a widget: rearranges it when its size changes.
 
     The constructor of the widget arranges it once.

@@ -16,6 +16,8 @@ from lightpen_app.look.phrases import first_missing
 from lightpen_app.steps.leds.table_panel import Changes
 from lightpen_app.work.selection import Selection
 
+translate = QCoreApplication.translate
+
 NO_MERGING, DIAMETER, TIP = -1, 1, 2
 
 
@@ -158,7 +160,6 @@ class LedDraft(QObject):
 
 def why_not_next(state: LedState, preparation: Preparation) -> str:
     """Return why no swing can be captured with these LEDs yet."""
-    translate = QCoreApplication.translate
     if not state.is_pending:
         return first_missing(preparation.leds_missing_inputs())
     if state.check.usable is None:
@@ -170,7 +171,6 @@ def why_not_next(state: LedState, preparation: Preparation) -> str:
 
 def why_not_savable(state: LedState) -> str:
     """Return why the table cannot be saved."""
-    translate = QCoreApplication.translate
     if not state.draft.rows:
         return translate("LedsPage", "The table has no LEDs.")
     if state.check.usable is None:
@@ -184,4 +184,4 @@ def unsaved_leds_text(state: LedState) -> str:
     """Return the message on the changes that would be lost."""
     if not state.is_edited:
         return ""
-    return QCoreApplication.translate("LedsPage", "The LED table has unsaved changes.")
+    return translate("LedsPage", "The LED table has unsaved changes.")

@@ -5,10 +5,10 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QLabel, QWidget
+from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
 
 from lightpen.formats.pen_content import UNITS
-from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
@@ -88,10 +88,7 @@ class LedFilePanel(Translated, QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """Place the buttons below the path, or beside it."""
-        direction = QBoxLayout.Direction
-        self._row.setDirection(
-            direction.TopToBottom if narrow else direction.LeftToRight
-        )
+        set_stacked(self._row, narrow)
 
     def value(self) -> str:
         """Return the path of the open file, not that being typed."""

@@ -1,10 +1,15 @@
 """View of the step Review: the verdict, the result and its details."""
 
 from PySide6.QtCore import QSize, QTimer
-from PySide6.QtWidgets import QBoxLayout, QProgressBar, QWidget
+from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    fill,
+    horizontal_layout,
+    set_stacked,
+    vertical_layout,
+)
 from lightpen_app.look.theme import GRID, TextSize
 from lightpen_app.steps.review.detail_tabs import DetailTabs
 from lightpen_app.steps.review.message_list import StatusMessageList
@@ -165,16 +170,15 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     @override
     def _use_room(self) -> None:
         """Place the result beside the tabs, or as first tab of a narrow page."""
-        side, direction = self._result_side, QBoxLayout.Direction
+        side = self._result_side
         self.result.set_large(self._room.is_vast)
+        set_stacked(self._buttons, not self._room.is_narrow)
         if self._room.is_narrow:
-            self._buttons.setDirection(direction.LeftToRight)
             side.setMinimumWidth(0)
             side.setMaximumWidth(ANY_WIDTH)
             self.tabs.insertTab(0, side, self.tr("Result"))
             self.tabs.setCurrentIndex(0)
         else:
-            self._buttons.setDirection(direction.TopToBottom)
             is_vast = self._room.is_vast
             side.setFixedWidth(LARGE_RESULT_WIDTH if is_vast else RESULT_WIDTH)
             self._columns.insertWidget(0, side)

@@ -23,6 +23,8 @@ from lightpen_app.widgets.question_bar import Question
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State
 
+translate = QCoreApplication.translate
+
 # What the sentence of a verdict has in it whose cause is the intrinsics file.
 OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
 OF_FILES = (
@@ -57,7 +59,7 @@ def review_page_state(
     status: SwingStatus, named: Names, main: MainAction
 ) -> ReviewPageState:
     """Return the view state of the page, by the selection at the step Start."""
-    translate, verdict = QCoreApplication.translate, status.verdict
+    verdict = status.verdict
     why_locked, is_accepted = why_not_changed(status), status.result is not None
     goes_on = all_read = not_swung = not_accepted = ""
     if status.is_reading:
@@ -141,7 +143,6 @@ def review_action(
     next_tip : str
         Tip that is swung next; empty where something is missing for a swing.
     """
-    translate = QCoreApplication.translate
     if status.result is not None:
         why_not = translate("ReviewPage", "Tip accepted.") if is_new else ""
         if not next_tip:
@@ -166,7 +167,6 @@ def review_action(
 
 def repeat_question() -> Question:
     """Return whether to swing again."""
-    translate = QCoreApplication.translate
     return Question(
         translate(
             "ReviewPage",
@@ -179,7 +179,6 @@ def repeat_question() -> Question:
 
 def take_back_question() -> Question:
     """Return whether to take an acceptance back."""
-    translate = QCoreApplication.translate
     return Question(
         translate(
             "ReviewPage",
@@ -193,7 +192,6 @@ def take_back_question() -> Question:
 
 def review_state(status: SwingStatus) -> State:
     """Return the banner: verdict, or since when the tip is current."""
-    translate = QCoreApplication.translate
     if status.result is not None:
         return _accepted_state(status.result)
     if status.failure is not None:
@@ -227,7 +225,6 @@ def remarks(status: SwingStatus, named: Names) -> tuple[StatusMessage, ...]:
 
 def next_step_text(status: SwingStatus) -> str:
     """Return the next step as a sentence."""
-    translate = QCoreApplication.translate
     if status.result is not None:
         return translate(
             "ReviewPage", "Next: start the next calibration or close the program."
@@ -257,7 +254,6 @@ def next_step_text(status: SwingStatus) -> str:
 
 def why_not_now(status: SwingStatus) -> str:
     """Return why no command is possible now; empty if one is."""
-    translate = QCoreApplication.translate
     if status.failure is None and (status.solution is None or status.verdict is None):
         return translate("ReviewPage", "Swing the pen first.")
     if status.is_solving:
@@ -274,14 +270,13 @@ def why_not_accepted(status: SwingStatus) -> str:
     verdict, why_not = status.verdict, why_not_now(status)
     if why_not or verdict is None or verdict.can_be_accepted:
         return why_not
-    return QCoreApplication.translate(
+    return translate(
         "ReviewPage", "Result not acceptable. Capture more images or repeat the swing."
     )
 
 
 def why_not_changed(status: SwingStatus) -> str:
     """Return why the swing cannot be changed."""
-    translate = QCoreApplication.translate
     if status.result is not None:
         return translate("ReviewPage", "Tip accepted. Start the next calibration.")
     return why_not_swung(status)
@@ -289,7 +284,6 @@ def why_not_changed(status: SwingStatus) -> str:
 
 def why_not_swung(status: SwingStatus) -> str:
     """Return why there is no solution."""
-    translate = QCoreApplication.translate
     if status.failure is not None:
         return translate("ReviewPage", "These images gave no tip.")
     if status.solution is None:
@@ -299,7 +293,6 @@ def why_not_swung(status: SwingStatus) -> str:
 
 def unsaved_text(status: SwingStatus) -> str:
     """Return the question before the window closes; empty if all is done."""
-    translate = QCoreApplication.translate
     if status.solution is None or status.result is not None:
         return ""
     taken = status.revoked
@@ -323,7 +316,6 @@ def step_of_file(reason: Message) -> str:
 
 
 def _accepted_state(result: Result) -> State:
-    translate = QCoreApplication.translate
     accepted = accepted_phrase(result.origin)
     text = translate(
         "ReviewPage", "Saved {0}. Earlier results stay in the archive."
@@ -341,7 +333,7 @@ def _accepted_state(result: Result) -> State:
 def _other_names(swung: Names, named: Names) -> str:
     if (swung.pen, swung.tip) == (named.pen, named.tip):
         return ""
-    text = QCoreApplication.translate(
+    text = translate(
         "ReviewPage",
         "This swing belongs to tip {0}, pen {1}; the step Start now shows tip {2}, "
         "pen {3}.",

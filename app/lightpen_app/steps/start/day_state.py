@@ -24,6 +24,8 @@ from lightpen_app.look.words import PARTED, on_one_line, shortened
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.status_mark import status_message
 
+translate = QCoreApplication.translate
+
 SOON = timedelta(days=7)  # before a tip is due: then it is listed as due
 
 
@@ -117,7 +119,7 @@ def readiness(
 
 def tip_details(now: Preparation, statuses: StationStatus) -> str:
     """Return the text on the selected tip, in one line; empty without one."""
-    translate, names = QCoreApplication.translate, now.names
+    names = now.names
     if not names.tip:
         return ""
     tip, point = statuses.library.tips.get(names.tip), now.nominal_tip
@@ -140,7 +142,6 @@ def tip_details(now: Preparation, statuses: StationStatus) -> str:
 
 
 def _row(pen: str, tip: str, statuses: StationStatus, *, is_simulated: bool) -> TipRow:
-    translate = QCoreApplication.translate
     found, status = statuses.in_force.get((pen, tip)), statuses.of_tip(pen, tip)
     if found is None:
         mark = status_message(None if is_simulated else status)
@@ -176,7 +177,6 @@ def _grade_message(grade: Grade | None) -> StatusMessage:
 
 
 def _due_text(last: date | None, today: date) -> str:
-    translate = QCoreApplication.translate
     if last is None:
         return ""
     days = (last - today).days
@@ -186,7 +186,6 @@ def _due_text(last: date | None, today: date) -> str:
 
 
 def _age_text(calibrated: datetime, today: date) -> str:
-    translate = QCoreApplication.translate
     days = (today - local_time(calibrated).date()).days
     if days == 0:
         return translate("DayPage", "today")
@@ -204,7 +203,6 @@ def _first_of(missing: Iterable[MissingInput]) -> str:
 
 
 def _camera_message(now: Preparation, camera: CameraState) -> StatusMessage:
-    translate = QCoreApplication.translate
     missing = _first_of(now.camera_missing_inputs())
     if camera.connection is not Connection.STREAMING or missing:
         no_images = translate("DayPage", "The camera sends no images.")
@@ -218,7 +216,7 @@ def _camera_message(now: Preparation, camera: CameraState) -> StatusMessage:
 def _leds_message(
     now: Preparation, statuses: StationStatus, camera: CameraState, file_doubt: str
 ) -> StatusMessage:
-    translate, pen = QCoreApplication.translate, now.names.pen
+    pen = now.names.pen
     if missing := _first_of(now.leds_missing_inputs()):
         return _amber(missing)
     if file_doubt:
@@ -233,7 +231,6 @@ def _leds_message(
 
 
 def _temperature_message(now: Preparation) -> StatusMessage:
-    translate = QCoreApplication.translate
     measured = now.assumptions_today.temperature_c
     if now.lacks_temperature:
         return _amber(translate("DayPage", "Measure the temperature of the pen."))
@@ -245,7 +242,7 @@ def _temperature_message(now: Preparation) -> StatusMessage:
 
 
 def _reference_message(status: VerificationStatus) -> StatusMessage:
-    translate, drift = QCoreApplication.translate, status.lamp_drift
+    drift = status.lamp_drift
     if drift is None:
         text = translate("DayPage", "No drift reference")
         return StatusMessage(text, Sign.RING, Tone.QUIET)

@@ -4,17 +4,16 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QBoxLayout,
-    QHeaderView,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.model.assumptions import COLDEST, WARMEST
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    fill,
+    horizontal_layout,
+    set_stacked,
+    vertical_layout,
+)
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.steps.start.day_state import ReadinessItem, TipRow
 from lightpen_app.steps.start.readiness_line import ReadinessLine
@@ -151,10 +150,7 @@ class DayView(Translated, QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """Put the last result below the table where there is little width."""
-        direction = QBoxLayout.Direction
-        self._columns.setDirection(
-            direction.TopToBottom if narrow else direction.LeftToRight
-        )
+        set_stacked(self._columns, narrow)
         self._ready.set_narrow(narrow)
 
     def set_ready(

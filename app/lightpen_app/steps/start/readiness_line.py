@@ -5,10 +5,10 @@ from functools import partial
 
 from PySide6.QtCore import QEvent, Signal
 from PySide6.QtGui import QIcon
-from PySide6.QtWidgets import QBoxLayout, QFrame
+from PySide6.QtWidgets import QFrame
 from typing_extensions import override
 
-from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, set_tone, text_label
 from lightpen_app.steps.start.day_state import ReadinessItem
 from lightpen_app.widgets.push_button import PushButton
@@ -53,9 +53,8 @@ class ReadinessLine(QFrame):
 
     def set_narrow(self, narrow: bool) -> None:
         """Put the place above the items where there is little width."""
-        direction = QBoxLayout.Direction
         for row in (self._row, self._pairs):
-            row.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
+            set_stacked(row, narrow)
 
     def set_place(self, place: str) -> None:
         """Show station and operator."""

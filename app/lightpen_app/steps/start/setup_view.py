@@ -1,9 +1,14 @@
 """Set up station: permanent entries."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    fill,
+    horizontal_layout,
+    set_stacked,
+    vertical_layout,
+)
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
@@ -61,10 +66,7 @@ class SetupView(Translated, QWidget):
 
     def set_narrow(self, narrow: bool) -> None:
         """Use one column where there is little width."""
-        direction = QBoxLayout.Direction
-        self._columns.setDirection(
-            direction.TopToBottom if narrow else direction.LeftToRight
-        )
+        set_stacked(self._columns, narrow)
         if not self._is_known:
             self.newcomer.set_wide(narrow)
             column = self._left if narrow else self._right

@@ -27,6 +27,8 @@ from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.swing_run import SwingRun
 
+translate = QCoreApplication.translate
+
 SOUNDS: dict[SwingEventKind, Sound] = {
     SwingEventKind.SEATED: Sound.SEATED,
     SwingEventKind.KEPT: Sound.KEPT,
@@ -180,7 +182,7 @@ class SwingPresenter(QObject):
 
 def main_action(status: SwingStatus) -> MainAction:
     """Return the present action of the main button."""
-    translate, state = QCoreApplication.translate, status.state
+    state = status.state
     if state is None or status.is_capturing:
         has_images = state is not None and state.n_kept > 0
         why_not = translate("SwingPage", "No image captured yet")
@@ -190,7 +192,6 @@ def main_action(status: SwingStatus) -> MainAction:
 
 
 def _why_no_review(status: SwingStatus) -> str:
-    translate = QCoreApplication.translate
     if status.is_solving:
         return translate("SwingPage", "Computing the tip")
     if status.is_reading:
@@ -218,7 +219,6 @@ def side_action(status: SwingStatus, connection: Connection) -> SideAction:
 
 def side_text(action: SideAction) -> str:
     """Return the label of the button beside Start over."""
-    translate = QCoreApplication.translate
     texts = {
         SideAction.OPEN_CAMERA: translate("SwingPage", "Open the camera"),
         SideAction.TRY_AGAIN: translate("SwingPage", "Try again"),
@@ -235,9 +235,7 @@ def why_not_more(status: SwingStatus) -> str:
     """Return why no more images can be captured after the verdict."""
     is_judged = status.state is not None and status.state.phase is Phase.VERDICT
     if is_judged and status.is_recording:
-        return QCoreApplication.translate(
-            "SwingPage", "All recorded images are loaded."
-        )
+        return translate("SwingPage", "All recorded images are loaded.")
     return ""
 
 
@@ -254,7 +252,7 @@ def unsaved_swing_text(status: SwingStatus) -> str:
     state = status.state
     if state is None or state.phase is Phase.VERDICT or not state.n_kept:
         return ""
-    text = QCoreApplication.translate(
+    text = translate(
         "SwingPage",
         "Swing not finished. The captured images ({0}) are saved; you can resume "
         "the swing at the next start.",
@@ -264,7 +262,6 @@ def unsaved_swing_text(status: SwingStatus) -> str:
 
 def finish_question(status: SwingStatus) -> Question:
     """Return whether to finish though something is missing."""
-    translate = QCoreApplication.translate
     return Question(
         missing_text(status),
         translate("SwingPage", "Finish now"),
@@ -274,7 +271,6 @@ def finish_question(status: SwingStatus) -> Question:
 
 def other_choices_question() -> Question:
     """Return the question whether to continue although the selection has changed."""
-    translate = QCoreApplication.translate
     return Question(
         translate(
             "SwingPage",
@@ -288,7 +284,6 @@ def other_choices_question() -> Question:
 
 def start_over_question(status: SwingStatus) -> Question:
     """Return whether to abandon a swing and restart."""
-    translate = QCoreApplication.translate
     text = translate(
         "SwingPage",
         "Start over? The images of this swing ({0}) are set aside and remain on the "

@@ -18,7 +18,12 @@ from lightpen.verification.tasks.circle import CIRCLE, MIN_ANGLE, ring_fit
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import ResultTable
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import (
+    fill,
+    horizontal_layout,
+    set_stacked,
+    vertical_layout,
+)
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.part_view import PartView, part_value
@@ -218,9 +223,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
         direction = QBoxLayout.Direction
         is_narrow, is_part = self._room.is_narrow, self._task is PART
         is_stacked = is_narrow or is_part  # its tables are wide
-        self._side.setDirection(
-            direction.TopToBottom if is_stacked else direction.LeftToRight
-        )
+        set_stacked(self._side, is_stacked)
         self._columns.setDirection(
             direction.BottomToTop
             if is_narrow and is_part and self._is_found

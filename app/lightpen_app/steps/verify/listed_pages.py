@@ -3,7 +3,6 @@
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import (
-    QBoxLayout,
     QFrame,
     QListWidget,
     QSizePolicy,
@@ -14,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.layouts import horizontal_layout, set_stacked
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, Tone, colors_of
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -122,10 +121,8 @@ class ListedPages(ResponsiveLayout, QWidget):
 
     @override
     def _use_room(self) -> None:
-        is_narrow, direction = self._room.is_narrow, QBoxLayout.Direction
-        self._columns.setDirection(
-            direction.TopToBottom if is_narrow else direction.LeftToRight
-        )
+        is_narrow = self._room.is_narrow
+        set_stacked(self._columns, is_narrow)
         self._columns.setSpacing(GRID if is_narrow else 2 * GRID)
         self._field.setVisible(is_narrow)
         self._list.setVisible(not is_narrow)

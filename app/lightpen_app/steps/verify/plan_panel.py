@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtWidgets import QBoxLayout, QCheckBox, QFileDialog, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.file_format import FileFormat
@@ -24,7 +24,7 @@ from lightpen.simulator.plate import plate_plan
 from lightpen.verification.session.status import VerificationStatus
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions, base_name, planned_at
-from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.layouts import horizontal_layout, set_stacked
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -129,10 +129,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
     @override
     def _use_room(self) -> None:
-        direction = QBoxLayout.Direction
-        self._rows.setDirection(
-            direction.TopToBottom if self._room.is_narrow else direction.LeftToRight
-        )
+        set_stacked(self._rows, self._room.is_narrow)
 
     @override
     def _retranslate(self) -> None:
