@@ -239,7 +239,7 @@ class Stage:
         self._workbench.run.runner.ask(lambda workflow: workflow.abandon())
         window = self.wizard.window
         window.close_unasked()
-        others = window.operator_view(), window.help_window()
+        others = window.operator_view, window.help_window
         for each in (*others, window, self.wizard):
             each.deleteLater()
         self._settle()

@@ -458,7 +458,7 @@ class Walker:
         """Close the window, whatever it asks."""
         with self.answering():
             self.window.close()
-        others = self.window.operator_view(), self.window.help_window()
+        others = self.window.operator_view, self.window.help_window
         for each in (*others, self.window, self.wizard):
             each.deleteLater()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -57,7 +57,7 @@ def test_the_operator_view_fills_the_screen(
     walker.until_says("CAPTURING")
 
     walker.press(Key.Key_F11)
-    view = walker.window.operator_view()
+    view = walker.window.operator_view
     walker.until(view.isActiveWindow)
     walker.until(lambda: on_screen(walker).shape == (view.height(), view.width()))
 
@@ -133,7 +133,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
 
 def is_shown(walker: "Walker") -> bool:
     """Whether the screen shows what the operator view draws."""
-    view = walker.window.operator_view()
+    view = walker.window.operator_view
     screen, drawn = on_screen(walker), pixels_of(view.grab().toImage())
     if screen.shape != drawn.shape or screen.std() < 10:
         return False

@@ -200,7 +200,7 @@ def _all_words(walker: "Walker") -> Iterator[str]:
     yield from walker.texts()
     for widget in walker.seen():
         yield widget.toolTip()
-    view = walker.window.operator_view()
+    view = walker.window.operator_view
     value = view.value()
     yield from (value.instruction, value.hint, value.count)
     yield from (value.state.word, value.state.detail)

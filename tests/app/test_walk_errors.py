@@ -571,7 +571,7 @@ def test_language_theme_size_and_windows_change_in_a_step_and_during_capture(
 
 def _use_all_windows(walker: "Walker", title: str) -> None:
     """Open all that the function keys open, and change language and appearance."""
-    help_window = walker.window.help_window()
+    help_window = walker.window.help_window
     walker.press(Key.Key_F1)
     walker.until(help_window.isActiveWindow)
     assert max(map(len, walker.texts(help_window))) > 100
@@ -595,7 +595,7 @@ def _use_all_windows(walker: "Walker", title: str) -> None:
         assert walker.says("Sounds are off.")
 
     walker.press(Key.Key_F11)
-    view = walker.window.operator_view()
+    view = walker.window.operator_view
     walker.until(view.isActiveWindow)
     walker.press(Key.Key_Escape)
     assert not view.isVisible()
@@ -625,7 +625,7 @@ def test_about_tells_the_versions_and_licences(prepared: "Walker") -> None:
 
 @pytest.mark.slow
 def test_the_operator_view_leads_the_swing_by_its_keys(capturing: "Walker") -> None:
-    view = capturing.window.operator_view()
+    view = capturing.window.operator_view
     capturing.press(Key.Key_F11)
     capturing.until(view.isActiveWindow)
     capturing.until(lambda: "CAPTURING" in capturing.texts(view))

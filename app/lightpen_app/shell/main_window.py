@@ -113,11 +113,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
         self._area = PageArea(pages[0])
-        self._notice = self._area.notice()
+        self._notice = self._area.notice
         self._action_bar = ActionBar()
-        self._operator_view = OperatorView()
-        self._operator_view.set_distance_m(preferences.distance_m)
-        self._help_window = HelpWindow()
+        self.operator_view = OperatorView()
+        self.operator_view.set_distance_m(preferences.distance_m)
+        self.help_window = HelpWindow()
         self._options = OptionsMenu(preferences, self)
         self._stream_dialog = StreamDialog(self)
         self._make_actions()
@@ -138,14 +138,14 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._options.stream_chosen.connect(self._on_stream_asked)
         self._options.about_chosen.connect(self._on_about_chosen)
         self._stream_dialog.value_changed.connect(self._options.set_stream)
-        self._operator_view.closed.connect(self._on_operator_view_closed)
-        self._operator_view.advance_requested.connect(self._on_advance_wanted_afar)
-        self._operator_view.pause_requested.connect(self._on_pause_pressed)
-        self._notice.value_changed.connect(self._operator_view.set_notice)
+        self.operator_view.closed.connect(self._on_operator_view_closed)
+        self.operator_view.advance_requested.connect(self._on_advance_wanted_afar)
+        self.operator_view.pause_requested.connect(self._on_pause_pressed)
+        self._notice.value_changed.connect(self.operator_view.set_notice)
         notifications.raised.connect(self._notice.show_text)
         notifications.withdrawn.connect(self._notice.drop)
         notifications.status_changed.connect(self._action_bar.set_status)
-        self._sidebar.subject_changed.connect(self._operator_view.set_subject)
+        self._sidebar.subject_changed.connect(self.operator_view.set_subject)
         for page in pages:
             self._add_page(page)
         application = QApplication.instance()
@@ -261,15 +261,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def is_seen(self) -> bool:
         """Return whether it, or the operator view, is on a screen."""
-        return not self.isMinimized() or self._operator_view.isVisible()
-
-    def help_window(self) -> HelpWindow:
-        """Return the help."""
-        return self._help_window
-
-    def operator_view(self) -> OperatorView:
-        """Return the operator view."""
-        return self._operator_view
+        return not self.isMinimized() or self.operator_view.isVisible()
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -310,8 +302,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._later = None
         self._settings.save_geometry(self)
         self.hide()  # what is under way may take its time to end
-        self._operator_view.close()
-        self._help_window.close()
+        self.operator_view.close()
+        self.help_window.close()
         self.page().left()
         for page in self._pages:
             page.shut_down()
@@ -332,7 +324,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         if event.type() == QEvent.Type.LanguageChange:
             self._retranslate()
             self._refresh()
-            self._help_window.set_language(self._options.value().language)
+            self.help_window.set_language(self._options.value().language)
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -384,7 +376,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             question.asking_changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self.show_step)
-        page.operator_value_changed.connect(self._operator_view.set_value)
+        page.operator_value_changed.connect(self.operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
         page.discovery_requested.connect(self.discovery_requested)
 
@@ -409,10 +401,10 @@ class MainWindow(ResponsiveLayout, QMainWindow):
                 *self._hands_free_actions,
             ]
         )
-        self._operator_view.addActions(
+        self.operator_view.addActions(
             [self._help_action, self._operator_action, self._options.mute_action]
         )
-        self._help_window.addActions([self._operator_action, self._options.mute_action])
+        self.help_window.addActions([self._operator_action, self._options.mute_action])
 
     def _action(self, key: Qt.Key, slot: Callable[[], object]) -> QAction:
         action = QAction(self)
@@ -542,15 +534,15 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self.page().toggle_pause()
 
     def _on_help_triggered(self) -> None:
-        self._help_window.set_topic(self.page().key, self._options.value().language)
-        self._help_window.show()
-        self._help_window.activateWindow()
+        self.help_window.set_topic(self.page().key, self._options.value().language)
+        self.help_window.show()
+        self.help_window.activateWindow()
 
     def _on_operator_toggled(self, shown: bool) -> None:
         if shown:
-            self._operator_view.open_beside(self)
+            self.operator_view.open_beside(self)
         else:
-            self._operator_view.close()
+            self.operator_view.close()
         self._emit_attention()
 
     def _emit_attention(self) -> None:
@@ -562,7 +554,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._operator_action.setChecked(False)
 
     def _on_options_changed(self, preferences: Preferences) -> None:
-        self._operator_view.set_distance_m(preferences.distance_m)
+        self.operator_view.set_distance_m(preferences.distance_m)
         self.preferences_changed.emit(preferences)
 
     def _on_mute_toggled(self, muted: bool) -> None:

@@ -104,7 +104,7 @@ class PageArea(QFrame):
         self.setObjectName("page_area")
 
         # Widgets: the order of making them is the order of the Tab key
-        self._notice = NoticeBar()
+        self.notice = NoticeBar()
         self._title = text_label(TextSize.TITLE)
         self._title.setWordWrap(False)
         self._lead = text_label(TextSize.BODY, Tone.QUIET)
@@ -113,7 +113,7 @@ class PageArea(QFrame):
         self._stack.addWidget(page)
 
         # Layout
-        self._layout = layout = vertical_layout(self, self._notice, margins=None)
+        self._layout = layout = vertical_layout(self, self.notice, margins=None)
         layout.addSpacing(GRID)
         self._heading = vertical_layout(
             layout, self._title, (self._lead, 1), spacing=-1
@@ -121,13 +121,9 @@ class PageArea(QFrame):
         layout.addSpacing(GRID)
         layout.addWidget(self._stack, 1)
 
-    def notice(self) -> NoticeBar:
-        """Return the bar of the notice."""
-        return self._notice
-
     def words(self) -> tuple[str, ...]:
         """Return the texts about the page."""
-        return self._notice.text(), self._title.text(), self._lead.text()
+        return self.notice.text(), self._title.text(), self._lead.text()
 
     def add_page(self, page: QWidget) -> None:
         """Add a page without showing it."""

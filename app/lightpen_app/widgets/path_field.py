@@ -67,16 +67,16 @@ class PathField(QWidget):
         self._is_faulty = False
 
         # Widgets
-        self._edit = EnterEdit()
-        self._edit.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFocusProxy(self._edit)
+        self.edit = EnterEdit()
+        self.edit.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setFocusProxy(self.edit)
 
         # Layout
-        self._layout = horizontal_layout(self, (self._edit, 1))
+        self._layout = horizontal_layout(self, (self.edit, 1))
 
         # Connections
-        self._edit.returnPressed.connect(self._on_return_pressed)
-        self._edit.editingFinished.connect(self._on_editing_finished)
+        self.edit.returnPressed.connect(self._on_return_pressed)
+        self.edit.editingFinished.connect(self._on_editing_finished)
 
     def value(self) -> str:
         """Return the path that was given last."""
@@ -85,17 +85,13 @@ class PathField(QWidget):
     def set_value(self, value: str) -> None:
         """Show another path."""
         self._value, self._last = value, value or self._last
-        self._edit.setText(value)
-        self._edit.setToolTip(value)
-
-    def edit(self) -> QLineEdit:
-        """Return the line edit, for its label."""
-        return self._edit
+        self.edit.setText(value)
+        self.edit.setToolTip(value)
 
     def set_faulty(self, faulty: bool) -> None:
         """Mark the path as not existing."""
         self._is_faulty = faulty
-        set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
+        set_tone(self.edit, Tone.BAD if faulty else Tone.PLAIN)
 
     def add_button(self, button: QPushButton) -> None:
         """Add a button beside the line."""
@@ -130,7 +126,7 @@ class PathField(QWidget):
 
     def _typed(self) -> str:
         """Return the text without the quotes added by a desktop."""
-        text = self._edit.text().strip()
+        text = self.edit.text().strip()
         for quote in QUOTES:
             if len(text) > 1 and text.startswith(quote) and text.endswith(quote):
                 text = text[1:-1]
@@ -138,7 +134,7 @@ class PathField(QWidget):
 
     def _on_return_pressed(self) -> None:
         """Accept the typed path; consume Enter, which the window uses otherwise."""
-        if self._edit.isModified() or self._is_faulty:
+        if self.edit.isModified() or self._is_faulty:
             self.take(self._typed())
 
     def _on_editing_finished(self) -> None:

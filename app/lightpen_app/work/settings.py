@@ -69,11 +69,11 @@ class Settings(QObject):
 
     def __init__(self, file: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._file = file
+        self.file = file
         loaded = load(file)
         self._content: Content = loaded.content
         self._machine, fault = load_of_machine()
-        self._fault = loaded.fault or fault
+        self.fault = loaded.fault or fault
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
         self._why_unwritten: Message | None = None
@@ -82,16 +82,6 @@ class Settings(QObject):
 
         # Connections
         self._written.connect(self._on_written, Qt.ConnectionType.QueuedConnection)
-
-    @property
-    def file(self) -> Path:
-        """Path of the settings."""
-        return self._file
-
-    @property
-    def fault(self) -> Message | None:
-        """Why they could not be read at the start."""
-        return self._fault
 
     def preferences(self) -> Preferences:
         """Return the preferences; at first in the computer's or system's language."""
@@ -243,7 +233,7 @@ class Settings(QObject):
         unwritten: Changes = {}
         while changes := self._taken_changes(unwritten):
             try:
-                fault, unwritten = save(self._file, self._content, changes), {}
+                fault, unwritten = save(self.file, self._content, changes), {}
             except LightpenError as error:
                 fault, unwritten = error.message, changes
             if fault is not None or self._why_unwritten is not None:

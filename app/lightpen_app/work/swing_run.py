@@ -43,16 +43,11 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         with suppress(FileError):  # which `Settings.fault` reports
             address = server_address()
         self.logbook = LazyLogbook(folder, address)  # any thread may use it
-        self._archive = FolderArchive(folder, self.logbook.confirm)
+        self.archive = FolderArchive(folder, self.logbook.confirm)
         self.follower: GuidedOperator | None = None  # leads a simulated hand
         self.runner = SwingRunner(
             self.records_folder, self.archive, self, now, self.logbook
         )
-
-    @property
-    def archive(self) -> FolderArchive:
-        """Archive of accepted results."""
-        return self._archive
 
     @property
     def records_folder(self) -> Path:

@@ -463,7 +463,7 @@ def test_b_mutes_but_can_be_typed(shell: Shell, press: Callable[[Key], None]) ->
 def test_f11_opens_the_operator_view_and_escape_leaves_only_that(
     shell: Shell, qtbot: QtBot
 ) -> None:
-    view = shell.window.operator_view()
+    view = shell.window.operator_view
     QTest.keyClick(shell.window, Key.Key_F11)
     assert view.isVisible()
 
@@ -479,7 +479,7 @@ def test_f11_opens_the_operator_view_and_escape_leaves_only_that(
 def test_the_operator_view_takes_the_keys_of_a_remote(
     shell: Shell, qtbot: QtBot
 ) -> None:
-    view, page = shell.window.operator_view(), shell.pages[0]
+    view, page = shell.window.operator_view, shell.pages[0]
     page.hands_free = True
     page.field.setText("done")
     QTest.keyClick(shell.window, Key.Key_F11)
@@ -508,7 +508,7 @@ def test_space_presses_the_button_that_has_the_focus_and_pauses_elsewhere(
 
 
 def test_the_operator_view_goes_nowhere_behind_the_operators_back(shell: Shell) -> None:
-    view, page = shell.window.operator_view(), shell.pages[0]
+    view, page = shell.window.operator_view, shell.pages[0]
     QTest.keyClick(shell.window, Key.Key_F11)
     keys = (Key.Key_Return, Key.Key_PageDown, Key.Key_PageUp)
 
@@ -527,7 +527,7 @@ def test_the_operator_view_names_pen_origin_notice_and_the_key_that_leaves_it(
     shell: Shell,
 ) -> None:
     QTest.keyClick(shell.window, Key.Key_F11)
-    view = shell.window.operator_view()
+    view = shell.window.operator_view
 
     shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.RECORDED))
     shell.notifications.notify("The disk is full.", "The disk is full.")
@@ -553,7 +553,7 @@ def test_nobody_looks_at_images_on_a_page_without_them_or_at_a_window_put_away(
     shell.window.go_to(1)
     shell.window.showMinimized()
     QTest.keyClick(shell.window, Key.Key_F11)  # the operator still looks
-    QTest.keyClick(shell.window.operator_view(), Key.Key_F11)
+    QTest.keyClick(shell.window.operator_view, Key.Key_F11)
     shell.window.showNormal()
     shell.window.go_to(0)
 
@@ -566,7 +566,7 @@ def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
     shell.pages[0].at_screen = True
     shell.pages[0].hands_free = True
     shell.pages[0].field.setText("done")
-    view = shell.window.operator_view()
+    view = shell.window.operator_view
     QTest.keyClick(shell.window, Key.Key_F11)
     QTest.keyClick(view, Key.Key_PageDown)
     QTest.keyClick(view, Key.Key_Return)
@@ -614,13 +614,13 @@ def test_the_help_of_review_links_how_the_tip_is_found(
 def test_f11_works_while_the_help_is_in_front(shell: Shell) -> None:
     QTest.keyClick(shell.window, Key.Key_F1)
 
-    QTest.keyClick(shell.window.help_window(), Key.Key_F11)
+    QTest.keyClick(shell.window.help_window, Key.Key_F11)
 
-    assert shell.window.operator_view().isVisible()
+    assert shell.window.operator_view.isVisible()
 
 
 def test_f11_in_the_operator_view_leaves_it(shell: Shell, qtbot: QtBot) -> None:
-    view = shell.window.operator_view()
+    view = shell.window.operator_view
     QTest.keyClick(shell.window, Key.Key_F11)
 
     QTest.keyClick(view, Key.Key_F11)
@@ -642,7 +642,7 @@ def test_a_page_speaks_through_the_window(shell: Shell) -> None:
         "Pen LP-04\nTip T-10",
         "The file holds no LED.",
     } <= set(words)
-    assert shell.window.operator_view().value().instruction == "Tilt right"
+    assert shell.window.operator_view.value().instruction == "Tilt right"
     shell.notifications.withdraw(page.key)
     assert "The file holds no LED." not in shell.window.words()
 
@@ -663,9 +663,9 @@ def test_f1_shows_the_help_of_the_step(shell: Shell, qtbot: QtBot) -> None:
 
     QTest.keyClick(shell.window, Key.Key_F1)
 
-    assert "Stray light" in shell.window.help_window().text()
-    QTest.keyClick(shell.window.help_window(), Key.Key_Escape)
-    assert not shell.window.help_window().isVisible()
+    assert "Stray light" in shell.window.help_window.text()
+    QTest.keyClick(shell.window.help_window, Key.Key_Escape)
+    assert not shell.window.help_window.isVisible()
 
 
 @pytest.mark.qt_log_ignore(
@@ -894,13 +894,13 @@ def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None
 
 
 def test_closing_leaves_the_page_and_stops_every_page(shell: Shell) -> None:
-    shell.window.operator_view().show()
+    shell.window.operator_view.show()
 
     assert shell.window.close()
 
     assert shell.pages[0].log == ["entered", "left", "shut down"]
     assert shell.pages[2].log == ["shut down"]
-    assert not shell.window.operator_view().isVisible()
+    assert not shell.window.operator_view.isVisible()
 
 
 @pytest.mark.parametrize(
@@ -1023,7 +1023,7 @@ def test_a_key_held_too_long_leads_one_step_on(shell: Shell, key: Key) -> None:
 def test_the_help_that_is_read_stays_when_the_language_changes(
     shell: Shell, qapp: QApplication
 ) -> None:
-    window = shell.window.help_window()
+    window = shell.window.help_window
     window.set_topic("start", SOURCE_LANGUAGE)
     english = window.text()
     shell.window.go_to(1)

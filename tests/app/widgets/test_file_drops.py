@@ -58,4 +58,4 @@ def test_a_field_does_not_take_the_text_of_an_address(place: QGroupBox) -> None:
     (field,) = place.findChildren(PathField)
 
     assert place.acceptDrops()
-    assert not field.edit().acceptDrops()
+    assert not field.edit.acceptDrops()

@@ -26,13 +26,13 @@ class Form:
         self.field.value_changed.connect(self.taken.append)
         self.window.show()
         self.window.activateWindow()
-        self.field.edit().setFocus()
+        self.field.edit.setFocus()
 
     def type(self, text: str) -> None:
-        QTest.keyClicks(self.field.edit(), text)
+        QTest.keyClicks(self.field.edit, text)
 
     def press(self, key: Qt.Key) -> None:
-        QTest.keyClick(self.field.edit(), key)
+        QTest.keyClick(self.field.edit, key)
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_leaving_the_field_takes_a_path_over_once(form: Form) -> None:
     form.type("/data/camera.yaml")
     form.press(Qt.Key.Key_Tab)
     form.other.clearFocus()
-    form.field.edit().setFocus()
+    form.field.edit.setFocus()
     form.press(Qt.Key.Key_Tab)
 
     assert form.taken == ["/data/camera.yaml"]

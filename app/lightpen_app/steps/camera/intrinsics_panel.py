@@ -128,7 +128,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Intrinsics of camera and lens"))
-        edit = self._path.edit()
+        edit = self._path.edit
         edit.setAccessibleName(self.tr("Intrinsics file"))
         edit.setPlaceholderText(self.tr("Intrinsics file"))
         self._open.setText(self.tr("Open..."))

@@ -62,12 +62,12 @@ class LivePanel(Translated, QWidget):
         self._figures.setSizePolicy(
             QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred
         )
-        self._view = ImageView()
+        self.view = ImageView()
 
         # Layout
         layout = vertical_layout(self, (self._switch, 0, Qt.AlignmentFlag.AlignLeft))
         horizontal_layout(layout, self._state, (self._figures, 1), spacing=HEAD_GAP)
-        layout.addWidget(self._view, 1)
+        layout.addWidget(self.view, 1)
 
         # Connections
         self._switch.value_changed.connect(self.camera_chosen)
@@ -91,10 +91,6 @@ class LivePanel(Translated, QWidget):
         """Return the number of spots and the frame rate, shortened to the width."""
         return self._figures.text()
 
-    def view(self) -> ImageView:
-        """Return the image."""
-        return self._view
-
     def spots(self) -> Spots | None:
         """Return the unmasked spots of the image; None without one."""
         return None if self._seen is None else self._seen.spots
@@ -110,7 +106,7 @@ class LivePanel(Translated, QWidget):
         rings = live_markers(shown.seen)
         free = (ring for ring in rings if not self._is_found(ring))
         markers = (*free, *self._extra)
-        self._view.set_half(shown.half, shown.size, markers)
+        self.view.set_half(shown.half, shown.size, markers)
         self._show_figures()
 
     def set_extra_markers(self, markers: Sequence[Marker]) -> None:
@@ -132,7 +128,7 @@ class LivePanel(Translated, QWidget):
 
     def _forget(self) -> None:
         """Clear the image until the next arrives."""
-        self._view.set_image(None)
+        self.view.set_image(None)
         self._seen = None
         self._arrivals.clear()
         self._n_lost.clear()
@@ -154,7 +150,7 @@ class LivePanel(Translated, QWidget):
         self._figures.setToolTip(PARTED.join(self._parts))
 
     def _retranslate(self) -> None:
-        self._view.setToolTip(
+        self.view.setToolTip(
             self.tr(
                 "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
             )
@@ -163,7 +159,7 @@ class LivePanel(Translated, QWidget):
 
     def _refresh(self) -> None:
         self._state.set_value(self._remark())
-        self._view.set_message(self._message())
+        self.view.set_message(self._message())
         if self._seen is not None:
             self._show_figures()
 

@@ -32,9 +32,9 @@ class MaskControl(QObject):
         panel.mask_requested.connect(self._on_mask_requested)
         panel.clear_requested.connect(self._on_clear_requested)
         panel.cover_requested.connect(self._on_cover_requested)
-        panel.drawing_toggled.connect(images.view().set_draws_circles)
-        images.view().pixel_clicked.connect(self._on_image_clicked)
-        images.view().circle_drawn.connect(self._on_circle_drawn)
+        panel.drawing_toggled.connect(images.view.set_draws_circles)
+        images.view.pixel_clicked.connect(self._on_image_clicked)
+        images.view.circle_drawn.connect(self._on_circle_drawn)
 
     def show_mask(self) -> None:
         """Show masked circles and the stray light found."""

@@ -38,7 +38,7 @@ class CameraPage(Page):
         self._view = view = CameraPanels(
             self._selection, self._camera, self._chosen_files
         )
-        self._search = SourceSearch(self._camera, view.source, view.second.source())
+        self._search = SourceSearch(self._camera, view.source, view.second.source)
         self._beside = BesideControl(self._selection, self._chosen_files, view.source)
         self._files = IntrinsicsControl(workbench, view.intrinsics, self)
         self._mask = MaskControl(

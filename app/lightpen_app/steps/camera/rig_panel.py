@@ -114,7 +114,7 @@ class RigPanel(Translated, QGroupBox):
         asked = self.tr("Use a second camera")
         self._second.setText(asked)
         self._second.setAccessibleName(asked)
-        edit = self._path.edit()
+        edit = self._path.edit
         edit.setAccessibleName(self.tr("Rig file"))
         edit.setPlaceholderText(self.tr("Rig file"))
         self._open.setText(self.tr("Open..."))

@@ -31,24 +31,20 @@ class SecondCameraChoice(QWidget):
 
         # Widgets
         self._rig = RigPanel()
-        self._source = SourcePanel(is_second=True)
+        self.source = SourcePanel(is_second=True)
 
         # Layout
-        vertical_layout(self, self._rig, self._source, spacing=2 * GRID)
+        vertical_layout(self, self._rig, self.source, spacing=2 * GRID)
 
         # Connections
         self._rig.wanted.connect(self._on_wanted)
         self._rig.path_chosen.connect(self._on_path_chosen)
-        self._source.value_changed.connect(self._on_source_chosen)
-        self._source.retry_requested.connect(camera.open)
+        self.source.value_changed.connect(self._on_source_chosen)
+        self.source.retry_requested.connect(camera.open)
         selection.changed.connect(self._on_workbench_changed)
         selection.station_changed.connect(self.shut_down)
 
         self._on_workbench_changed()
-
-    def source(self) -> SourcePanel:
-        """Return the choice of its source."""
-        return self._source
 
     def show_step(self, seen: LiveImage) -> None:
         """Show by the newest image whether two cameras are synchronised."""
@@ -78,9 +74,9 @@ class SecondCameraChoice(QWidget):
     def _on_workbench_changed(self) -> None:
         now = self._selection.preparation
         self._rig.set_value(now.second is not None, now.rig_file)
-        self._source.setVisible(now.second is not None)
+        self.source.setVisible(now.second is not None)
         if now.second is not None:
-            self._source.set_value(now.second.source)
+            self.source.set_value(now.second.source)
 
     def _on_wanted(self, is_wanted: bool) -> None:
         now = self._selection.preparation

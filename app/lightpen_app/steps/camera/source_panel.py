@@ -281,13 +281,13 @@ class SourcePanel(Translated, QGroupBox):
         self._kind.setAccessibleName(title)
         # On Linux the name of a list that drops down is what is chosen in it.
         self._kind.setAccessibleDescription(title)
-        edit = self._place.edit()
+        edit = self._place.edit
         edit.setAccessibleName(self.tr("Folder, record or video"))
         edit.setPlaceholderText(self.tr("Folder, record or video"))
         self._pick.setText(self.tr("Open..."))
         self._folder.setText(self.tr("Folder or record..."))
         self._file.setText(self.tr("Video..."))
-        producer = self._producer.edit()
+        producer = self._producer.edit
         producer.setAccessibleName(self.tr("GenTL producer"))
         producer.setPlaceholderText(self.tr("GenTL producers of the system"))
         self._open_producer.setText(self.tr("Open..."))

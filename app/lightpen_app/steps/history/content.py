@@ -64,7 +64,7 @@ class HistoryContent(Translated, QWidget):
 
         # Widgets: the order of making them is the order of the Tab key
         self._filter = FilterBar()
-        self._table = HistoryTable()
+        self.table = HistoryTable()
         self._tabs = QTabWidget()
         self._entry = EntryPanel()
         self._trend_panel = TrendPanel()
@@ -80,21 +80,21 @@ class HistoryContent(Translated, QWidget):
         self._tabs.setMinimumHeight(LEAST_TABS)
 
         # Layout
-        table, tabs = (self._table, TABLE_SHARE), (self._tabs, TABS_SHARE)
+        table, tabs = (self.table, TABLE_SHARE), (self._tabs, TABS_SHARE)
         vertical_layout(self, self._filter, table, tabs)
 
         # Connections
         reader = self._reader
         reader.failed.connect(self._show_fault)
         reader.opened.connect(self._on_opened)
-        reader.block_read.connect(self._table.put_block)
-        reader.block_passed.connect(self._table.forget_block)
+        reader.block_read.connect(self.table.put_block)
+        reader.block_passed.connect(self.table.forget_block)
         reader.trend_read.connect(self._on_trend_read)
         reader.messages_read.connect(self._entry.set_messages)
         reader.due_read.connect(self._due.set_tips)
         self._filter.value_changed.connect(self.read_anew)
-        self._table.block_wanted.connect(reader.read_block)
-        self._table.selection_changed.connect(self._on_selection_changed)
+        self.table.block_wanted.connect(reader.read_block)
+        self.table.selection_changed.connect(self._on_selection_changed)
         self._entry.note_given.connect(self._enter_note)
         self._entry.restore_requested.connect(self._restore)
         self._entry.paper_requested.connect(self._show_paper)
@@ -110,10 +110,6 @@ class HistoryContent(Translated, QWidget):
 
         self._show_rule()
         self._retranslate()
-
-    def table(self) -> HistoryTable:
-        """Return the table of the entries."""
-        return self._table
 
     def check_result(self) -> ArchiveCheckResult | None:
         """Return the result of the last archive check."""
@@ -160,8 +156,8 @@ class HistoryContent(Translated, QWidget):
         self._entry.set_value(None)
         self._entry.set_home(opening.home)
         self._archive.set_delivery(opening.delivery)
-        self._table.set_stations(opening.names.stations)
-        self._table.set_lines(opening.n_lines, opening.first)
+        self.table.set_stations(opening.names.stations)
+        self.table.set_lines(opening.n_lines, opening.first)
         if self._followed is None:
             self._on_trend_read(Trend())
         n_lines = opening.n_lines
@@ -171,7 +167,7 @@ class HistoryContent(Translated, QWidget):
         self._reader.read_due(self._due.rule(), self._tips.library)
 
     def _on_selection_changed(self) -> None:
-        line = self._table.current()
+        line = self.table.current()
         if line != self._entry.value():
             self._entry.set_value(line)
             if line is not None and line.entry is not None:
@@ -196,11 +192,11 @@ class HistoryContent(Translated, QWidget):
     def _on_trend_read(self, trend: Trend) -> None:
         self._trend = trend
         self._trend_panel.set_value(trend)
-        self._trend_panel.mark(_hash_of(self._table.current()))
+        self._trend_panel.mark(_hash_of(self.table.current()))
         self._show_selection()
 
     def _show_selection(self) -> None:
-        entries = [line.entry for line in self._table.selected()]
+        entries = [line.entry for line in self.table.selected()]
         selected = [entry for entry in entries if entry is not None]
         self._selection.set_limits(self._chosen.choices.limits)
         self._selection.set_value(selected, self._trend)

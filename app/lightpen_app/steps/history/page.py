@@ -60,7 +60,7 @@ class HistoryPage(Page):
 
     @override
     def first_control(self) -> QWidget:
-        return self._content.content().table()
+        return self._content.content().table
 
     @override
     def entered(self) -> None:

@@ -51,7 +51,7 @@ class LedFilePanel(Translated, QWidget):
         self._save = PushButton()
         self._samples = PushButton()
         self._discover = PushButton()
-        self._label.setBuddy(self._path.edit())
+        self._label.setBuddy(self._path.edit)
         self._units = _UnitsRow()
         self._problem = SignLabel()
         self._exchange = PushButton()
@@ -214,8 +214,8 @@ class LedFilePanel(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._label.setText(self.tr("LED &file"))
-        self._path.edit().setAccessibleName(self.tr("LED file"))
-        self._path.edit().setPlaceholderText(self.tr("Table (CSV) or JSON file"))
+        self._path.edit.setAccessibleName(self.tr("LED file"))
+        self._path.edit.setPlaceholderText(self.tr("Table (CSV) or JSON file"))
         self._open.setText(self.tr("Open..."))
         self._save.setText(self.tr("Save as..."))
         self._samples.setText(self.tr("Use file of the simulated pen"))

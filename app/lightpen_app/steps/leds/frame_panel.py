@@ -33,14 +33,14 @@ class FramePanel(Translated, QGroupBox):
         self._value: FrameCheck | None = None
 
         # Widgets
-        self._view = PenView()
+        self.view = PenView()
         self._rules = {rule: SignLabel() for rule in Rule}
         self._amounts = {rule: text_label(TextSize.SMALL, Tone.QUIET) for rule in LONG}
         self._layout_note = SignLabel()
         self._move = PushButton()
 
         # Layout
-        layout = vertical_layout(self, (self._view, 1))
+        layout = vertical_layout(self, (self.view, 1))
         grid = grid_layout(layout, spacing=(GRID, GRID // 4))
         grid.setColumnStretch(0, 1)
         for row, rule in enumerate(Rule):
@@ -52,18 +52,14 @@ class FramePanel(Translated, QGroupBox):
         fill(layout, self._layout_note, self._move)
 
         # Connections
-        self._view.led_chosen.connect(self.led_chosen)
+        self.view.led_chosen.connect(self.led_chosen)
         self._move.clicked.connect(self.move_requested)
 
         self._retranslate()
 
-    def view(self) -> PenView:
-        """Return the pen in space."""
-        return self._view
-
     def set_picture(self, picture: PenPicture) -> None:
         """Draw another pen."""
-        self._view.set_value(picture)
+        self.view.set_value(picture)
 
     def value(self) -> FrameCheck | None:
         """Return the listed checks."""

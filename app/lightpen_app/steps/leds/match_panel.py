@@ -103,22 +103,18 @@ class MatchPanel(Translated, QGroupBox):
         self._is_aside = False
 
         # Widgets
-        self._view = ImageView()
+        self.view = ImageView()
         self._banner = StateBanner(TextSize.TITLE)
         self._messages = tuple(FixableMessage() for _ in range(N_FINDINGS))
 
         # Layout
-        vertical_layout(self, (self._view, 1), self._banner, *self._messages, 0, foot)
+        vertical_layout(self, (self.view, 1), self._banner, *self._messages, 0, foot)
 
         # Connections
         for remark in self._messages:
             remark.mend_requested.connect(self.mend_requested)
 
         self._retranslate()
-
-    def view(self) -> ImageView:
-        """Return the live image."""
-        return self._view
 
     def state(self) -> State:
         """Return the state of the last images."""
@@ -139,14 +135,14 @@ class MatchPanel(Translated, QGroupBox):
             self._counts.append(detection.n_leds)
         self._detection = detection
         markers = self._toned(live_markers(shown.seen))
-        self._view.set_half(shown.half, shown.size, tuple(markers))
+        self.view.set_half(shown.half, shown.size, tuple(markers))
         self._refresh_state()
 
     def clear(self) -> None:
         """Clear the image."""
         self._detection = None
         self._forget()
-        self._view.set_image(None)
+        self.view.set_image(None)
         self._refresh_state()
 
     def set_why_unknown(self, sentence: str) -> None:
@@ -201,7 +197,7 @@ class MatchPanel(Translated, QGroupBox):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         width = self.contentsRect().width()
-        self._view.setMaximumHeight(round(TALLEST * width))
+        self.view.setMaximumHeight(round(TALLEST * width))
 
     def _forget(self) -> None:
         self._sigmas.clear()
@@ -209,12 +205,12 @@ class MatchPanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Live match"))
-        self._view.setToolTip(
+        self.view.setToolTip(
             self.tr(
                 "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
             )
         )
-        self._view.set_message(self.tr("No image yet"))
+        self.view.set_message(self.tr("No image yet"))
         self._refresh()
 
     def _refresh(self) -> None:

@@ -80,7 +80,7 @@ class LedsPage(ResponsiveLayout, Page):
         self._files.status_changed.connect(workbench.notifications.show_status)
         self._table.value_changed.connect(self._leds.edit)
         self._table.discard_requested.connect(self._files.discard)
-        self._table.led_chosen.connect(self._space.view().set_chosen)
+        self._table.led_chosen.connect(self._space.view.set_chosen)
         self._space.led_chosen.connect(self._table.set_chosen)
         self._space.move_requested.connect(self._on_move_requested)
         self._match.mend_requested.connect(self._on_mend_requested)

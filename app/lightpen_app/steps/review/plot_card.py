@@ -39,7 +39,7 @@ class PlotCard(Translated, QFrame):
 
     def __init__(self, plot: Plot, file_stem: str) -> None:
         super().__init__()
-        self._plot = plot
+        self.plot = plot
         self._file_stem = file_stem
         self._place: SavePlace | None = None
         self.setProperty("area", "panel")
@@ -73,10 +73,6 @@ class PlotCard(Translated, QFrame):
 
         self._retranslate()
 
-    def plot(self) -> Plot:
-        """Return the plot."""
-        return self._plot
-
     @property
     def is_needed(self) -> bool:
         """Whether there is something to show."""
@@ -94,7 +90,7 @@ class PlotCard(Translated, QFrame):
 
     def picture(self) -> NamedPicture:
         """Return the plot for saving beside others."""
-        return NamedPicture(f"{self._file_stem}.png", self._plot.png(self._mark()))
+        return NamedPicture(f"{self._file_stem}.png", self.plot.png(self._mark()))
 
     def actions_offered(self) -> Sequence[QAction]:
         """Return the actions of the menu: enlarge, save as PNG, save as CSV."""
@@ -103,7 +99,7 @@ class PlotCard(Translated, QFrame):
     def save(self, path: Path) -> None:
         """Save by suffix: numbers as CSV, else a picture."""
         is_table = path.suffix.lower() == ".csv"
-        data = self._plot.csv() if is_table else self._plot.png(self._mark())
+        data = self.plot.csv() if is_table else self.plot.png(self._mark())
         job = Job(lambda _: write_whole(path, data), self)
         text = self.tr("Saved as {0}").format(path)
         job.start(lambda _: self.saved.emit(text), self.failed)
@@ -131,7 +127,7 @@ class PlotCard(Translated, QFrame):
         self._save_png.setText(self.tr("Save picture (PNG)"))
         self._save_csv.setText(self.tr("Save numbers (CSV)"))
         self._button.setToolTip(self.tr("Enlarge or save this plot"))
-        words = f"{self._plot.accessibleName()}: {self._button.toolTip()}"
+        words = f"{self.plot.accessibleName()}: {self._button.toolTip()}"
         self._button.setAccessibleName(words)
 
 

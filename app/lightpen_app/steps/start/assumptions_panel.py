@@ -192,29 +192,25 @@ class AssumptionsPanel(Translated, QGroupBox):
         # Widgets
         self._words = text_label(TextSize.SMALL, Tone.QUIET)
         self._change = PushButton()
-        self._dialog = AssumptionsDialog(self)
+        self.dialog = AssumptionsDialog(self)
 
         # Layout
         horizontal_layout(self, (self._words, 1), self._change, spacing=2 * GRID)
 
         # Connections
-        self._change.clicked.connect(self._dialog.open)
-        self._dialog.value_changed.connect(self._on_dialog_changed)
+        self._change.clicked.connect(self.dialog.open)
+        self.dialog.value_changed.connect(self._on_dialog_changed)
 
         self._retranslate()
 
     def value(self) -> Assumptions:
         """Return the assumptions."""
-        return self._dialog.value()
+        return self.dialog.value()
 
     def set_value(self, assumptions: Assumptions) -> None:
         """Show other assumptions."""
-        self._dialog.set_value(assumptions)
+        self.dialog.set_value(assumptions)
         self._retranslate()
-
-    def dialog(self) -> AssumptionsDialog:
-        """Return the dialog that changes them."""
-        return self._dialog
 
     def _on_dialog_changed(self) -> None:
         self._retranslate()

@@ -292,7 +292,7 @@ class ItemForm(Translated, QWidget):
         }
         for field, text in texts.items():
             self._labels[field].setText(text)
-            named = self._picture.edit() if field is self._picture else field
+            named = self._picture.edit if field is self._picture else field
             named.setAccessibleName(text)
         self._due.setToolTip(
             self.tr("Last day of use, for example {0}; empty for none").format(
@@ -324,7 +324,7 @@ class ItemForm(Translated, QWidget):
         )
         self._browse.setText(self.tr("Browse..."))
         kept = self._item.picture if isinstance(self._item, ListedTip) else None
-        self._picture.edit().setPlaceholderText("" if kept is None else kept.place)
+        self._picture.edit.setPlaceholderText("" if kept is None else kept.place)
 
 
 def kept_picture(folder: Path, tip: ListedTip) -> ReadPicture | None:

@@ -103,7 +103,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._panel = QFrame()
         self._panel.setProperty("area", "panel")
         self._what = text_label(TextSize.LEAD)
-        self._form = ItemForm(folder)
+        self.form = ItemForm(folder)
         self._reason = EnterEdit()
         self._reason.setMaxLength(LONGEST_REASON)
         self._supervisor = SupervisorFields()
@@ -129,7 +129,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         horizontal_layout(
             listed, self._use, self._add, self._edit, self._retire, 1, self._close
         )
-        parts = (self._what, self._form, self._supervisor, self._fault)
+        parts = (self._what, self.form, self._supervisor, self._fault)
         panel = vertical_layout(self._panel, *parts, margins=margins)
         horizontal_layout(panel, (self._reason, 1), self._leave, self._save)
         self.setMinimumWidth(100 * GRID)
@@ -147,16 +147,11 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._close.clicked.connect(self.accept)
         self._leave.clicked.connect(self._stop_editing)
         self._save.clicked.connect(self._on_save_clicked)
-        self._form.value_edited.connect(self._refresh)
+        self.form.value_edited.connect(self._refresh)
         self._supervisor.value_edited.connect(self._refresh)
 
         self._stop_editing()
         self._retranslate()
-
-    @property
-    def form(self) -> ItemForm:
-        """In which an item is typed."""
-        return self._form
 
     @override
     def reject(self) -> None:
@@ -270,10 +265,10 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
     def _start_editing(self, item: AnyItem, what: str, *, is_new: bool) -> None:
         self._item, self._before, self._is_new = item, None if is_new else item, is_new
         self._what.setText(what)
-        self._form.set_value(item, is_new=is_new)
-        self._form.show()
+        self.form.set_value(item, is_new=is_new)
+        self.form.show()
         self._open_panel()
-        self._form.focus_first()
+        self.form.focus_first()
 
     def _open_panel(self) -> None:
         self._asked = None
@@ -288,7 +283,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
     def _stop_editing(self) -> None:
         self._item = self._asked = None
-        self._form.stop_spin()
+        self.form.stop_spin()
         self._panel.hide()
         self._list.show()
         self._refresh()
@@ -314,7 +309,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._is_new = False
         words = self.tr("Reactivate {0}") if back else self.tr("Retire {0}")
         self._what.setText(words.format(item.id))
-        self._form.hide()
+        self.form.hide()
         self._open_panel()
 
     def _on_use_clicked(self) -> None:
@@ -329,12 +324,12 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
     def _on_save_clicked(self) -> None:
         if self._item is None or not self._save.isEnabled():
             return
-        is_typed = not self._form.isHidden()
-        self._form.stop_spin()
-        item = self._form.value() if is_typed else self._item
+        is_typed = not self.form.isHidden()
+        self.form.stop_spin()
+        item = self.form.value() if is_typed else self._item
         signature = self._supervisor.value() if self._is_guarded else None
         self._fault.set_value(StatusMessage())
-        picture = self._form.picture() if is_typed else ""
+        picture = self.form.picture() if is_typed else ""
         reason = self._reason.text().strip()
         self._asked = RequestedChange(
             item, picture, self._is_new, reason, signature, self._before
@@ -363,11 +358,11 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._retire.setText(
             self.tr("Reactivate...") if is_retired else self.tr("Retire...")
         )
-        is_typed = not self._form.isHidden()
+        is_typed = not self.form.isHidden()
         missing_inputs = ""
-        if is_typed and not self._form.has_id():
+        if is_typed and not self.form.has_id():
             missing_inputs = self.tr("Enter an ID.")
-        elif is_typed and not self._form.has_day():
+        elif is_typed and not self.form.has_day():
             missing_inputs = self.tr(
                 "Enter a date such as 2026-08-14, or leave it empty."
             ).replace("2026", str(local_now().year + 1))  # what is due is to come

@@ -65,8 +65,8 @@ class ImagesRow(Translated, QWidget):
     def _retranslate(self) -> None:
         self._choose.setText(self.tr("Choose..."))
         name = self.tr("Folder, video or record of images")
-        self._place.edit().setAccessibleName(name)
-        self._place.edit().setPlaceholderText(name)
+        self._place.edit.setAccessibleName(name)
+        self._place.edit.setPlaceholderText(name)
         self._is_still.setText(self.tr("Held still"))
         self._is_still.setToolTip(
             self.tr(

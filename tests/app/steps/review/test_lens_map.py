@@ -51,7 +51,7 @@ def test_the_lens_field_is_mapped_where_the_images_support_one(qtbot: QtBot) -> 
     assert not card.isVisible()
     panel.set_value(solution_with_lens(0.15))
     assert card.isVisible()
-    plot = card.plot()
+    plot = card.plot
     assert isinstance(plot, ArrowPlot)
     assert plot.accessibleName().startswith("Lens field")
     assert len(plot.lines()[0]) > 6

@@ -1689,7 +1689,7 @@ def test_a_swing_without_a_tip_shows_its_cause_once_and_its_residuals(
     assert [tabs.isTabEnabled(i) for i in range(tabs.count())] == [
         tabs.tabText(i) == "Residuals" for i in range(tabs.count())
     ]
-    plots = [card.plot().columns() for card in failed.findChildren(PlotCard)]
+    plots = [card.plot.columns() for card in failed.findChildren(PlotCard)]
     (leds,) = (columns for columns in plots if "rms_px" in columns)
     assert (np.asarray(leds["rms_px"], dtype=float) > 0).all()
 

@@ -71,5 +71,5 @@ def test_the_panel_tells_whether_a_station_has_its_own(qtbot: QtBot) -> None:
     panel = AssumptionsPanel()
     qtbot.addWidget(panel)
     with qtbot.waitSignal(panel.value_changed):
-        field(panel.dialog(), "Scale").setValue(20.0)
+        field(panel.dialog, "Scale").setValue(20.0)
     assert panel.value() == replace(USUAL, scale=20e-6)
