@@ -147,7 +147,6 @@ class Wizard(QObject):
             self._discovery.close()
 
     def _show_subject(self) -> None:
-        """Show the current swing on every page, or the selection."""
         now, chosen = self.workbench.run.status, self.workbench.selection.preparation
         self.window.set_subject(
             subject_of(now, chosen, self.workbench.library.statuses)
@@ -302,7 +301,6 @@ def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> in
 
 
 def _end(application: QApplication, wizard: Wizard) -> None:
-    """Close the window and its dialogs after a signal."""
     wizard.window.close_unasked()
     application.exit()
 

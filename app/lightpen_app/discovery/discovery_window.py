@@ -191,7 +191,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._save.set_why_not("" if state.is_final else nothing)
 
     def _show_found(self) -> None:
-        """Show pen, camera and numbers of the last solution."""
         found, is_final = self._run.state.found, self._run.state.is_final
         self._pen.setVisible(found is not None)
         pair = _longest_pair(found)
@@ -216,7 +215,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._refresh()
 
     def _instructed(self, state: DiscoveryState) -> StatusMessage:
-        """Return the next step as text."""
         if state.progress is not None:
             words = self.tr("Computing: {0:.0%}").format(state.progress)
             return StatusMessage(words, Sign.WAIT, Tone.QUIET)

@@ -218,14 +218,12 @@ def paint_bars(painter: QPainter, plane: Plane, values: Sequence[FloatArray]) ->
 
 
 def _series_pen(series: int, color: str = "") -> QPen:
-    """Return the pen of a series: full, dashed or dotted."""
     pen = line_pen(color or SERIES[series], 9)
     pen.setStyle(DASHES[series])
     return pen
 
 
 def _paint_dot(painter: QPainter, point: QPointF, series: int) -> None:
-    """Draw a dot, a square or a triangle."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(SERIES[series]))
     half = DOT / 2

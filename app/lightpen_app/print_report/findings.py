@@ -236,7 +236,6 @@ def _halves(calibration: CalibrationRecord) -> list[tuple[str, ...]]:
 
 
 def _share_name(name: ContributionName) -> str:
-    """Return a part of the uncertainty in full."""
     return {
         ContributionName.NOISE: translate("paper", "Image noise"),
         ContributionName.CENTERS: translate("paper", "LED centres, systematic"),

@@ -91,7 +91,6 @@ def _title(calibration_file: CalibrationFile) -> Iterable[Block]:
 
 
 def _verdict(calibration_file: CalibrationFile) -> Block:
-    """Return the grade in a frame, with its reason."""
     word = grade_text(calibration_file.grade)
     lines = [worded(calibration_file.why)]
     if calibration_file.accepted is None:

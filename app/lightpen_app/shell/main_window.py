@@ -381,7 +381,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page.discovery_requested.connect(self.discovery_requested)
 
     def _make_actions(self) -> None:
-        """Create the actions with application-wide keys."""
         self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
         self._operator_action = QAction(self)
         self._operator_action.setCheckable(True)
@@ -415,7 +414,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return action
 
     def _arranged(self) -> QWidget:
-        """Return all widgets in their places."""
         central = QWidget()
         layout = grid_layout(central, spacing=0)
         layout.addWidget(self._sidebar, 0, 0, 2, 1)
@@ -426,7 +424,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     @override
     def _use_room(self) -> None:
-        """Adapt the layout around the page to the window size."""
         self._area.set_room(self._room)
         self._sidebar.set_room(self._room)
         self._action_bar.set_room(self._room)
@@ -498,7 +495,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._focus_page()
 
     def _show_options(self) -> None:
-        """Open the options above their button."""
         menu = self._options
         corner = self._sidebar.options_corner()
         menu.popup(corner - QPoint(0, menu.sizeHint().height()))

@@ -141,7 +141,6 @@ class Sidebar(Translated, QFrame):
         self._stream.set_value(remark)
 
     def _reveal_present(self) -> None:
-        """Scroll to the current step."""
         present = self._steps.present()
         if present is not None:
             self._scroll.ensureWidgetVisible(present, 0, 0)

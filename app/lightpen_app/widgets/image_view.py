@@ -351,7 +351,6 @@ def _as_qimage(pixels: Image) -> QImage:
 
 
 def _label_box(ring: QRectF, angle: float, size: QSizeF, away: float) -> QRectF:
-    """Return the position of a label beside a ring, px."""
     reach, width, height = ring.width() / 2 + away, size.width(), size.height()
     x = ring.center().x() + math.cos(angle) * (reach + width / 2)
     y = ring.center().y() + math.sin(angle) * (reach + height / 2)

@@ -171,7 +171,6 @@ class Plot(QWidget):
             self._restyle()
 
     def _named_curves(self) -> tuple[str, ...]:
-        """Return the names beside the title."""
         return ()
 
     def _fitted_title_px(self) -> int:

@@ -251,7 +251,6 @@ class PostureDial(Translated, QWidget):
         return max(BAR_SHARE * side, LEAST_BAR * self._least_letters)
 
     def _images(self, place: _Field) -> tuple[int, int]:
-        """Return the accepted and required images of a field."""
         value = self._value
         if place.ring == 0:
             return value.n_upright, value.n_upright_needed

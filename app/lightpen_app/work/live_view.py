@@ -388,7 +388,6 @@ class LiveView(QObject):
         self._notifications.notify((self, "closing"), sentence)
 
     def _show_fault(self, camera: int, error: LightpenError) -> None:
-        """Report a camera fault."""
         words = self._words_of(camera, error)
         self._notifications.notify((self, camera, WITHOUT_IMAGES), words)
 
@@ -425,8 +424,6 @@ class LiveView(QObject):
 
 @dataclass
 class _CameraState:
-    """State of a camera."""
-
     connection: Connection = Connection.CLOSED
     settings: CameraSettings | None = None
 

@@ -220,7 +220,6 @@ class Settings(QObject):
         self._write_soon()
 
     def _write_soon(self) -> None:
-        """Write pending settings, if any."""
         with self._lock:
             if self._is_writing or not self._changes:
                 return

@@ -124,7 +124,6 @@ class Streaming(QObject):
 
 
 def _what_counts(preparation: Preparation) -> tuple[object, ...]:
-    """Return the inputs of the current tip."""
     return (
         preparation.names,
         preparation.origin,

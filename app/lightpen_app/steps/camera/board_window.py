@@ -223,7 +223,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._refresh()
 
     def _list_views(self) -> None:
-        """List the views of the result and keep the selection."""
         found, chosen = self._calibration.found, self._worst.currentRow()
         self._worst.clear()
         if found is None:

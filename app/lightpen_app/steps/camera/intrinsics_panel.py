@@ -203,7 +203,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
         return StatusMessage.good(self.tr("Checked by a swing: file and camera agree."))
 
     def _fact_texts(self, camera: Camera) -> list[str]:
-        """Return the content of the file, one text for each name."""
         assert self._file is not None
         stated = camera.covariance
         u = None if stated is None else (2 * np.sqrt(np.diag(stated))).tolist()

@@ -115,7 +115,6 @@ class ArchiveControl(QObject):
     def _do(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
     ) -> None:
-        """Run one archive job at a time in the background."""
         if self._work is not None:
             return
         self._work = job = Job(function, self)

@@ -186,7 +186,6 @@ class EntryPanel(Translated, QWidget):
         )
 
     def _label_texts(self, line: Line | None) -> tuple[str, ...]:
-        """Return the words of each label."""
         if line is None:
             return (self.tr("No entry selected"), *[""] * (len(self._texts) - 1))
         if line.entry is None:

@@ -341,5 +341,4 @@ def _expanded(covariance: FloatArray) -> FloatArray:
 
 
 def _rounded(values: FloatArray) -> tuple[str, ...]:
-    """Return lengths in mm."""
     return tuple(map(mm_text, values.tolist()))

@@ -114,7 +114,6 @@ class InterruptedItem(Translated, QFrame):
         raise NotImplementedError
 
     def _retranslate(self) -> None:
-        """Set the texts in the language that is chosen."""
         words = self._words()
         self._when.setText(words.heading)
         asks = self._question.isVisibleTo(self)

@@ -119,6 +119,5 @@ class LastResultPresenter(QObject):
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:
-    """Return the key of the displayed result."""
     names = preparation.names
     return names.pen, names.tip, preparation.origin is Origin.SIMULATED

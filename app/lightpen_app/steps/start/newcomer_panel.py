@@ -102,7 +102,6 @@ class NewcomerPanel(Translated, QGroupBox):
         introduction.open()
 
     def _on_play_clicked(self) -> None:
-        """Play the demo in its own window."""
         QProcess.startDetached(*DEMO)
 
     def _retranslate(self) -> None:

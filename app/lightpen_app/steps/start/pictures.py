@@ -82,7 +82,6 @@ class Pictures(Translated, QWidget):
 
 
 def _steps() -> tuple[tuple[str, str], ...]:
-    """Return name and purpose of each step."""
     return (
         (
             translate("Introduction", "Start"),

@@ -84,7 +84,6 @@ class SoundTest(Translated, QWidget):
         self._timer.start()
 
     def _silence(self) -> str:
-        """Return why audio is unavailable; empty if it is available."""
         reason = self._sounds.why_silent()
         if reason:
             return self.tr(

@@ -56,7 +56,6 @@ class TipPicture(Translated, QLabel):
 
 
 def _scaled(read: ReadPicture, place: QSize, density: float) -> QImage:
-    """Return a picture scaled for display."""
     buffer = QBuffer()
     buffer.setData(QByteArray(read()))
     buffer.open(QIODevice.OpenModeFlag.ReadOnly)

@@ -157,7 +157,6 @@ class SwingPage(Page):
         self._show()
 
     def _missing_input(self) -> str:
-        """Return the first missing input of a swing."""
         return first_missing(self._selection.preparation.missing_inputs())
 
     def _ask_about_choices(self) -> None:
@@ -171,7 +170,6 @@ class SwingPage(Page):
             self._showing.start()
 
     def _show(self) -> None:
-        """Update page and operator view."""
         before = self._shown
         self._shown = now = self._presenter.page_state(is_away=not self._is_entered)
         self._face.set_state(now)

@@ -118,7 +118,6 @@ class SwingPlots(Translated, QWidget):
         self._uncertainty.set_axes(Axes(title))
 
     def _retranslate(self) -> None:
-        """Translate the titles."""
         self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))

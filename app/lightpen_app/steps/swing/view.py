@@ -150,7 +150,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         return self._plots.content()
 
     def _retranslate(self) -> None:
-        """Translate the texts."""
         self._image.set_message(self.tr("No image yet"))
         self._progress.setAccessibleName(self.tr("Progress"))
         self.swapped.setText(self.tr("Left and right are swapped"))

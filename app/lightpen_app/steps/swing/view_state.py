@@ -361,7 +361,6 @@ class SwingWords(QObject):
         return words.format(progress.n_read, progress.n_images)
 
     def _time_left(self, moment: SwingViewState) -> str:
-        """Return the remaining time at the present rate."""
         state, is_recording = moment.state, moment.setup.is_recording
         is_on = state.phase is Phase.CAPTURING and not is_recording
         if not is_on or not isfinite(state.kept.uncertainty):
@@ -376,7 +375,6 @@ class SwingWords(QObject):
         return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
 
     def _keys(self, moment: SwingViewState) -> str:
-        """Return the keys of the operator view."""
         if moment.is_away:
             return ""
         if moment.verdict is not None:

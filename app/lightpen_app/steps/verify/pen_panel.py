@@ -139,7 +139,6 @@ class PenPanel(Translated, QWidget):
         return now.names.pen, now.origin, now.pen_file, now.camera_file
 
     def _read(self) -> None:
-        """Read the swings of the pen again."""
         now, archive = self._selection.preparation, self._run.archive
         is_other, self._read_of = self._chosen() != self._read_of, self._chosen()
         self._unread = ""

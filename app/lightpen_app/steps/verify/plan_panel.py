@@ -184,7 +184,6 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         )
 
     def _folder(self) -> str:
-        """Return the folder of the last saved files."""
         return str(self._workbench.save_place.folder())
 
     def _on_free_clicked(self) -> None:
@@ -203,7 +202,6 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._change(lambda each: structs.replace(each, scan=scan))
 
     def _change(self, changed: Callable[[PlannedFeature], PlannedFeature]) -> None:
-        """Change the current feature in the plan."""
         plan, planned = self._plan(), self._planned()
         if plan is None or planned is None:
             return

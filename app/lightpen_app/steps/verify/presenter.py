@@ -138,7 +138,6 @@ class VerifyPresenter(QObject):
         return PARTED.join(filter(None, parts))
 
     def _purpose(self) -> str:
-        """Return the purpose of the step."""
         return self.tr("Verify the current tip on reference artefacts.")
 
     def _tip_is_doubted(self) -> bool:
@@ -214,11 +213,9 @@ class VerifyPresenter(QObject):
         return self.tr("Enter the value")
 
     def _refused(self) -> str:
-        """Return the short text for a refusal."""
         return self.tr("Nothing to verify")
 
     def _verdict(self, found: VerificationAssessment) -> str:
-        """Return the verdict in a few words."""
         if found.grade is Grade.REPEAT:
             return self.tr("Not verified")
         if found.grade is Grade.CHECK:
@@ -228,7 +225,6 @@ class VerifyPresenter(QObject):
         return self.tr("Scale and form verified")
 
     def _short(self, setup: SessionSetup, state: SessionState) -> str:
-        """Return the instruction in a few words."""
         task, touching = state.task(setup), state.touching
         if is_held(state):
             return self.tr("Hold still")

@@ -196,7 +196,6 @@ class ProbingPage(ResponsiveLayout, Page):
             self._showing.start()
 
     def _show(self) -> None:
-        """Update page and operator view."""
         before, self._view = self._view, self._presenter.view()
         view, status = self._view, self._run.status
         self._progress.set_value(view)
