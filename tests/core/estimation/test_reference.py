@@ -49,6 +49,7 @@ from lightpen.simulator.swings import (
     leds_in_camera,
     paper_camera,
     paper_pen,
+    perturbed_pen,
     seen_from,
     simulate_centers,
     swing_poses,
@@ -112,12 +113,13 @@ def restless() -> Calibration:
 
 
 def unstated() -> Calibration:
-    """Files that state no uncertainty, a warm pen, and other assumptions."""
+    """No uncertainty in files, LEDs off theirs, a warm pen, other assumptions."""
     camera = replace(CAMERA, covariance=None)
     longer = replace(camera, fx=1.002 * CAMERA.fx, fy=1.002 * CAMERA.fy)
     assumptions = replace(USUAL, temperature_c=24.0, temperature=0.3, form_error=4e-4)
-    seen = observed(swing_of(3), 0.03 * lasting(3, 0.0), longer, BARE)
-    return calibrate(longer, BARE, seen, assumptions)
+    pen = perturbed_pen(BARE, 0.03, np.random.default_rng(3))
+    seen = observed(swing_of(3), 0.03 * lasting(3, 0.0), longer, pen)
+    return calibrate(longer, pen, seen, assumptions)
 
 
 def spoilt_files() -> Calibration:

@@ -202,6 +202,7 @@ def _rig_lines(calibration: Calibration) -> list[str]:
     lines = []
     rig = calibration.bundle.state.rig
     moves = calibration.bundle.values[calibration.bundle.layout.extrinsics]
+    moves = moves.reshape(-1, 2, 3)  # turn and shift of each camera but the first
     for c, (name, images) in enumerate(
         zip(rig.names, calibration.cameras, strict=True)
     ):
@@ -215,7 +216,7 @@ def _rig_lines(calibration: Calibration) -> list[str]:
                 f"    dropped  {count} {reason}: {_named_images(images, reason)}"
             )
         if c > 0:
-            turn, shift = moves[6 * c - 6 : 6 * c - 3], moves[6 * c - 3 : 6 * c]
+            turn, shift = moves[c - 1]
             lines.append(
                 f"    stands   {np.linalg.norm(shift):.3f} mm and "
                 f"{np.degrees(np.linalg.norm(turn)):.4f} degrees off the rig file"

@@ -36,7 +36,6 @@ def join_poses(
     """
     rotations = np.full((n_moments, 3, 3), np.nan)
     translations = np.full((n_moments, 3), np.nan)
-    n_cameras = np.bincount(np.concatenate(posed), minlength=n_moments)
     information = np.zeros((n_moments, 6, 6))
     for c, (at, each) in enumerate(zip(posed, poses, strict=True)):
         R, t, covariances = poses_in_rig(
@@ -44,17 +43,13 @@ def join_poses(
         )
         new = np.isnan(translations[at, 0])
         rotations[at[new]], translations[at[new]] = R[new], t[new]
-        shared = np.flatnonzero(n_cameras[at] > 1)
-        known = np.linalg.inv(covariances[shared])
-        moments = at[shared]
-        turns = R[shared] @ np.swapaxes(rotations[moments], 1, 2)
-        off = np.concatenate(
-            [vector_from_rotation(turns), t[shared] - translations[moments]], axis=1
-        )
-        information[moments] += known
-        step = np.linalg.solve(information[moments], known @ off[..., None])[..., 0]
-        rotations[moments] = rotation_from_vector(step[:, :3]) @ rotations[moments]
-        translations[moments] += step[:, 3:]
+        known = np.linalg.inv(covariances)
+        turns = vector_from_rotation(R @ np.swapaxes(rotations[at], 1, 2))
+        off = np.concatenate([turns, t - translations[at]], axis=1)
+        information[at] += known
+        step = np.linalg.solve(information[at], known @ off[..., None])[..., 0]
+        rotations[at] = rotation_from_vector(step[:, :3]) @ rotations[at]
+        translations[at] += step[:, 3:]
     return RigPoses(rotations, translations)
 
 

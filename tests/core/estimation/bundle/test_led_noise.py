@@ -62,6 +62,24 @@ def test_leds_that_are_hardly_seen_are_taken_as_usual() -> None:
     assert noise[0, 8] > 4.0
 
 
+@pytest.mark.parametrize(("n_seen", "is_told"), [(8, False), (12, True)])
+def test_degrees_of_freedom_that_the_fit_took_tell_nothing_of_an_led(
+    n_seen: int, is_told: bool
+) -> None:
+    """Half of them: what is left of the residuals is as much smaller than the noise."""
+    sigmas = np.array([0.03] * 8 + [0.2, 0.2])
+    used = np.ones((100, 1, 10), bool)
+    used[n_seen:, :, 9] = False
+    weights = (sigmas / 0.03)[None]
+    residuals = np.sqrt(0.5) * drawn(sigmas)
+
+    noise = find_led_noise(residuals, used, 0.03, weights)
+
+    assert noise is not None
+    assert (noise[0, 9] > 2.0) == is_told
+    assert noise[0, 8] > 4.0
+
+
 def calibrated(sigmas: FloatArray, seed: int) -> tuple[Calibration, FloatArray]:
     rng = np.random.default_rng([27, seed])
     swing = swing_poses(60, rng)

@@ -11,7 +11,7 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.effect_findings import FoundEffect
-from lightpen.estimation.bundle.effects import EffectName
+from lightpen.estimation.bundle.effects import EffectName, lens_and_timing
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.uncertainty.budget import ContributionName
@@ -124,6 +124,24 @@ def test_a_late_camera_is_corrected_and_named() -> None:
     assert float(reported.split(" ms late")[0].split()[-1]) == pytest.approx(
         3.0, rel=0.05
     )
+
+
+def test_an_led_that_the_next_image_lacks_moves_as_from_the_one_before() -> None:
+    """One that both images beside lack moves as the others do on average."""
+    speeds = 10.0 + np.arange(6.0)
+    pixels = np.zeros((9, 1, 6, 2))
+    pixels[:, 0, :, 0] = np.arange(9)[:, None] * speeds
+    used = np.ones((9, 1, 6), bool)
+    used[4, 0, 0] = used[[5, 7], 0, 1] = False
+    effects = lens_and_timing(pixels, used, (CAMERA,))
+    strobe = next(each for each in effects if each.name is EffectName.STROBE)
+    order = np.arange(6) - 2.5
+
+    found = strobe.columns[:, 0, :, 0, 0] / order
+
+    np.testing.assert_allclose(found[3, 0], 10.0)
+    np.testing.assert_allclose(found[6, 1], np.delete(speeds, 1).mean())
+    assert (strobe.columns[..., 1, 0] == 0).all()
 
 
 def test_a_time_is_stated_in_ms_if_the_image_rate_is_known_with_its_sign() -> None:
