@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import platformdirs
 
-from lightpen.commands.arguments import whole_number
+from lightpen.commands.arguments import add_file, whole_number
 from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
 SAMPLE = 3  # tips that a check recomputes
@@ -92,11 +92,8 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         "password; the password is requested, or read from LIGHTPEN_PASSWORD",
     )
     for action in (check, listed, export, taken, delivered, fetched, stamped, renewed):
-        action.add_argument(
-            "--data",
-            type=Path,
-            metavar="FOLDER",
-            help="data folder (default: that of the program)",
+        add_file(
+            action, "--data", "FOLDER", "data folder (default: that of the program)"
         )
         action.set_defaults(data_folder=data_folder)
     for action in (export, taken):

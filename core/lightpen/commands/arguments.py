@@ -75,6 +75,13 @@ def number_from(
     return number_of
 
 
+def add_file(
+    parser: argparse.ArgumentParser, name: str, metavar: str, meaning: str
+) -> None:
+    """Add an option or argument that is a path."""
+    parser.add_argument(name, type=Path, metavar=metavar, help=meaning)
+
+
 def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``--camera`` and ``--pen``, both required, and the options of the pen."""
     parser.add_argument(
@@ -92,12 +99,7 @@ def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
 
 def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
     """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen."""
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
-    )
+    add_file(parser, "--camera", "FILE", "camera file: intrinsics of the camera")
     parser.add_argument(
         "--rig",
         type=Path,
@@ -208,6 +210,4 @@ def limits_by(options: argparse.Namespace) -> VerificationLimits:
 
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add where the record is written."""
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="write the record as JSON"
-    )
+    add_file(parser, "--json", "FILE", "write the record as JSON")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from lightpen.commands.arguments import above_zero, finite
+from lightpen.commands.arguments import above_zero, add_file, add_json, finite
 from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import are_same, printing, progress, shown, write_record
 from lightpen.commands.touched import touches_at
@@ -117,9 +117,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
     )
-    parser.add_argument(
-        "--camera", type=Path, metavar="FILE", help="camera file, if there is one"
-    )
+    add_file(parser, "--camera", "FILE", "camera file, if there is one")
     rough = parser.add_mutually_exclusive_group()
     rough.add_argument(
         "--pen-sketch",
@@ -132,21 +130,11 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
     )
     for name, what in (("pen", "LED file"), ("camera", "camera file")):
         suffix = "json" if name == "pen" else "yaml"
-        parser.add_argument(
-            f"--out-{name}",
-            type=Path,
-            metavar=f"FILE.{suffix}",
-            help=f"write the {what}",
-        )
-    parser.add_argument(
-        "--picture",
-        type=Path,
-        metavar="FILE.png",
-        help="draw the pen with the numbers of its LEDs",
+        add_file(parser, f"--out-{name}", f"FILE.{suffix}", f"write the {what}")
+    add_file(
+        parser, "--picture", "FILE.png", "draw the pen with the numbers of its LEDs"
     )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="write the record as JSON"
-    )
+    add_json(parser)
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -17,20 +17,12 @@ from lightpen.commands.touched import add_touch_inputs, measure_runs
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.file_format import FileFormat
 from lightpen.formats.files import write_whole
-from lightpen.formats.hashes import hashed
-from lightpen.formats.json_records import file_entry
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.plan import Plan, read_plan
-from lightpen.verification.probing.drift_reference import (
-    judged_with,
-    lamp_drift_entries,
-)
-from lightpen.verification.reports.records import verification_record
+from lightpen.verification.probing.drift_reference import judged_with
 from lightpen.verification.reports.summaries import found_text
-from lightpen.verification.storage.verification_files import camera_serials
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.probed_point import rejected_entries
 from lightpen.verification.tasks.task import BALL_OPTION
 
 
@@ -103,19 +95,8 @@ def _measure(given: argparse.Namespace) -> int:
     tables = PART.tables(found, conditions)
     rule = PART.rule_of(options, conditions.limits)
     print(shown(found_text(tables, judged, measured.rejected, rule)))
-    record = verification_record(
-        PART.kind,
-        {
-            "camera_serials": camera_serials(measured.instrument),
-            **PART.entries(found, measured.instrument),
-            "rejected": rejected_entries(measured.rejected),
-            "witness": lamp_drift_entries(measured.lamp_drift),
-        },
-        judged,
-        {},
-        {"plan": file_entry(hashed(given.plan)), **measured.input_entries(given)},
-        rule,
-    )
+    entries = PART.entries(found, measured.instrument)
+    record = measured.record(given, PART.kind, entries, judged, rule)
     for path, export in exports.items():
         write_whole(path, export.encoded(found.part))
     keep_record(given, record, measured.calibration, measured.origin)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightpen.commands.arguments import add_pen_options
+from lightpen.commands.arguments import add_file, add_pen_options
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.pen_files import read_raw_pen, write_pen
@@ -12,9 +12,7 @@ from lightpen.formats.pen_files import read_raw_pen, write_pen
 def add_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen pen``."""
     parser.set_defaults(run=_pen)
-    parser.add_argument(
-        "raw", type=Path, metavar="RAW.csv", help="LED coordinates as measured"
-    )
+    add_file(parser, "raw", "RAW.csv", "LED coordinates as measured")
     parser.add_argument("out", type=Path, metavar="OUT.csv", help="LED file to write")
     add_pen_options(parser)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from lightpen.commands.arguments import (
     add_camera_and_pen,
     add_exit_by_verdict,
+    add_file,
     add_json,
 )
 from lightpen.commands.console import (
@@ -60,11 +61,8 @@ def add_improve_pen(parser: argparse.ArgumentParser) -> None:
         metavar="NEW.json",
         help="new LED file to write",
     )
-    parser.add_argument(
-        "--out-camera",
-        type=Path,
-        metavar="NEW.yaml",
-        help="camera file by the same swings to write",
+    add_file(
+        parser, "--out-camera", "NEW.yaml", "camera file by the same swings to write"
     )
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightpen.commands.arguments import add_exit_by_verdict, add_json
+from lightpen.commands.arguments import add_exit_by_verdict, add_file, add_json
 from lightpen.commands.console import (
     printing,
     require_other_file,
@@ -25,9 +25,7 @@ from lightpen.verification.reports.summaries import press_test_text
 def add_verify_press(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify press``."""
     parser.set_defaults(run=_verify_press)
-    parser.add_argument(
-        "usual", type=Path, metavar="USUAL.json", help="calibration with usual pressure"
-    )
+    add_file(parser, "usual", "USUAL.json", "calibration with usual pressure")
     parser.add_argument(
         "firm",
         type=Path,

@@ -9,6 +9,7 @@ import numpy as np
 
 from lightpen.commands.arguments import (
     above_zero,
+    add_file,
     add_json,
     add_pen_options,
     add_verdict,
@@ -56,12 +57,8 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT",
         help="calibrations of one tip: RESULT.json, or LED centres as FILE.csv",
     )
-    parser.add_argument(
-        "--camera", type=Path, metavar="FILE", help="camera file for LED centres"
-    )
-    parser.add_argument(
-        "--pen", type=Path, metavar="FILE", help="LED file for LED centres"
-    )
+    add_file(parser, "--camera", "FILE", "camera file for LED centres")
+    add_file(parser, "--pen", "FILE", "LED file for LED centres")
     add_pen_options(parser)
     parser.add_argument(
         "--method",
@@ -98,9 +95,7 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help=f"limit of the standard deviation of a coordinate ({usual:g})",
     )
-    parser.add_argument(
-        "--chart", type=Path, metavar="FILE", help="control chart, .csv or .svg"
-    )
+    add_file(parser, "--chart", "FILE", "control chart, .csv or .svg")
     add_verdict(parser)
     add_json(parser)
     add_entering(parser)

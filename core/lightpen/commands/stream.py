@@ -20,7 +20,12 @@ from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, source_named
 from lightpen.cameras.worker import CameraWorker
 from lightpen.cameras.worker_events import Failed, FaultRaised, WorkerEvent
-from lightpen.commands.arguments import above_zero, add_pen_options, whole_number
+from lightpen.commands.arguments import (
+    above_zero,
+    add_file,
+    add_pen_options,
+    whole_number,
+)
 from lightpen.commands.console import lacking, printing, shown
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.region_of_interest import RegionOfInterest
@@ -65,12 +70,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--producer", default="", metavar="FILE", help="GenTL producer of a camera"
     )
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        metavar="FILE",
-        help="camera file: intrinsics of the camera",
-    )
+    add_file(parser, "--camera", "FILE", "camera file: intrinsics of the camera")
     parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(

@@ -7,7 +7,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from lightpen.commands.archive import DataFolder, parse_date
-from lightpen.commands.arguments import add_camera_and_pen, finite, whole_number
+from lightpen.commands.arguments import (
+    add_camera_and_pen,
+    add_file,
+    finite,
+    whole_number,
+)
 
 T = TypeVar("T")
 
@@ -38,11 +43,8 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         "cone",
     )
     for action in (listed, added, changed, retired, returned, shared, spun):
-        action.add_argument(
-            "--data",
-            type=Path,
-            metavar="FOLDER",
-            help="data folder (default: that of the program)",
+        add_file(
+            action, "--data", "FOLDER", "data folder (default: that of the program)"
         )
         action.add_argument("--json", action="store_true", help="print JSON")
         action.set_defaults(data_folder=data_folder)

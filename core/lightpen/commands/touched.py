@@ -1,7 +1,7 @@
 """Probed points for a command: camera, pen and tip by files, then images or centres."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.commands.arguments import add_cameras_and_pen, limits_by
+from lightpen.commands.arguments import add_cameras_and_pen, chosen_limits, limits_by
 from lightpen.commands.console import lacking, progress, require_other_file
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
@@ -18,12 +18,13 @@ from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
+from lightpen.messages import Message
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.recorded_tasks import read_drift
 from lightpen.verification.probing.current_tip import cone_before
-from lightpen.verification.probing.drift_reference import LampDrift
+from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
 from lightpen.verification.probing.image_locations import (
     ImageLocation,
     PenCameras,
@@ -45,11 +46,17 @@ from lightpen.verification.probing.sources import (
     observe_place,
     touches_of,
 )
-from lightpen.verification.storage.verification_files import viewer_entries
+from lightpen.verification.reports.records import verification_record
+from lightpen.verification.storage.verification_files import (
+    camera_serials,
+    viewer_entries,
+)
+from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import (
     NO_DRIFT,
     ProbedPoint,
     RejectedFrame,
+    rejected_entries,
 )
 from lightpen.verification.tasks.task import Conditions
 
@@ -116,10 +123,35 @@ class MeasuredRuns:
         own = {each.sha256 for each in self.calibration.calibration.inputs.observations}
         return sum(each.sha256 in own for each in self.hashed_files)
 
-    def input_entries(self, options: argparse.Namespace) -> dict[str, Any]:
-        """Return the files that were read, for a record."""
+    def record(
+        self,
+        options: argparse.Namespace,
+        kind: str,
+        entries: Mapping[str, Any],
+        assessment: VerificationAssessment | None,
+        rule: Message,
+    ) -> dict[str, Any]:
+        """Return the record of what was measured."""
+        return verification_record(
+            kind,
+            {
+                "camera_serials": camera_serials(self.instrument),
+                **entries,
+                "rejected": rejected_entries(self.rejected),
+                "witness": lamp_drift_entries(self.lamp_drift),
+            },
+            assessment,
+            chosen_limits(options),
+            self._input_entries(options),
+            rule,
+        )
+
+    def _input_entries(self, options: argparse.Namespace) -> dict[str, Any]:
+        """Return the files that were read."""
         drift: Path | None = getattr(options, "drift", None)
+        plan: Path | None = getattr(options, "plan", None)
         return {
+            **({} if plan is None else {"plan": file_entry(hashed(plan))}),
             "tip": file_entry(hashed(options.tip)),
             **viewer_entries(self.viewers),
             "pen": file_entry(hashed(self.pen_file)),

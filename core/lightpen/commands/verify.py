@@ -1,10 +1,9 @@
 """``lightpen verify``: verify a tip on reference artefacts."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from lightpen.commands.arguments import (
     add_json,
     add_limits,
     add_verdict,
-    chosen_limits,
     finite,
     not_negative,
 )
@@ -27,16 +25,9 @@ from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.messages import message
 from lightpen.model.limits import rule_in_words
-from lightpen.verification.probing.drift_reference import (
-    judged_with,
-    lamp_drift_entries,
-)
-from lightpen.verification.reports.records import verification_record
+from lightpen.verification.probing.drift_reference import judged_with
 from lightpen.verification.reports.summaries import found_text, touches_text
-from lightpen.verification.storage.verification_files import (
-    camera_serials,
-    conditions_entries,
-)
+from lightpen.verification.storage.verification_files import conditions_entries
 from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
     VerificationAssessment,
@@ -46,7 +37,6 @@ from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
     on_surface,
     point_entries,
-    rejected_entries,
 )
 from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen.verification.tasks.task import (
@@ -192,7 +182,7 @@ def _verify_task(given: argparse.Namespace) -> int:
     print(shown(found_text(tables, judged, measured.rejected, rule)))
     _print_lamp_drift(measured, judged)
     entries = task.entries(found, measured.instrument)
-    record = _record(given, measured, task.kind, entries, judged)
+    record = measured.record(given, task.kind, entries, judged, rule)
     keep_record(given, record, measured.calibration, measured.origin)
     return verdict_status(given, judged.grade)
 
@@ -242,7 +232,9 @@ def _touches(options: argparse.Namespace) -> None:
             **conditions_entries(options.pen_temperature, options.humidity),
             "touches": point_entries(touches, instrument),
         }
-        write_record(options.json, _record(options, measured, "touches", entries, None))
+        rule = rule_in_words(measured.conditions.limits)
+        record = measured.record(options, "touches", entries, None, rule)
+        write_record(options.json, record)
 
 
 def _on_surface(touch: ProbedPoint, radius: float) -> ProbedPoint:
@@ -267,25 +259,3 @@ def _print_lamp_drift(
     drift = None if measured.lamp_drift is None else measured.lamp_drift.assessment
     if drift is not None and drift is not judged:
         print(shown(str(drift.reason)))
-
-
-def _record(
-    options: argparse.Namespace,
-    measured: MeasuredRuns,
-    kind: str,
-    entries: Mapping[str, Any],
-    assessment: VerificationAssessment | None,
-) -> dict[str, Any]:
-    return verification_record(
-        kind,
-        {
-            "camera_serials": camera_serials(measured.instrument),
-            **entries,
-            "rejected": rejected_entries(measured.rejected),
-            "witness": lamp_drift_entries(measured.lamp_drift),
-        },
-        assessment,
-        chosen_limits(options),
-        measured.input_entries(options),
-        rule_in_words(measured.conditions.limits),
-    )
