@@ -156,7 +156,8 @@ def _discover(options: argparse.Namespace) -> None:
     if not lengths and separation is None and options.out_pen is not None:
         raise UsageError("discover.no-length")
     camera = None if options.camera is None else read_camera(options.camera)
-    sketch = _sketch(options.pen_sketch or options.pen)
+    rough = options.pen_sketch or options.pen
+    sketch = None if rough is None else read_unchecked_pen(rough, "mm")
     _check_outputs(options)
     places = _places(options)
     has_cone = options.second_cone is not None
@@ -229,10 +230,6 @@ def _length(words: Sequence[str], sigma: float) -> MeasuredLength:
     except (ValueError, argparse.ArgumentTypeError):
         pass
     raise UsageError("cli.discover-length-words", words=" ".join(words))
-
-
-def _sketch(path: Path | None) -> Pen | None:
-    return None if path is None else read_unchecked_pen(path, "mm")
 
 
 def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:

@@ -11,7 +11,6 @@ from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     EndOfImages,
-    Frame,
     FrameTimeout,
     ImageCamera,
 )
@@ -33,7 +32,6 @@ from lightpen.errors import LightpenError, UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.model.camera import Camera
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.swings.names import Names
@@ -204,7 +202,14 @@ def _play(listened: _Listened, stream: PoseStream) -> None:
             with suppress(FrameTimeout):
                 frame = worker.next_frame(LONGEST_WAIT)
                 if not camera.fits(frame.image):
-                    raise _another_size(frame, camera)
+                    height, width = frame.image.shape
+                    raise UsageError(
+                        "stream.another-size",
+                        width=width,
+                        height=height,
+                        its_width=camera.width,
+                        its_height=camera.height,
+                    )
                 before = detect_pen(
                     frame.image, camera, pen, mask, before, frame.full_scale
                 )
@@ -214,14 +219,3 @@ def _play(listened: _Listened, stream: PoseStream) -> None:
             raise failures[-1] from None
     finally:
         worker.stop()
-
-
-def _another_size(frame: Frame, camera: Camera) -> UsageError:
-    height, width = frame.image.shape
-    return UsageError(
-        "stream.another-size",
-        width=width,
-        height=height,
-        its_width=camera.width,
-        its_height=camera.height,
-    )

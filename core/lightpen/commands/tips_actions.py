@@ -4,7 +4,6 @@ import argparse
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -265,7 +264,9 @@ def _record(item: AnyItem, found: StationStatus) -> dict[str, Any]:
         entries["in_force"] = [
             {
                 "pen": pen,
-                "calibrated": _moment(found.in_force[pen, item.id].calibrated),
+                "calibrated": found.in_force[pen, item.id].calibrated.isoformat(
+                    timespec="seconds"
+                ),
                 "due": str(found.due(pen, item.id)),
                 "standing": found.of_tip(pen, item.id),
             }
@@ -286,10 +287,6 @@ def _line(record: dict[str, Any]) -> str:
     if record["due"] is not None:
         words.append(f"by {record['due']}")
     return "  ".join(filter(None, [*words, record["note"]]))
-
-
-def _moment(moment: datetime) -> str:
-    return moment.isoformat(timespec="seconds")
 
 
 def _degrees(angle: float) -> str:

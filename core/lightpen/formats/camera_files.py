@@ -257,7 +257,8 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
     if entries.has(*_COVARIANCE):
         stated = entries.counted((4 + given) ** 2, *_COVARIANCE)
         stated = stated.reshape(4 + given, 4 + given)
-        _check_covariance(stated, entries.name)
+        if not is_covariance(stated):
+            raise FileError("camera-file.covariance", name=entries.name)
     elif entries.has(*_DEVIATIONS):
         deviations = entries.numbers(*_DEVIATIONS)
         if len(deviations) < 4 + given or np.any(deviations < 0):
@@ -276,11 +277,6 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
     shared = 4 + min(given, kept)
     covariance[:shared, :shared] = stated[:shared, :shared]
     return covariance
-
-
-def _check_covariance(covariance: FloatArray, name: str | Message) -> None:
-    if not is_covariance(covariance):
-        raise FileError("camera-file.covariance", name=name)
 
 
 def _day(entries: Entries) -> date | None:

@@ -1,8 +1,10 @@
 """The files opened at a station: their paths and contents."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
 from lightpen.errors import LightpenError
 from lightpen.formats.camera_files import read_camera
@@ -13,6 +15,8 @@ from lightpen.formats.simulated_files import is_simulated
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +75,15 @@ def open_files(
 
     ``units`` are those of a pen file that states none.
     """
-    camera_file, pen_file, rig_file, faults = None, None, None, []
-    try:
-        camera_file = None if camera_path is None else CameraFile.read(camera_path)
-    except LightpenError as error:
-        faults.append(error.message)
-    try:
-        pen_file = None if pen_path is None else PenFile.read(pen_path, units)
-    except LightpenError as error:
-        faults.append(error.message)
-    try:
-        rig_file = None if rig_path is None else read_rig(rig_path)
-    except LightpenError as error:
-        faults.append(error.message)
-    return OpenedFiles(camera_file, pen_file, rig_file, tuple(faults))
+    faults: list[Message] = []
+
+    def opened(read: Callable[[Path], T], path: Path | None) -> T | None:
+        try:
+            return None if path is None else read(path)
+        except LightpenError as error:
+            faults.append(error.message)
+            return None
+
+    camera_file = opened(CameraFile.read, camera_path)
+    pen_file = opened(partial(PenFile.read, units=units), pen_path)
+    return OpenedFiles(camera_file, pen_file, opened(read_rig, rig_path), tuple(faults))

@@ -88,17 +88,19 @@ def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     names = _names(listed, name)
     files = tuple(camera_files) or _camera_files(listed, names, path)
     if len(files) != len(listed):
-        raise _other_number(name, len(listed), len(files))
+        n_cameras, n_files = len(listed), len(files)
+        raise FileError(
+            "rig-file.other-number", name=name, n_cameras=n_cameras, n_files=n_files
+        )
     cameras = tuple(_read_of(name, names[c], file) for c, file in enumerate(files))
     _require_reference(listed[0], names[0], name)
-    places = [_place(each) for each in listed[1:]]
     return RigFile(
         path,
         files,
         Rig(
             cameras=cameras,
-            rotations=np.stack([np.eye(3), *(R for R, _ in places)]),
-            translations=np.stack([np.zeros(3), *(t for _, t in places)]),
+            rotations=np.stack([np.eye(3), *map(_rotation, listed[1:])]),
+            translations=np.stack([np.zeros(3), *map(_translation, listed[1:])]),
             covariance=_covariance(listed[1:], names[1:], name),
             names=names,
         ),
@@ -154,12 +156,6 @@ def _text(entries: Entries, key: str) -> str:
     return text
 
 
-def _other_number(name: str, n_cameras: int, n_files: int) -> FileError:
-    return FileError(
-        "rig-file.other-number", name=name, n_cameras=n_cameras, n_files=n_files
-    )
-
-
 def _camera_files(
     listed: list[Entries], names: tuple[str, ...], path: Path
 ) -> tuple[Path, ...]:
@@ -198,10 +194,6 @@ def _require_reference(entries: Entries, camera: str, name: str) -> None:
             place=entries.name,
             key=entries.entry(*_UNCERTAINTIES)[0],
         )
-
-
-def _place(entries: Entries) -> tuple[FloatArray, FloatArray]:
-    return _rotation(entries), _translation(entries)
 
 
 def _rotation(entries: Entries) -> FloatArray:

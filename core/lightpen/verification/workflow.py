@@ -125,7 +125,11 @@ class VerificationWorkflow:
         """Set the choices; while an operator is present, the tip is read again."""
         before, self._preparation = self._preparation, preparation
         self._choose_how(choices)
-        is_other = before is None or not _verifies_like(before, preparation)
+        is_other = (
+            before is None
+            or not before.swings_like(preparation)
+            or before.source != preparation.source
+        )
         status = self._status
         has_none = status.tip is None and status.refusal is None and not status.reading
         if status.is_here and (is_other or has_none):
@@ -526,7 +530,3 @@ class VerificationWorkflow:
         self._status = status
         self._note_under_way()
         self._listener.on_verification(status, events)
-
-
-def _verifies_like(one: Preparation, other: Preparation) -> bool:
-    return one.swings_like(other) and one.source == other.source

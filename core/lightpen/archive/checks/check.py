@@ -155,7 +155,11 @@ def _walked(
             if entry is None:
                 yield _changed(head.chain, row.number)
             elif previous not in ("", entry.entry.previous):
-                yield _unchained(head.chain, row.number)
+                yield message(
+                    "archive.entry-unchained",
+                    number=row.number,
+                    chain=head.chain[:SHORT],
+                )
             else:
                 sound.append(entry)
                 unsigned = keys.finding(entry)
@@ -242,10 +246,6 @@ def _entries_of(database: Database, record: str) -> tuple[Message, ...]:
 
 def _changed(chain: str, number: int) -> Message:
     return message("archive.entry-changed", number=number, chain=chain[:SHORT])
-
-
-def _unchained(chain: str, number: int) -> Message:
-    return message("archive.entry-unchained", number=number, chain=chain[:SHORT])
 
 
 def _missing(chain: str, first: int, last: int) -> Message:

@@ -1,6 +1,5 @@
 """The history of the archive: one line for each entry, with its later events."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -106,14 +105,9 @@ def known_names(database: Database) -> KnownNames:
     columns = (ENTRIES.c.pen, ENTRIES.c.tip)
     with database.reading() as connection:
         tips = connection.execute(select(*columns).distinct()).all()
-        stations = connection.execute(select(ENTRIES.c.station).distinct()).scalars()
-        return KnownNames(
-            tuple(sorted((row.pen, row.tip) for row in tips)), _sorted(stations)
-        )
-
-
-def _sorted(names: Iterable[str]) -> tuple[str, ...]:
-    return tuple(sorted(filter(None, names)))
+        found = connection.execute(select(ENTRIES.c.station).distinct()).scalars()
+        stations = tuple(sorted(filter(None, found)))
+        return KnownNames(tuple(sorted((row.pen, row.tip) for row in tips)), stations)
 
 
 def _line(row: Row[Any]) -> Line:

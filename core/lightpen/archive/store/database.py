@@ -223,17 +223,13 @@ def known_version(database: Database) -> str | None:
         with database.reading() as connection:
             found = _found_version(connection)
             if found is None and inspect(connection).get_table_names():
-                raise _of_other_program(database.name)
-        if found is not None and not _is_known(found):
-            raise _of_later_version(database.name)
+                raise ArchiveError("archive.of-other-program", name=database.name)
+        if found and not (found.isdecimal() and int(found) <= int(VERSION)):
+            raise ArchiveError("archive.later-version", name=database.name)
     except ArchiveError:
         database.close()
         raise
     return found
-
-
-def _is_known(version: str) -> bool:
-    return version.isdecimal() and int(version) <= int(VERSION)
 
 
 def update_tables(database: Database) -> Database:
@@ -323,7 +319,9 @@ def _converting_errors(name: str) -> Iterator[None]:
     except SQLAlchemyError as error:
         cause = getattr(error, "orig", None)
         if getattr(cause, "sqlite_errorname", "").startswith("SQLITE_BUSY"):
-            raise _busy(name) from error
+            raise ArchiveError(
+                "archive.busy", name=name, seconds=LONGEST_WAIT_S
+            ) from error
         raise _unusable(name, _reason(error)) from error
     except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
         raise _unusable(name, MALFORMED) from error
@@ -337,15 +335,3 @@ def _reason(error: SQLAlchemyError) -> str:
 
 def _unusable(name: str, reason: str) -> ArchiveError:
     return ArchiveError("archive.unusable", name=name, reason=reason)
-
-
-def _busy(name: str) -> ArchiveError:
-    return ArchiveError("archive.busy", name=name, seconds=LONGEST_WAIT_S)
-
-
-def _of_other_program(name: str) -> ArchiveError:
-    return ArchiveError("archive.of-other-program", name=name)
-
-
-def _of_later_version(name: str) -> ArchiveError:
-    return ArchiveError("archive.later-version", name=name)

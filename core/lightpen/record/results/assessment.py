@@ -64,7 +64,8 @@ def assess(
         library = archive.library()
         listed = library.tips.get(names.tip)
         limit = None if listed is None else listed.max_change_mm
-        last = _last(archive, names, origin)
+        is_simulated = origin is Origin.SIMULATED
+        last = archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
     except (FileError, AcceptanceError) as error:
         unknown = error.message
     verdict = judge(solution.calibration, limits)
@@ -73,7 +74,12 @@ def assess(
     change, doubt = None, None
     if last is not None:
         date = f"{local_time(last.accepted):%Y-%m-%d}"
-        change = _change(solution, last)
+        change = change_since(
+            solution.calibration.joint.tip_pen,
+            solution.calibration.budget.expanded_uncertainty[:3],
+            last.tip_pen,
+            last.uncertainty,
+        )
         doubt = change_doubt(change, date, limit)
         verdict = judge_change(verdict, change, date, limit)
     all_doubts = chain(
@@ -98,21 +104,6 @@ def _limits_in_force(
     chosen = StationLimits(swing=recorded)
     now = archive.supervision().limits_at(names.station, chosen).swing
     return replace(now, spacing=recorded.spacing, min_per_field=recorded.min_per_field)
-
-
-def _last(archive: FolderArchive, names: Names, origin: Origin | None) -> Result | None:
-    is_simulated = origin is Origin.SIMULATED
-    return archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
-
-
-def _change(solution: Solution, last: Result) -> Change:
-    calibration = solution.calibration
-    return change_since(
-        calibration.joint.tip_pen,
-        calibration.budget.expanded_uncertainty[:3],
-        last.tip_pen,
-        last.uncertainty,
-    )
 
 
 def overdue_items(library: Library, names: Names, day: date) -> Iterator[Message]:

@@ -267,7 +267,8 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
         parse_checked(head, ResultHeading)
         whole = parse_own_json(data, dict[str, Any])
         entries = in_shape(upgraded(whole, RESULT), _Whole)
-        _require_digest(data[len(head) - 1 :], entries.calibration_sha256)
+        if sha256(data[len(head) - 1 :]).hexdigest() != entries.calibration_sha256:
+            raise DamagedError("The checksum of the calibration is another one.")
         return Result(
             names=Names(
                 station=entries.station,
@@ -300,11 +301,6 @@ def head_of(data: bytes) -> bytes:
     """Return the beginning of the file, before the calibration, as JSON."""
     head, found, _ = data.partition(CALIBRATION)
     return head + b"}" if found else data
-
-
-def _require_digest(rest: bytes, digest: str | None) -> None:
-    if sha256(rest).hexdigest() != digest:
-        raise DamagedError("The checksum of the calibration is another one.")
 
 
 def _damaged(file: Path) -> FileError:

@@ -154,7 +154,10 @@ def read_header(folder: Path) -> Header:
     try:
         header = parse_upgraded(data, Header, SWING)
     except LaterFormatError as error:
-        raise _of_later_version(path, error.number) from error
+        known = newest_format(SWING)
+        raise FileError(
+            "record.later-version", path=path, number=error.number, known=known
+        ) from error
     except DamagedError as error:
         raise damaged_file(path) from error
     for name, copy in header_copies(header).items():
@@ -188,12 +191,6 @@ def camera_stem(c: int) -> str:
 def damaged_file(path: Path) -> FileError:
     """Return the error of a file of a record, other than an image or a copy."""
     return FileError("record.damaged", path=path)
-
-
-def _of_later_version(path: Path, number: int) -> FileError:
-    return FileError(
-        "record.later-version", path=path, number=number, known=newest_format(SWING)
-    )
 
 
 def limits_in(settings: Mapping[str, Plain]) -> SwingLimits:

@@ -20,7 +20,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
-from lightpen.messages import Message, message
+from lightpen.messages import message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
 from lightpen.model.rigid import skew
@@ -196,14 +196,11 @@ def _assessment(
         # The most significant of several changes is larger by chance.
         chance = normal_quantile(BY_CHANCE / (2 * n_growths)) / COVERAGE_FACTOR
         if abs(growth.relative) > max(GROWN, chance * growth.uncertainty):
-            return check(_grown(growth), MEASURE_LENGTH)
+            grown = message(
+                "pen-health.grown",
+                growth=1e6 * growth.relative,
+                uncertainty=1e6 * growth.uncertainty,
+                kelvin=growth.relative / ALUMINIUM,
+            )
+            return check(grown, MEASURE_LENGTH)
     return accepted(message("pen-health.good", n_swings=len(swings)), KEEP_FILE)
-
-
-def _grown(growth: Growth) -> Message:
-    return message(
-        "pen-health.grown",
-        growth=1e6 * growth.relative,
-        uncertainty=1e6 * growth.uncertainty,
-        kelvin=growth.relative / ALUMINIUM,
-    )

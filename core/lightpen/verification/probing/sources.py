@@ -148,7 +148,12 @@ def observe_place(
     """Find and label the LEDs in the images of each camera; see `touch_run`."""
     rig, pen = instrument.rig, instrument.pen
     if len(place.images) != rig.n_cameras:
-        raise _other_number(place, rig)
+        raise UsageError(
+            "verification.other-number-of-cameras",
+            place=printable(place.name),
+            n_given=len(place.images),
+            n_cameras=rig.n_cameras,
+        )
     if rig.n_cameras == 1:
         images, mask = place.images[0], place.masks[0]
         return (observe_images(images, instrument.camera, pen, mask=mask),)
@@ -259,15 +264,6 @@ def _detection(camera: Camera, pen: Pen, seen: Observations, i: int) -> PenDetec
         return unseen(pen, seen.reasons[i])
     return detect_from_centers(
         camera, pen, seen.pixels[i], seen.rotations[i], seen.translations[i]
-    )
-
-
-def _other_number(place: ImageLocation, rig: Rig) -> UsageError:
-    return UsageError(
-        "verification.other-number-of-cameras",
-        place=printable(place.name),
-        n_given=len(place.images),
-        n_cameras=rig.n_cameras,
     )
 
 

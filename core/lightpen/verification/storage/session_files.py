@@ -55,63 +55,6 @@ class PendingRecord:
     supervisor: SigningKey | None = None
 
 
-class SessionRecords:
-    """Writes the records of one session after another."""
-
-    def __init__(self, data: Path) -> None:
-        self._data = data
-        self._files: list[Path] = []
-        self._waiting: list[tuple[PendingRecord, list[Path]]] = []
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """The written files of the current session."""
-        return tuple(self._files)
-
-    @property
-    def are_waiting(self) -> bool:
-        """Whether some could not be written yet."""
-        return bool(self._waiting)
-
-    @property
-    def waiting(self) -> tuple[str, ...]:
-        """The tasks of the current session whose records are not written yet."""
-        return tuple(
-            kept.task.kind
-            for kept, files in self._waiting
-            if files is self._files and kept.task is not None
-        )
-
-    def begin(self, files: tuple[Path, ...] = ()) -> None:
-        """Begin another session with files already written."""
-        self._files = list(files)
-
-    def add(self, kept: PendingRecord) -> None:
-        """Queue a record of the current session for the next `write`."""
-        self._waiting.append((kept, self._files))
-
-    def write(self) -> None:
-        """Write all queued records; what cannot be written stays pending."""
-        while self._waiting:
-            kept, files = self._waiting[0]
-            self._write(kept, files)
-            self._waiting.pop(0)
-
-    def write_now(self, kept: PendingRecord) -> None:
-        """Write a record of the current session, or nothing."""
-        self._write(kept, self._files)
-
-    def _write(self, kept: PendingRecord, files: list[Path]) -> None:
-        record = kept.record_of(all_hashed(files))
-        file = keep_verification(
-            self._data, record, kept.supervisor, is_simulated=kept.is_simulated
-        )
-        files.append(file)
-        _logger.info("verification written: %s", files[-1])
-        if kept.ends is not None:
-            kept.ends.conclude()
-
-
 def concluding(
     tip: CurrentTip, conclusion: Conclusion, ends: CheckpointFile | None
 ) -> PendingRecord:
@@ -138,7 +81,8 @@ class SessionKeeping:
         self._data = data
         self._now = now
         self.images = PointImages(new_record)
-        self._records = SessionRecords(data)
+        self._files: list[Path] = []  # of the current session
+        self._waiting: list[tuple[PendingRecord, list[Path]]] = []  # with its files
         self._unkept: tuple[CompletedTask, ...] = ()  # whose drift is not known yet
         self._read: tuple[ReadImages, ...] = ()
         self._done: dict[str, CompletedTask] = {}
@@ -147,12 +91,12 @@ class SessionKeeping:
     @property
     def files(self) -> tuple[Path, ...]:
         """The written files of the current session."""
-        return self._records.files
+        return tuple(self._files)
 
     @property
     def is_behind(self) -> bool:
         """Whether something could not be written yet."""
-        return self._records.are_waiting
+        return bool(self._waiting)
 
     def has_read(self, task: AnyTask) -> bool:
         """Return whether a task that is done was done with recorded images."""
@@ -222,11 +166,11 @@ class SessionKeeping:
         tip, began = status.tip, status.began
         if tip is not None and began is not None:
             conclusion = Conclusion(outcome, began, self._now(), status.assessment)
-            self._records.add(concluding(tip, conclusion, self._file))
+            self._queue(concluding(tip, conclusion, self._file))
 
     def accept(self, tip: CurrentTip, conclusion: Conclusion) -> None:
         """Write the acceptance of a tip despite findings."""
-        self._records.write_now(concluding(tip, conclusion, None))
+        self._write(concluding(tip, conclusion, None), self._files)
 
     def give_up(self, status: VerificationStatus) -> None:
         """Conclude an incomplete session, as another begins."""
@@ -239,13 +183,15 @@ class SessionKeeping:
 
     def begin(self) -> None:
         """Begin another session."""
-        self._records.begin()
+        self._files = []
         self._unkept, self._read, self._file = (), (), None
         self._done = {}
 
     def write(self) -> None:
         """Write pending records; what cannot be written stays pending."""
-        self._records.write()
+        while self._waiting:
+            self._write(*self._waiting[0])
+            self._waiting.pop(0)
 
     def note(self, status: VerificationStatus) -> None:
         """Write the checkpoint from which the verification can be resumed."""
@@ -259,6 +205,11 @@ class SessionKeeping:
             path = under_way_path(self.root(tip), tip.names, status.began)
             self._file = CheckpointFile(path)
         unkept = (done.task.kind for done in self._unkept)
+        queued = (
+            kept.task.kind
+            for kept, files in self._waiting
+            if files is self._files and kept.task is not None
+        )
         self._file.note(
             VerificationCheckpoint(
                 began=status.began,
@@ -271,8 +222,8 @@ class SessionKeeping:
                 choices=setup.choices,
                 runs=runs,
                 read=self._read,
-                files=tuple(file.name for file in self._records.files),
-                unwritten=(*unkept, *self._records.waiting),
+                files=tuple(file.name for file in self._files),
+                unwritten=(*unkept, *queued),
             )
         )
 
@@ -288,7 +239,7 @@ class SessionKeeping:
             file.let_go()
             raise
         self._file, self._read = file, under_way.read
-        self._records.begin(before.files)
+        self._files = list(before.files)
         read = {done.task.kind: done for done in before.read}
         for kind in before.state.found:
             done = read.get(kind) or self._live_task(
@@ -312,4 +263,18 @@ class SessionKeeping:
             done.images,
         )
         is_simulated = Origin.SIMULATED in (done.tip.origin, done.images.origin)
-        self._records.add(PendingRecord(lambda _: record, is_simulated, done.task))
+        self._queue(PendingRecord(lambda _: record, is_simulated, done.task))
+
+    def _queue(self, kept: PendingRecord) -> None:
+        self._waiting.append((kept, self._files))
+
+    def _write(self, kept: PendingRecord, files: list[Path]) -> None:
+        """Write a record, after the files of its session before it."""
+        record = kept.record_of(all_hashed(files))
+        file = keep_verification(
+            self._data, record, kept.supervisor, is_simulated=kept.is_simulated
+        )
+        files.append(file)
+        _logger.info("verification written: %s", file)
+        if kept.ends is not None:
+            kept.ends.conclude()

@@ -195,7 +195,7 @@ def measure_sphere(
         fit.residuals + (diameter - options.diameter) / 2,
         by_points,
         fit.by_sphere[:, :3],
-        _certified_covariance(n, known)
+        np.full((n, n), (known / 2 / COVERAGE_FACTOR) ** 2)  # of the diameter by U
         + by_points @ np.diag(np.tile(conditions.drift**2, n)) @ by_points.T,
     )
     size = Size(diameter, options.diameter, float(np.hypot(own, known)))
@@ -227,11 +227,6 @@ def fit_sphere(points_cam: FloatArray) -> SphereFit:
         raise CalibrationError("sphere.flat")
     spokes = ways / np.linalg.norm(ways, axis=1)[:, None]
     return SphereFit(found.origin, radius, found.distances[:, 0], spokes)
-
-
-def _certified_covariance(n: int, uncertainty: float) -> FloatArray:
-    """Return the covariance of n distances by U of the diameter, mm^2."""
-    return np.full((n, n), (uncertainty / 2 / COVERAGE_FACTOR) ** 2)
 
 
 def _assessment(
