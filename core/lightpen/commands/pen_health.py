@@ -1,4 +1,4 @@
-"""``lightpen verify pen`` and ``lightpen improve-pen``: LEDs over several swings."""
+"""``lightpen verify pen``, ``verify press`` and ``improve-pen``: swings of one pen."""
 
 import argparse
 from pathlib import Path
@@ -25,14 +25,25 @@ from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.recomputing import recompute
 from lightpen.verification.history.led_file import improve_pen
-from lightpen.verification.history.pen_health import GROWN, MOVED, examine_pen
+from lightpen.verification.history.pen_health import (
+    GROWN,
+    MOVED,
+    examine_pen,
+    require_one_pen,
+)
+from lightpen.verification.history.press_test import PRESS_TEST, press_test
 from lightpen.verification.history.recorded_tasks import read_scale
 from lightpen.verification.reports.records import (
     pen_health_entries,
     verification_record,
 )
-from lightpen.verification.reports.summaries import improved_pen_text, pen_health_text
+from lightpen.verification.reports.summaries import (
+    improved_pen_text,
+    pen_health_text,
+    press_test_text,
+)
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
@@ -129,3 +140,41 @@ def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
                 pen=options.pen,
             )
     return swings
+
+
+def add_verify_press(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen verify press``."""
+    parser.set_defaults(run=_verify_press)
+    add_file(parser, "usual", "USUAL.json", "calibration with usual pressure")
+    parser.add_argument(
+        "firm",
+        type=Path,
+        metavar="FIRM.json",
+        help="calibration with firm pressure: same tip, cone, pen and camera",
+    )
+    add_exit_by_verdict(parser)
+    add_json(parser)
+    add_entering(parser)
+
+
+@printing
+def _verify_press(options: argparse.Namespace) -> int:
+    files = [options.usual, options.firm]
+    require_other_file(options.json, *files)
+    usual, firm = both = [read_calibration(path) for path in files]
+    require_one_pen(both)
+    if usual.camera_hashes != firm.camera_hashes:
+        raise UsageError("press-test.another-camera", first=usual.name, other=firm.name)
+    if (usual.tip_pen == firm.tip_pen).all():
+        raise UsageError("repeatability.twice", one=usual.name, other=firm.name)
+    found = press_test(*(recompute(path).calibration for path in files))
+    print(shown(press_test_text(found)))
+    record = verification_record(
+        PRESS_TEST,
+        found.entries,
+        found.assessment,
+        {},
+        {"files": [file_entry(file) for file in all_hashed(files)]},
+    )
+    keep_record(options, record, usual)
+    return verdict_status(options, found.assessment.grade)

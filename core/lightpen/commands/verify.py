@@ -18,8 +18,7 @@ from lightpen.commands.arguments import (
 )
 from lightpen.commands.console import printing, shown, verdict_status, write_record
 from lightpen.commands.entering import add_entering, keep_record
-from lightpen.commands.pen_health import add_verify_pen
-from lightpen.commands.press_test import add_verify_press
+from lightpen.commands.pen_health import add_verify_pen, add_verify_press
 from lightpen.commands.touched import MeasuredRuns, add_touch_inputs, measure_runs
 from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR

@@ -225,9 +225,7 @@ def batch_of(database: Database, chain: str, after: int) -> tuple[StoredEntry, .
         .order_by(ENTRIES.c.number)
         .limit(BATCH)
     )
-    with database.reading() as connection:
-        rows = connection.execute(wanted).all()
-    return tuple(read_row(database, row) for row in rows)
+    return read_entries(database, wanted)
 
 
 def records_of(database: Database, entries: Sequence[StoredEntry]) -> dict[str, str]:
@@ -250,9 +248,7 @@ def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry |
 
 def entries_of_limits(database: Database, chain: str) -> tuple[StoredEntry, ...]:
     """Return the entries of limits of a chain, the oldest first."""
-    with database.reading() as connection:
-        rows = connection.execute(_of_limits(chain)).all()
-    return tuple(read_row(database, row) for row in rows)
+    return read_entries(database, _of_limits(chain))
 
 
 class ArchivedFiles:
@@ -496,6 +492,13 @@ def _forked(entry: StoredEntry) -> Message:
 def _named_entry(entry: StoredEntry) -> Message:
     place = entry.entry
     return named_entry(place.chain, place.number, place.event.names.station)
+
+
+def read_entries(database: Database, wanted: Select[Any]) -> tuple[StoredEntry, ...]:
+    """Return the entries that a query for the columns `READ` finds."""
+    with database.reading() as connection:
+        rows = connection.execute(wanted).all()
+    return tuple(read_row(database, row) for row in rows)
 
 
 def read_row(database: Database, row: Row[Any]) -> StoredEntry:

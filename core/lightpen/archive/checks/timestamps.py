@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import select
 
-from lightpen.archive.chains.chains import READ, chain_at_home, heads, read_row
+from lightpen.archive.chains.chains import READ, chain_at_home, heads, read_entries
 from lightpen.archive.chains.entries import SHORT, StoredEntry
 from lightpen.archive.checks.check import ArchiveCheckResult
 from lightpen.archive.store.database import Database
@@ -284,9 +284,7 @@ def _stored_finding(
 
 def _entry(database: Database, chain: str, number: int) -> StoredEntry | None:
     wanted = select(*READ).where(ENTRIES.c.chain == chain, ENTRIES.c.number == number)
-    with database.reading() as connection:
-        row = connection.execute(wanted).one_or_none()
-    return None if row is None else read_row(database, row)
+    return next(iter(read_entries(database, wanted)), None)
 
 
 def _waiting(database: Database, home: str | None, last: int) -> Iterator[Message]:

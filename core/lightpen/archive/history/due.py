@@ -59,7 +59,7 @@ def due_tips(
     found = (
         last_accepted(database, pen, tip, chain=chain)
         for pen, tip in known_names(database).tips
-        if pen and tip and not _is_retired(library, tip)
+        if pen and tip and not library.has_retired(tip)
     )
     entries = [entry for entry in found if entry is not None]
     if not entries:
@@ -75,11 +75,6 @@ def due_tips(
             key=_urgency,
         )
     )
-
-
-def _is_retired(library: Library, tip: str) -> bool:
-    listed = library.tips.get(tip)
-    return listed is not None and listed.is_retired
 
 
 def _urgency(tip: DueTip) -> tuple[bool, datetime]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Row, select
 
-from lightpen.archive.chains.chains import READ, read_row, sound_entry
+from lightpen.archive.chains.chains import READ, read_entries, sound_entry
 from lightpen.archive.chains.entries import IN_FORCE_BY, StoredEntry
 from lightpen.archive.history.queries import (
     IN_ORDER,
@@ -95,9 +95,7 @@ def lines(
 def messages_on(database: Database, entry: StoredEntry) -> tuple[StoredEntry, ...]:
     """Return the entries on an entry: comments, revocation, reinstatement."""
     found = select(*READ).where(ENTRIES.c.concerns == entry.sha256).order_by(*IN_ORDER)
-    with database.reading() as connection:
-        rows = connection.execute(found).all()
-    return tuple(read_row(database, row) for row in rows)
+    return read_entries(database, found)
 
 
 def known_names(database: Database) -> KnownNames:

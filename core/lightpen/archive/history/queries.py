@@ -14,7 +14,7 @@ from sqlalchemy import (
     tuple_,
 )
 
-from lightpen.archive.chains.chains import READ, read_row, searchable
+from lightpen.archive.chains.chains import READ, read_entries, searchable
 from lightpen.archive.chains.entries import (
     IN_FORCE_BY,
     Entry,
@@ -66,9 +66,7 @@ def newest(
         .order_by(*(column.desc() for column in IN_ORDER))
         .limit(n_entries)
     )
-    with database.reading() as connection:
-        rows = connection.execute(found).all()
-    return tuple(read_row(database, row) for row in rows)
+    return read_entries(database, found)
 
 
 def last_accepted(
@@ -94,9 +92,7 @@ def last_accepted(
     if chain is not None:
         condition &= of_chain(chain)
     found = select(*READ).where(condition).order_by(ENTRIES.c.since_us.desc()).limit(1)
-    with database.reading() as connection:
-        row = connection.execute(found).one_or_none()
-    return None if row is None else read_row(database, row)
+    return next(iter(read_entries(database, found)), None)
 
 
 def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
@@ -106,11 +102,10 @@ def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
     """
     while entry.entry.event.kind is Kind.RESTORED:
         found = select(*READ).where(ENTRIES.c.sha256 == entry.entry.event.concerns)
-        with database.reading() as connection:
-            row = connection.execute(found.limit(1)).one_or_none()
-        if row is None:
+        origin = read_entries(database, found.limit(1))
+        if not origin:
             break
-        entry = read_row(database, row)
+        (entry,) = origin
     return entry
 
 

@@ -16,7 +16,7 @@ from msgspec import structs
 from sqlalchemy import select, text
 
 from lightpen.archive.chains.chains import READ as OF_ENTRY
-from lightpen.archive.chains.chains import chain_at_home, read_row, records_of
+from lightpen.archive.chains.chains import chain_at_home, read_entries, records_of
 from lightpen.archive.chains.entries import Kind, StoredEntry, read_entry, text_sha256
 from lightpen.archive.chains.signatures import ChainKeys
 from lightpen.archive.store.database import Database
@@ -136,10 +136,7 @@ def _newest(
 def _copied(database: Database) -> Iterator[tuple[StoredEntry, LibraryChange]]:
     """Yield the changes in a database; copies were checked when they were imported."""
     wanted = select(*OF_ENTRY).where(ENTRIES.c.kind == Kind.LIBRARY.value)
-    with database.reading() as connection:
-        rows = connection.execute(wanted).all()
-    for row in rows:
-        entry = read_row(database, row)
+    for entry in read_entries(database, wanted):
         name = entry.entry.event.record_sha256 or ""
         yield from _changes(entry, records_of(database, [entry]).get(name))
 

@@ -47,7 +47,7 @@ class StationStatus:
         if self.now is None or not (pen and tip):
             return None
         listed = self.library.tips.get(tip)
-        if listed is not None and listed.is_retired:
+        if self.library.has_retired(tip):
             return TipStatus.RETIRED
         found = self.in_force.get((pen, tip))
         if found is None:

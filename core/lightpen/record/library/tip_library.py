@@ -224,6 +224,11 @@ class Library:
         exact = self.tips.get(code)
         return exact or _alike(self.tips, code)
 
+    def has_retired(self, tip: str) -> bool:
+        """Return whether a tip is in the library and retired."""
+        listed = self.tips.get(tip)
+        return listed is not None and listed.is_retired
+
     def rule_of(self, tip: str, usual: DueRule) -> DueRule:
         """Return the calibration interval of a tip."""
         listed = self.tips.get(tip)

@@ -137,11 +137,9 @@ def require_in_use(archive: FolderArchive, name: str) -> None:
 
     A library that cannot be read is reported with the verdict.
     """
-    tip = None
     with suppress(FileError):
-        tip = archive.library().tips.get(name)
-    if tip is not None and tip.is_retired:
-        raise AcceptanceError("acceptance.retired", tip=tip.id)
+        if archive.library().has_retired(name):
+            raise AcceptanceError("acceptance.retired", tip=name)
 
 
 def _require_acceptable(verdict: Verdict, reason: str) -> None:

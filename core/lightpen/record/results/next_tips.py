@@ -35,7 +35,7 @@ def next_tips(archive: FolderArchive, present: Result) -> tuple[NextTip, ...]:
     with suppress(FileError):
         known = archive.tips(pen, is_simulated=is_simulated)
         tips = [tip for tip in known if tip != present.names.tip]
-        for tip in [tip for tip in tips if not _is_retired(library, tip)][:MOST]:
+        for tip in [tip for tip in tips if not library.has_retired(tip)][:MOST]:
             with suppress(FileError):
                 last = archive.in_force(pen, tip, is_simulated=is_simulated)
                 if last is not None:
@@ -47,10 +47,5 @@ def next_tips(archive: FolderArchive, present: Result) -> tuple[NextTip, ...]:
                 *found,
             ]
     others = [each for each in found if each.tip != present.names.tip]
-    in_use = [each for each in others if not _is_retired(library, each.tip)]
+    in_use = [each for each in others if not library.has_retired(each.tip)]
     return tuple(reversed(in_use))[:MOST]
-
-
-def _is_retired(library: Library, tip: str) -> bool:
-    listed = library.tips.get(tip)
-    return listed is not None and listed.is_retired
