@@ -83,13 +83,10 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredRuns:
-    """The points of all runs, with the drift of fixed lamps in view.
-
-    The origin of images or centres is simulated if some of them are.
-    """
+    """The points of all runs, and the instrument."""
 
     calibration: CalibrationFile
-    origin: Origin
+    origin: Origin  # of images or centres; simulated if some of them are
     conditions: Conditions
     runs: tuple[ProbingRun, ...]
     files: tuple[Path, ...]

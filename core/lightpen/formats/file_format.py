@@ -8,16 +8,12 @@ from lightpen.messages import Message
 
 @dataclass(frozen=True)
 class FileFormat:
-    """A format of exported files.
+    """A format of exported files."""
 
-    The name is that on the command line, ``text`` returns the content of a file,
-    and the suffix is the end of its name.
-    """
-
-    name: str
+    name: str  # on the command line
     label: Message
-    suffix: str
-    text: Callable[..., str]
+    suffix: str  # end of the names of its files
+    text: Callable[..., str]  # content of a file
 
     def encoded(self, *values: object) -> bytes:
         """Return the content of a file for some values, in UTF-8."""

@@ -17,15 +17,11 @@ LIMIT = 16 * MEGABYTE  # of a file that is kept in the record
 
 @dataclass(frozen=True)
 class InputFile:
-    """An input file of a calibration.
-
-    With its content in the record, the calibration can be recomputed from that
-    alone.
-    """
+    """An input file of a calibration."""
 
     path: Path
     sha256: str
-    content: bytes | None = None
+    content: bytes | None = None  # in the record, to recompute from that alone
 
 
 @dataclass(frozen=True)

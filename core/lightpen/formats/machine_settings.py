@@ -23,18 +23,14 @@ WHAT = message("file.machine-settings")
 
 @dataclass(frozen=True)
 class MachineSettings:
-    """Default settings of the machine; an empty text is none.
-
-    The limits are those of new stations, by `lightpen.model.limits.Limit.key`;
-    ``update_file`` names the newest version.
-    """
+    """Default settings of the machine; an empty text is none."""
 
     language: str = ""
     archive_server: str = ""
-    update_file: str = ""
+    update_file: str = ""  # names the newest version
     timestamp_authority: str = ""
     timestamp_certificate: str = ""
-    limits: Mapping[str, float] = field(default_factory=dict)
+    limits: Mapping[str, float] = field(default_factory=dict)  # of new stations, by key
     laboratory: Laboratory | None = None
 
     def station_limits(self) -> StationLimits:

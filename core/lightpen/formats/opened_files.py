@@ -36,17 +36,13 @@ class CameraFile:
 
 @dataclass(frozen=True, eq=False)
 class PenFile:
-    """An LED geometry file that was read, with the hash of its content.
-
-    The units were given for a file that states none; the hash is empty for a pen
-    that is in no file yet.
-    """
+    """An LED geometry file that was read."""
 
     path: Path
     pen: Pen
-    units: str | None = None
+    units: str | None = None  # given for a file that states none
     is_simulated: bool = False
-    sha256: str = ""
+    sha256: str = ""  # of the content read; empty for a pen in no file yet
 
     @classmethod
     def read(cls, path: Path, units: str | None = None) -> Self:

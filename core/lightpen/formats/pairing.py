@@ -20,13 +20,10 @@ Key: TypeAlias = str | int
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """Indices (N, C) of the images of C cameras at N moments, from 0; -1 for none.
+    """The images of C cameras at N moments."""
 
-    They are paired by order where the names do not match.
-    """
-
-    images: IntArray
-    by_order: bool = False
+    images: IntArray  # (N, C), index of the image, from 0; -1 for none
+    by_order: bool = False  # as the names do not match
 
 
 def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairing:

@@ -38,16 +38,12 @@ _CUT_SHORT_ROWS = 20  # fewer rows are typed by hand and may end in a shorter nu
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The cells of a table, as text without surrounding blanks.
+    """The cells of a table, as text."""
 
-    All rows are equally long. The header has the column names in lower case, or
-    none; ``lines`` are the lines of the file that the rows stand on, from 1.
-    """
-
-    name: str
-    header: tuple[str, ...]
-    rows: list[list[str]]
-    lines: list[int]
+    name: str  # of the file
+    header: tuple[str, ...]  # in lower case; empty if there is none
+    rows: list[list[str]]  # all equally long, without surrounding blanks
+    lines: list[int]  # of the file that the rows stand on, from 1
 
     @property
     def n_columns(self) -> int:

@@ -61,15 +61,11 @@ IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
 
 
 class FileHash(Struct, frozen=True):
-    """A file that an entry refers to.
+    """A file that an entry refers to."""
 
-    The place is its path from the data folder, or absolute if outside of it;
-    ``n_bytes`` the length of the hashed beginning, None for the whole file.
-    """
-
-    place: str
+    place: str  # from the data folder, or absolute if outside of it
     sha256: Digest
-    n_bytes: Annotated[int, Meta(ge=0)] | None = None
+    n_bytes: Annotated[int, Meta(ge=0)] | None = None  # hashed beginning; None for all
 
 
 class Event(Struct, frozen=True):
@@ -104,45 +100,34 @@ class Event(Struct, frozen=True):
 
 
 class Entry(Struct, frozen=True):
-    """An event in its place: its number in the chain, from 1.
-
-    ``since`` is its time, but never before the entry before it, whatever a clock
-    says: by it the entries of several stations stand in one order.
-    """
+    """An event in its place."""
 
     chain: Chain
-    number: Annotated[int, Meta(ge=1)]
-    previous: Digest
-    since: ZonedTime
+    number: Annotated[int, Meta(ge=1)]  # in the chain, from 1
+    previous: Digest  # hash of the entry before
+    since: ZonedTime  # never before the entry before it: one order of all stations
     event: Event
 
 
 @dataclass(frozen=True)
 class StoredEntry:
-    """An entry as stored.
-
-    The text is canonical JSON: names sorted, no blanks, ASCII. For the signature,
-    empty until it is entered, see `lightpen.archive.chains.signatures`.
-    """
+    """An entry as stored."""
 
     entry: Entry
-    text: str
+    text: str  # canonical JSON: names sorted, no blanks, ASCII
     sha256: str
-    signature: str = ""
+    signature: str = ""  # see `lightpen.archive.chains.signatures`
 
 
 @dataclass(frozen=True)
 class ChainHead:
-    """Last entry of a chain: number, hash, time, and the public key that signed it.
-
-    An empty chain has the number 0, no time and no key.
-    """
+    """Last entry of a chain."""
 
     chain: str
-    number: int = 0
+    number: int = 0  # 0 for an empty chain
     sha256: str = NOTHING_BEFORE
     since: datetime | None = None
-    key: str = ""
+    key: str = ""  # public key that signed it; empty for an empty chain
 
 
 def chained(head: ChainHead, event: Event) -> StoredEntry:

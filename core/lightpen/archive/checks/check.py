@@ -33,19 +33,14 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True)
 class ArchiveCheckResult:
-    """Numbers of what was checked, images included, and the findings.
-
-    The notes prove no change, see `lightpen.archive.checks.check_notes`; for the
-    tips see `lightpen.archive.checks.recompute_check`, for valid timestamps
-    `lightpen.archive.checks.timestamps`.
-    """
+    """Result of a check."""
 
     n_entries: int
-    n_files: int
+    n_files: int  # images included
     findings: tuple[Message, ...]
-    notes: tuple[Message, ...] = ()
-    n_tips: int = 0
-    n_timestamps: int = 0
+    notes: tuple[Message, ...] = ()  # prove no change, see `check_notes`
+    n_tips: int = 0  # recomputed ones, see `recompute_check`
+    n_timestamps: int = 0  # valid ones, see `timestamps`
 
 
 def check_archive(

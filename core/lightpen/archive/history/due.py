@@ -24,18 +24,13 @@ SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
 
 @dataclass(frozen=True)
 class DueTip:
-    """A tip in force, by the entry of its acceptance.
+    """A tip in force."""
 
-    ``calibrated`` is the date of the calibration, also if the result was reinstated
-    later, ``due`` the due date by age. ``n_swings`` of the pen were made since; it
-    is due by their count after ``n_left`` more, None if any number may be made.
-    """
-
-    entry: StoredEntry
-    calibrated: datetime
-    due: datetime
-    n_swings: int
-    n_left: int | None
+    entry: StoredEntry  # of the acceptance
+    calibrated: datetime  # also if the result was reinstated later
+    due: datetime  # by age
+    n_swings: int  # of the pen since the calibration
+    n_left: int | None  # until it is due by their count; None for any number
 
     def is_due(self, now: datetime) -> bool:
         """Return whether it needs calibration before it is used.

@@ -31,17 +31,13 @@ class TipState(StrEnum):
 
 @dataclass(frozen=True)
 class Line:
-    """An entry and its later events.
-
-    The entry is None if it was changed since it was entered, and foreign if it is a
-    copy from another station.
-    """
+    """An entry and its later events."""
 
     chain: str
     number: int
-    entry: StoredEntry | None
+    entry: StoredEntry | None  # None if it was changed
     state: TipState = TipState.NONE
-    is_foreign: bool = False
+    is_foreign: bool = False  # copied from another station
 
 
 @dataclass(frozen=True)

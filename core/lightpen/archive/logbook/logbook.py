@@ -86,13 +86,10 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ReplicationState:
-    """Entries that wait for a server, and why the last attempt failed.
+    """Progress of the replication to a server."""
 
-    Their number is None as long as it did not answer.
-    """
-
-    n_waiting: int | None
-    fault: Message | None
+    n_waiting: int | None  # None as long as it did not answer
+    fault: Message | None  # of the last attempt
 
 
 class Logbook:

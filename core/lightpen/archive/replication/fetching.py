@@ -32,14 +32,11 @@ _UNSAFE = {"..", "."}
 
 @dataclass(frozen=True)
 class FetchResult:
-    """Numbers of entries and files that were restored.
-
-    ``lost`` are files of entries that are neither here nor on the server.
-    """
+    """Result of fetching."""
 
     n_entries: int
-    n_files: int
-    lost: tuple[str, ...]
+    n_files: int  # that were missing
+    lost: tuple[str, ...]  # files of entries that are neither here nor on the server
 
 
 def fetch(

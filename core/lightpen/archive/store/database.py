@@ -67,15 +67,11 @@ _VERSION = Table(
 
 @dataclass(frozen=True)
 class Database:
-    """An archive that is open.
-
-    The name, fit to be shown, is its file, or the address of a server, without the
-    password.
-    """
+    """An archive that is open."""
 
     engine: Engine
-    name: str
-    file: Path | None = None
+    name: str  # file or address without the password, fit to be shown
+    file: Path | None = None  # None of a server
     _uses: UseCount = field(
         default_factory=UseCount, init=False, repr=False, compare=False
     )

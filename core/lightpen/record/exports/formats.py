@@ -33,15 +33,11 @@ PEN_FRAME, TIP_FRAME = "pen", "tip"
 
 @dataclass(frozen=True)
 class ExportFormat(FileFormat):
-    """A format of exported calibrations; its `text` takes a `CalibrationFile`.
-
-    Where it ``needs_laboratory``, it takes a `Laboratory`, too; ``has_status`` if
-    its files state what the library says of pen and tip.
-    """
+    """A format of exported calibrations; its `text` takes a `CalibrationFile`."""
 
     description: Message
-    needs_laboratory: bool = False
-    has_status: bool = True
+    needs_laboratory: bool = False  # `text` takes a `Laboratory`, too
+    has_status: bool = True  # states what the library says of pen and tip
 
     def content(
         self, file: CalibrationFile, laboratory: Laboratory | None = None

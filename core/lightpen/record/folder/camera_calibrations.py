@@ -36,21 +36,15 @@ WHAT = message("file.camera-calibration")
 
 @dataclass(frozen=True, eq=False)
 class CameraTrial:
-    """An attempt to calibrate a camera by a board.
-
-    The serial number is empty for images from a folder; ``images`` has the SHA-256
-    of each view by its name: of its file, or of the pixels of a live image. One
-    that was abandoned found nothing, and one that was not accepted has no camera
-    file.
-    """
+    """An attempt to calibrate a camera by a board."""
 
     outcome: TrialOutcome
     board: str
-    serial: str
+    serial: str  # empty for images from a folder
     origin: Origin | None
-    images: Mapping[str, str]
-    found: CameraCalibration | None = None
-    camera_file: InputFile | None = None
+    images: Mapping[str, str]  # SHA-256 of file or pixels by name
+    found: CameraCalibration | None = None  # None if abandoned
+    camera_file: InputFile | None = None  # None if not accepted
 
 
 class StoredTrial(Struct, frozen=True):

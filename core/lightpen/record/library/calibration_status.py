@@ -33,14 +33,12 @@ class CurrentResult:
 
 @dataclass(frozen=True)
 class StationStatus:
-    """Status of pens, cones and real tips of a station, these by pen and tip.
-
-    It is that of the time ``now``; None where nothing was read yet.
-    """
+    """Status of all tips, pens and cones of a station."""
 
     library: Library = field(default_factory=Library)
+    # Real tips by pen.
     in_force: Mapping[tuple[str, str], CurrentResult] = field(default_factory=dict)
-    now: datetime | None = None
+    now: datetime | None = None  # None where nothing was read yet
 
     def of_tip(self, pen: str, tip: str) -> TipStatus | None:
         """Return the status of a tip of a pen; None while unknown."""

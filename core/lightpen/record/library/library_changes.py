@@ -57,15 +57,12 @@ PICTURE = message("file.picture")
 
 @dataclass(frozen=True)
 class Author:
-    """Author of a change of the library, with the reason in own words.
-
-    The signature of a supervisor is needed if a password is set.
-    """
+    """Author of a change of the library."""
 
     station: str = ""
     operator: str = ""
-    reason: str = ""
-    signature: Signature | None = None
+    reason: str = ""  # may be empty
+    signature: Signature | None = None  # of a supervisor, if a password is set
 
 
 def add_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:

@@ -67,14 +67,11 @@ class FileCopy(Struct, frozen=True, omit_defaults=True):
 
 
 class RigCopies(Struct, frozen=True):
-    """Copies of the files of rig and other cameras, with the masks of these cameras.
-
-    The masks are as `Header.mask_px`.
-    """
+    """Copies of the files of rig and other cameras."""
 
     rig_file: FileCopy
     camera_files: tuple[FileCopy, ...]
-    masks_px: tuple[tuple[Vector, ...], ...]
+    masks_px: tuple[tuple[Vector, ...], ...]  # as `Header.mask_px`
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.camera_files) == len(self.masks_px):

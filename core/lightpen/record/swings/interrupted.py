@@ -29,14 +29,10 @@ class DamagedSwing:
 
 @dataclass(frozen=True, eq=False)
 class InterruptedSwings:
-    """The swings in a folder that have no verdict, each kind the newest first.
+    """The swings in a folder that have no verdict, each kind the newest first."""
 
-    Interrupted ones can be resumed; those under way are recorded by another
-    process.
-    """
-
-    interrupted: tuple[Record, ...] = ()
-    under_way: tuple[Record, ...] = ()
+    interrupted: tuple[Record, ...] = ()  # with images, to be resumed
+    under_way: tuple[Record, ...] = ()  # recorded by another process
     damaged: tuple[DamagedSwing, ...] = ()
 
 

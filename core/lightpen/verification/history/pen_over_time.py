@@ -32,11 +32,7 @@ Tell = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class PenOverTime:
-    """A pen over its accepted swings, the oldest first, with the LED file chosen.
-
-    Swings with another LED file, or that cannot be read, are left out; fewer than
-    two tell no health.
-    """
+    """A pen over its accepted swings with the LED file that is chosen."""
 
     names: Names
     is_simulated: bool
@@ -45,9 +41,9 @@ class PenOverTime:
     pen_sha256: str
     camera: Camera | None
     camera_sha256: str
-    swings: tuple[CalibrationFile, ...]
-    n_left_out: int
-    health: PenHealth | None
+    swings: tuple[CalibrationFile, ...]  # the oldest first
+    n_left_out: int  # with another LED file, or unreadable
+    health: PenHealth | None  # None of fewer than two swings
 
     @property
     def poolable(self) -> tuple[CalibrationFile, ...]:

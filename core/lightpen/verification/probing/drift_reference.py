@@ -37,14 +37,10 @@ MIN_BLOCKS, MAX_BLOCKS = 3, 10  # before, during and after; larger ones are less
 
 @dataclass(frozen=True, eq=False)
 class LampImages:
-    """Lamps in images of touches, in order of time.
+    """Lamps in images of touches, in order of time."""
 
-    ``lights`` are what shines in each image and is no LED, masked or not, (S, 2),
-    px; the distances are those of the pen along the view in each, mm.
-    """
-
-    lights: tuple[FloatArray, ...] = ()
-    distances: tuple[float, ...] = ()
+    lights: tuple[FloatArray, ...] = ()  # (S, 2), what shines and is no LED, px
+    distances: tuple[float, ...] = ()  # of the pen along the view, mm
 
     def then(self, other: "LampImages") -> "LampImages":
         """Return both, the other ones after these."""

@@ -31,13 +31,10 @@ from lightpen.record.swings.recordings import is_simulated_recording
 
 @dataclass(frozen=True, eq=False)
 class PenCameras:
-    """The cameras that observe the pen, one or a rig.
-
-    The files are the camera file; or the rig file, and those of all its cameras.
-    """
+    """The cameras that observe the pen, one or a rig."""
 
     rig: Rig
-    files: tuple[InputFile, ...]
+    files: tuple[InputFile, ...]  # of the camera; or of the rig and all its cameras
 
     @property
     def hashes(self) -> tuple[str, ...]:

@@ -21,14 +21,11 @@ from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 @dataclass(frozen=True)
 class VerificationChoices:
-    """Selected tasks in their order, and images of a point.
+    """Selected tasks and their options."""
 
-    Options are those that differ from the defaults, of selected tasks or not.
-    """
-
-    kinds: tuple[TaskKind, ...] = (FIXED_POINT.kind,)
-    options: tuple[AnyOptions, ...] = ()
-    n_frames: int = FAST
+    kinds: tuple[TaskKind, ...] = (FIXED_POINT.kind,)  # in their order
+    options: tuple[AnyOptions, ...] = ()  # that differ from the defaults
+    n_frames: int = FAST  # images of a point
     limits: VerificationLimits = field(default_factory=VerificationLimits)
 
     @property

@@ -68,18 +68,13 @@ def with_drift(
 
 @dataclass(frozen=True, eq=False)
 class RunsOfTask:
-    """Points of a task that is done, to be measured again.
-
-    The setup is that by which they were measured, None where it is the session's;
-    the lamps are those of recorded images; the drift is that between the visits of
-    the drift reference around the task.
-    """
+    """Points of a task that is done, to be measured again."""
 
     task: AnyTask
     runs: Runs
-    setup: SessionSetup | None = None
-    lamps: LampDrift | None = None
-    drift: Drift | None = None
+    setup: SessionSetup | None = None  # None where it is the session's
+    lamps: LampDrift | None = None  # in recorded images
+    drift: Drift | None = None  # between the visits around it
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,26 +43,20 @@ class SessionEventKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class VerificationStatus:
-    """A verification from the current tip to its verdict; nothing of it is changed.
-
-    Setup and state are None until the tip is read. It ``began`` with its first
-    image; ``files`` are its results; lamps drifted up to the last finished task. A
-    supervisor may have accepted the tip despite findings; a refusal is why nothing
-    can be verified.
-    """
+    """A verification from the current tip to its verdict; nothing of it is changed."""
 
     tip: CurrentTip | None = None
-    setup: SessionSetup | None = None
-    state: SessionState | None = None
+    setup: SessionSetup | None = None  # None until the tip is read
+    state: SessionState | None = None  # likewise
     region: RegionOfInterest | None = None
-    began: datetime | None = None
-    files: tuple[Path, ...] = ()
+    began: datetime | None = None  # when its first image came
+    files: tuple[Path, ...] = ()  # results
     reading: ReadingState = ReadingState.NOTHING
-    lamp_drift: LampDrift | None = None
-    is_here: bool = False
+    lamp_drift: LampDrift | None = None  # up to the last finished task
+    is_here: bool = False  # an operator is present
     is_paused: bool = False
-    accepted_by: str = ""
-    refusal: Message | None = None
+    accepted_by: str = ""  # supervisor, despite findings
+    refusal: Message | None = None  # why nothing can be verified
 
     @property
     def task(self) -> AnyTask | None:

@@ -49,14 +49,11 @@ WHAT = message("file.under-way")
 
 
 class CountingRun(Struct, frozen=True):
-    """A run of live touches that counts; its task may have ended with it.
-
-    ``folder`` is the name of its record in the folder of touches.
-    """
+    """A run of live touches that counts."""
 
     task: TaskKind
-    folder: str
-    is_last: bool = False
+    folder: str  # of its record, in that of touches
+    is_last: bool = False  # its task ended with it
 
 
 class ReadImages(Struct, frozen=True):
@@ -68,25 +65,20 @@ class ReadImages(Struct, frozen=True):
 
 
 class VerificationCheckpoint(Struct, frozen=True):
-    """A verification that began and is not concluded.
-
-    It names the result that is verified, its runs in order of time, and the records
-    that were written; ``unwritten`` tasks are done and have no record yet.
-    ``seen_by`` are the hashes of the camera files.
-    """
+    """A verification that began and is not concluded."""
 
     began: ZonedTime
     names: Names
     origin: Origin
-    tip_file: str
+    tip_file: str  # name of the result that is verified
     tip_sha256: Digest
     pen_sha256: Digest
-    seen_by: tuple[Digest, ...]
+    seen_by: tuple[Digest, ...]  # of the camera files
     choices: VerificationChoices
-    runs: tuple[CountingRun, ...] = ()
+    runs: tuple[CountingRun, ...] = ()  # in order of time
     read: tuple[ReadImages, ...] = ()
-    files: tuple[str, ...] = ()
-    unwritten: tuple[TaskKind, ...] = ()
+    files: tuple[str, ...] = ()  # records that were written
+    unwritten: tuple[TaskKind, ...] = ()  # tasks done without record
 
     def __post_init__(self) -> None:
         require_usual(self.began)

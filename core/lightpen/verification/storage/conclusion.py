@@ -30,19 +30,15 @@ from lightpen.verification.tasks.assessment import VerificationAssessment
 
 @dataclass(frozen=True)
 class Conclusion:
-    """The end of a verification that began at ``session``, with the worst finding.
-
-    A reason is given where the tip is used though something was found against it;
-    the key of the supervisor who approved that signs the record.
-    """
+    """The end of a verification."""
 
     outcome: TrialOutcome
-    session: datetime
+    session: datetime  # when it began
     at: datetime
-    found: VerificationAssessment | None = None
-    reason: str = ""
-    supervisor: str = ""
-    supervisor_key: SigningKey | None = None
+    found: VerificationAssessment | None = None  # the worst, if any
+    reason: str = ""  # why the tip is used despite findings
+    supervisor: str = ""  # who approved that, if needed
+    supervisor_key: SigningKey | None = None  # signs the record
 
 
 def conclusion_record(

@@ -30,14 +30,11 @@ class CompletedTask:
 
 @dataclass(frozen=True, eq=False)
 class ReadRuns:
-    """Results from recorded images.
-
-    In the touches a drift reference that is read later may count.
-    """
+    """Results from recorded images."""
 
     done: CompletedTask
     found: Found
-    touched: RunsOfTask
+    touched: RunsOfTask  # a drift reference that is read later may count in it
 
 
 def read_runs(

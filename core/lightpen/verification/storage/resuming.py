@@ -61,19 +61,16 @@ from lightpen.verification.tasks.registry import task_of
 
 @dataclass(frozen=True, eq=False)
 class ResumedVerification:
-    """A verification as it was when it was interrupted; see `VerificationCheckpoint`.
-
-    The lamps are those in the images of touches; what was read is computed again.
-    """
+    """A verification as it was when it was interrupted."""
 
     under_way: VerificationCheckpoint
     tip: CurrentTip
     setup: SessionSetup
     state: SessionState
-    files: tuple[Path, ...]
-    unwritten: tuple[str, ...]
-    lamps: LampObservations
-    read: tuple[CompletedTask, ...]
+    files: tuple[Path, ...]  # records written of it
+    unwritten: tuple[str, ...]  # tasks done without record
+    lamps: LampObservations  # in the images of touches
+    read: tuple[CompletedTask, ...]  # computed again
 
 
 def resume_verification(

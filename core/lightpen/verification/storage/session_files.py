@@ -41,18 +41,13 @@ _logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class PendingRecord:
-    """A record to be written, after earlier ones of its session.
+    """A record to be written, after earlier ones of its session."""
 
-    ``record_of`` returns it by the files of the session before it. It is of a task,
-    or a conclusion, which ``ends`` a checkpoint and may name a supervisor, whose
-    key signs it.
-    """
-
-    record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]
+    record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]  # by files before
     is_simulated: bool
-    task: AnyTask | None = None
-    ends: CheckpointFile | None = None
-    supervisor: SigningKey | None = None
+    task: AnyTask | None = None  # None for a conclusion
+    ends: CheckpointFile | None = None  # that this record concludes
+    supervisor: SigningKey | None = None  # whom the record names
 
 
 def concluding(

@@ -34,16 +34,13 @@ from lightpen.verification.tasks.task import Found
 
 @dataclass(frozen=True)
 class TaskImages:
-    """Source of the images of a task, images that belong to no touch, drift of lamps.
-
-    Of recorded images it is their files, of a live camera a record for each run.
-    """
+    """Source of the images of a task."""
 
     origin: Origin | None
-    files: tuple[InputFile, ...] = ()
-    rejected: tuple[RejectedFrame, ...] = ()
+    files: tuple[InputFile, ...] = ()  # of recorded images
+    rejected: tuple[RejectedFrame, ...] = ()  # that belong to no touch
     lamp_drift: LampDrift | None = None
-    records: tuple[PointRecord, ...] = ()
+    records: tuple[PointRecord, ...] = ()  # of a live camera, one a run
 
 
 def keep_verification(

@@ -113,14 +113,11 @@ class CircleRun:
 
 @dataclass(frozen=True, eq=False)
 class Circle(Found):
-    """Runs round a ring of certified radius, mm.
-
-    The uncertainty is U (k = 2) of mean and certified radius together, mm.
-    """
+    """Runs round a ring of certified radius."""
 
     runs: tuple[CircleRun, ...]
-    certified: float
-    uncertainty: float
+    certified: float  # mm
+    uncertainty: float  # U (k = 2) of mean and certified radius together, mm
     tip: TipEvidence
 
     @property

@@ -90,20 +90,15 @@ SIMULATED_STEP = np.array([0.0, 15.0, 0.0])  # from one place to the next
 
 @dataclass(frozen=True, eq=False)
 class LengthRun:
-    """A length measured at one place, mm.
-
-    It is certified at the temperature of the artefact; the uncertainty is U (k = 2)
-    of the error, the limit the maximum permissible error. ``along_view`` is the
-    cosine between the length and the line of sight: 1 measures depth.
-    """
+    """A length measured at one place."""
 
     name: str
     ends: Ends
-    measured: float
-    certified: float
-    uncertainty: float
-    limit: float
-    along_view: float
+    measured: float  # mm
+    certified: float  # at the temperature of the artefact, mm
+    uncertainty: float  # U (k = 2) of the error, mm
+    limit: float  # maximum permissible error, mm
+    along_view: float  # cosine between length and line of sight: 1 measures depth
 
     @property
     def error(self) -> float:
@@ -127,13 +122,10 @@ class Scale:
 
 @dataclass(frozen=True, eq=False)
 class Length(Found):
-    """A certified length measured at one or several places.
-
-    The uncertainties (N,), mm, are U (k = 2) of the certified lengths, of their
-    temperature and of the ball.
-    """
+    """A certified length measured at one or several places."""
 
     runs: tuple[LengthRun, ...]
+    # (N,), U (k = 2) with that of heat and ball, mm.
     certified_uncertainties: FloatArray
     scale: Scale
     tip: TipEvidence

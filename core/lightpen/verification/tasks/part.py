@@ -61,15 +61,12 @@ MOST_NAMED = 5  # characteristics in a sentence
 
 @dataclass(frozen=True, eq=False)
 class Part(Found):
-    """A measured part: feature and ball centre of each touch; features not probed.
-
-    The refinement is that by features of known form, if there are any.
-    """
+    """A measured part."""
 
     part: MeasuredPart
-    points: tuple[tuple[str, ProbedPoint], ...]
-    missing: tuple[str, ...]
-    refinement: Refinement | None = None
+    points: tuple[tuple[str, ProbedPoint], ...]  # feature and ball centre
+    missing: tuple[str, ...]  # features that were not probed
+    refinement: Refinement | None = None  # by features of known form
 
     def deviations(self) -> list[FloatArray | None]:
         """Return the way from its feature to each point, (3,), mm; None if unknown."""

@@ -139,16 +139,12 @@ def planned_at(options: PartOptions, run: int) -> PlannedFeature | None:
 
 @dataclass(frozen=True, eq=False)
 class FeatureSoFar:
-    """The current feature, of the planned kind or the one recognised so far.
-
-    The touches lie (N,) mm off it, NaN before it is determined; the most
-    informative next touch is in the frame of the camera.
-    """
+    """The current feature."""
 
     planned: PlannedFeature
-    kind: FeatureKind | None
-    deviations: FloatArray
-    next_touch: Place | None = None
+    kind: FeatureKind | None  # as planned, or as recognised so far
+    deviations: FloatArray  # (N,), mm; NaN before it is determined
+    next_touch: Place | None = None  # the most informative one, frame of the camera
 
 
 def feature_so_far(

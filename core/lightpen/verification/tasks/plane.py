@@ -107,16 +107,13 @@ class PlaneFit:
 
 @dataclass(frozen=True, eq=False)
 class Flatness(Found):
-    """A plate of certified flatness, and U (k = 2) of the measured one, mm.
-
-    Points off the plane are left out: the pen was lifted.
-    """
+    """A plate."""
 
     points: tuple[ProbedPoint, ...]
-    left_out: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]  # off the plane: the pen was lifted
     fit: PlaneFit
-    certified: float
-    uncertainty: float
+    certified: float  # mm
+    uncertainty: float  # U (k = 2) of the measured flatness, mm
     tip: TipEvidence
 
     @property

@@ -57,14 +57,11 @@ class RejectedFrame:
 
 @dataclass(frozen=True, eq=False)
 class StillFrames:
-    """Images through which the pen was held still on one point.
-
-    The tip came to it along a unit vector (3,), camera frame, None if not known.
-    """
+    """Images through which the pen was held still on one point."""
 
     frames: tuple[ProbingFrame, ...]
     rejected: tuple[RejectedFrame, ...] = ()
-    approach_cam: FloatArray | None = None
+    approach_cam: FloatArray | None = None  # (3,), unit vector
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,14 +56,10 @@ class TipEstimate:
 
 @dataclass(frozen=True, eq=False)
 class RepeatedPoint:
-    """A fixed point (N, 3) touched several times with a tip, camera frame, mm.
+    """A fixed point touched several times with a tip."""
 
-    Of the touches (3,) mm are expected as standard deviation by all that is known
-    of them.
-    """
-
-    points: FloatArray
-    expected_deviation: FloatArray
+    points: FloatArray  # (N, 3), camera frame, mm
+    expected_deviation: FloatArray  # (3,), of the touches, as is known of them, mm
     when: datetime
 
     @property
@@ -74,15 +70,11 @@ class RepeatedPoint:
 
 @dataclass(frozen=True, eq=False)
 class Capability:
-    """A type-1 gauge study, per coordinate (3,), by the width of the tolerance, mm.
+    """A type-1 gauge study, per coordinate."""
 
-    C_g is a fifth of the tolerance over six standard deviations, C_gk the same less
-    the bias, None without a reference.
-    """
-
-    tolerance: float
-    cg: FloatArray
-    cgk: FloatArray | None
+    tolerance: float  # width of that of a coordinate, mm
+    cg: FloatArray  # (3,), a fifth of the tolerance over six standard deviations
+    cgk: FloatArray | None  # (3,), less the bias; None without a reference
 
     @property
     def least(self) -> float:
@@ -107,16 +99,13 @@ class ControlLimits:
 
 @dataclass(frozen=True, eq=False)
 class Repeatability:
-    """Calibrations of one tip; at least ten are needed for control limits.
-
-    Touches of a fixed point with it may show what the scatter ``points_to``.
-    """
+    """Calibrations of one tip."""
 
     tips: tuple[TipEstimate, ...]
-    control: ControlLimits | None
+    control: ControlLimits | None  # None for fewer than ten calibrations
     capability: Capability | None
-    touched: RepeatedPoint | None
-    points_to: Message | None
+    touched: RepeatedPoint | None  # with the tip
+    points_to: Message | None  # what the scatter indicates
     assessment: VerificationAssessment
 
     @property

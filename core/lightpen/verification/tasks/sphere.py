@@ -99,16 +99,12 @@ SIMULATED_AXES = np.array(
 
 
 class SphereFit(NamedTuple):
-    """A sphere of least squares.
-
-    The residuals (N,) are the distances of the points from it, outwards, mm; the
-    spokes (N, 3) unit vectors from the centre to the points.
-    """
+    """A sphere of least squares."""
 
     center_cam: FloatArray
     radius: float
-    residuals: FloatArray
-    spokes: FloatArray
+    residuals: FloatArray  # (N,), distances from it, outwards, mm
+    spokes: FloatArray  # (N, 3), unit vectors from the centre to the points
 
     @property
     def form(self) -> float:
@@ -136,16 +132,13 @@ class Size(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Found):
-    """A sphere, with the largest form, mm, that noise makes of an ideal one.
-
-    Points off the sphere are left out: the pen was lifted.
-    """
+    """A sphere."""
 
     points: tuple[ProbedPoint, ...]
-    left_out: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]  # off the sphere: the pen was lifted
     fit: SphereFit
     size: Size
-    form_by_noise: float
+    form_by_noise: float  # largest form that an ideal sphere shows, mm
     tip: TipEvidence
 
 

@@ -69,18 +69,14 @@ class NumberOption:
 
 @dataclass(frozen=True)
 class SurfaceOption:
-    """Option for the probed surface of an artefact; labels in order of `Surface`.
-
-    The words of the command line, the default first, need the ball diameter, whose
-    option has the help ``ball_help``.
-    """
+    """Option for the probed surface of an artefact."""
 
     name: str
     label: Message
-    labels: tuple[Message, ...]
+    labels: tuple[Message, ...]  # in the order of `Surface`
     argument: str
-    words: dict[str, Surface]
-    ball_help: str
+    words: dict[str, Surface]  # the default first; need the ball diameter
+    ball_help: str  # of the option for that
     is_of_artefact: bool = True
 
 
@@ -142,15 +138,12 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class ResultRow:
-    """A row of a table: its name, and a value for each column or None for a blank.
-
-    The remark is in the last column, which has a head of its own.
-    """
+    """A row of a table: its name, and a value for each column or None for a blank."""
 
     name: Message | str
     values: Sequence[float | str | None]
     decimals: int = 4
-    remark: Message | str = ""
+    remark: Message | str = ""  # in the last column, with its own head
 
     def texts(self) -> tuple[str, ...]:
         """Return the values as texts, without a sign before zero."""

@@ -32,14 +32,11 @@ WHAT = message("file.station-key")
 
 
 class RememberedFolder(Struct, frozen=True):
-    """What a user account remembers of a data folder with a supervisor password.
-
-    That is the number of files of limits, and the hash of the newest.
-    """
+    """Memory of a user account about a data folder with a supervisor password."""
 
     folder: str
-    n_changes: int
-    sha256: Digest
+    n_changes: int  # files of limits
+    sha256: Digest  # of the newest of them
 
 
 class _StationFile(Struct):
