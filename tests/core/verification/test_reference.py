@@ -35,6 +35,11 @@ from lightpen.verification.tasks.repeatability import (
     TipEstimate,
     measure_repeatability,
 )
+from lightpen.verification.tasks.sphere import (
+    SIMULATED_AXES,
+    SphereOptions,
+    sphere_directions,
+)
 from lightpen.verification.tasks.task import (
     Conditions,
     ResultTable,
@@ -48,6 +53,7 @@ Ring = Callable[..., FloatArray]
 Named = tuple[tuple[str, tuple[ProbedPoint, ...]], ...]
 
 ENDS = PAPER_CONE + np.array([[-75.0, 0.0, 0.0], [75.0, 4.0, 20.0]])
+DENTS = 0.003 * (-1.0) ** np.arange(25)
 DRIFT = np.array([0.004, 0.001, 0.006])
 
 
@@ -62,6 +68,13 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
     cone, off = np.tile(PAPER_CONE, (8, 1)), PAPER_TIP + np.array([0.15, 0.0, -0.1])
     lifted = cone.copy()
     lifted[5] += [0.0, -9.0, 2.0]
+    lobes = 1 + 0.0025 * np.cos(5 * np.linspace(0, 2 * np.pi, 24, endpoint=False))
+    middle = ring(24).mean(axis=0)
+    lobed = middle + lobes[:, None] * (ring(24) - middle)
+    beside = spread(ring(24), 5)
+    beside[7] += [0.5, 0.0, -6.0]
+    ball = spread(PAPER_CONE + 20 * sphere_directions(25) @ SIMULATED_AXES, 6)
+    dented = PAPER_CONE + (1 + DENTS[:, None]) * (ball - PAPER_CONE)
     plate = np.stack(np.meshgrid([-60.0, 0.0, 60.0], [-40.0, 0.0, 40.0]), axis=-1)
     tilted = plate.reshape(-1, 2) @ [[1.0, 0.1, 0.0], [0.0, 0.9, 0.4]]
     postures = [
@@ -85,6 +98,27 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
         ),
         "circle": (CircleOptions(31.75, 0.002, n_runs=3), tuple(circles)),
         "circle, one run": (CircleOptions(31.7), tuple(circles[:1])),
+        "circle, not round": (
+            CircleOptions(26.751, 0.002, Surface.BOSS, n_runs=2),
+            (circles[0], ("lobed", touching(lobed))),
+        ),
+        "circle, lifted": (CircleOptions(31.751), (("", touching(beside)),)),
+        "circle, uncertain": (CircleOptions(31.751, 0.2), tuple(circles[:1])),
+        "circle, another": (CircleOptions(20.0, n_runs=3), tuple(circles)),
+        **{
+            f"sphere, {name}": (
+                SphereOptions(diameter, u, Surface.BOSS),
+                (("", touching(points)),),
+            )
+            for name, diameter, u, points in (
+                ("good", 30.0, 0.001, ball),
+                ("too large", 29.9, 0.001, ball),
+                ("another", 20.0, 0.001, ball),
+                ("uncertain", 30.0, 0.4, ball),
+                ("not round", 30.0, 0.002, dented),
+                ("lifted", 30.0, 0.002, np.concatenate([ball, ball[:1] + 5.0])),
+            )
+        },
         "length": (
             LengthOptions(151.5, 0.003, n_places=2),
             (
@@ -100,6 +134,7 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
             ArticulationOptions(),
             tuple(zip("abcde", again, strict=True)),
         ),
+        "articulation, one run": (ArticulationOptions(), (("", sum(again, ())),)),
         "drift": (
             DriftOptions(),
             tuple(
@@ -110,9 +145,15 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
     }
 
 
-CASES = (
+COURSES = (
     *("fixed point", "fixed point, lifted", "fixed point, another tip", "circle"),
-    *("circle, one run", "length", "plane", "articulation", "drift"),
+    *("circle, one run", "sphere, good", "length", "plane", "articulation", "drift"),
+)
+CASES = (
+    *COURSES,
+    *("circle, not round", "circle, lifted", "circle, uncertain", "circle, another"),
+    *("sphere, too large", "sphere, another", "sphere, uncertain", "sphere, not round"),
+    *("sphere, lifted", "articulation, one run"),
 )
 
 
@@ -134,7 +175,10 @@ def shown(tables: tuple[ResultTable, ...]) -> list[dict[str, Any]]:
             "code": table.title.code,
             "columns": len(table.columns),
             "rows": [
-                {"values": [v for v in row.values if not isinstance(v, str)]}
+                {
+                    "decimals": row.decimals,
+                    "values": [v for v in row.values if not isinstance(v, str)],
+                }
                 for row in table.rows
             ],
         }
@@ -195,7 +239,7 @@ def step_of(
     }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", COURSES)
 def test_how_a_task_goes_on_is_as_before(
     case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
 ) -> None:

@@ -39,6 +39,11 @@ from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import ProbingOperator
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.history.recorded_tasks import read_fixed_point, read_scale
+from lightpen.verification.probing.current_tip import tip_at
+from lightpen.verification.probing.image_locations import (
+    ImageLocation,
+    viewers_of_camera,
+)
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen.verification.storage.checkpoint import find_interrupted
@@ -308,6 +313,42 @@ def test_a_task_read_before_its_witness_is_kept_with_the_drift_in_its_budget(
     assert share[0] > 0.1  # a pixel where the pen is, over the root of 3
     assert after == pytest.approx(np.hypot(before, 2 * share), rel=1e-3)
     assert len(at_it.conclusions[0]["records"]) == 2
+
+
+def test_a_task_read_after_its_witness_is_kept_with_the_drift_in_its_budget(
+    at_it: Verifier, recorded: Path, bumped: Path
+) -> None:
+    at_it.come(WITNESSED)
+    at_it.read(DRIFT, bumped)
+    at_it.read(FIXED_POINT, recorded)
+
+    share = found_by(at_it.status.state, DRIFT).share
+    point = found_by(at_it.status.state, FIXED_POINT)
+    assert (point.uncertainty > 2 * share).all()
+    assert point.uncertainty[0] > 0.2
+
+
+def test_images_of_another_camera_are_measured_without_the_cone_of_the_swing(
+    at_it: Verifier, tmp_path: Path
+) -> None:
+    tip, chosen = at_it.status.tip, at_it.preparation
+    assert tip is not None
+    assert chosen.camera_file is not None
+    assert chosen.pen_file is not None
+    other = tmp_path / "other.yaml"
+    other.write_text(f"{chosen.camera_file.path.read_text()}\n# serviced\n")
+    bare = ImageLocation("run", (), None)
+    own = replace(bare, pen=chosen.pen_file.pen, pen_file=chosen.pen_file.path)
+    same, serviced = (
+        replace(own, viewers=viewers_of_camera(chosen.camera_file.camera, file))
+        for file in (chosen.camera_file.path, other)
+    )
+
+    assert tip_at(tip, bare) is tip
+    assert tip.cone_cam is not None
+    np.testing.assert_array_equal(tip_at(tip, same).cone_cam, tip.cone_cam)
+    assert tip_at(tip, serviced).cone_cam is None
+    assert tip_at(tip, serviced).viewers is serviced.viewers
 
 
 def test_a_task_read_before_a_kill_still_waits_for_its_witness(

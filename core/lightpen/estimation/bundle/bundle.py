@@ -113,9 +113,8 @@ class Bundle:
         """Largest distance between two positions of the drifting cone, mm."""
         at, unknowns = self.layout, self.unknowns
         first = (at.drift.start - at.seat[0].start) // N_CONE
-        n_forms = (at.drift.stop - at.drift.start) // N_CONE
         by_form = self.values[at.drift].reshape(-1, N_CONE)
-        places = unknowns.forms[:, first : first + n_forms] @ by_form
+        places = unknowns.forms[:, first : first + len(by_form)] @ by_form
         apart = np.linalg.norm(places[:, None] - places, axis=2)
         return float(apart.max())
 

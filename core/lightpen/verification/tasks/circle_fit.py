@@ -148,7 +148,7 @@ def on_ring_of(points: FloatArray) -> BoolArray:
         normals = normals / np.sqrt(doubled)[:, None]
         spokes = points[None] - (a + to_center)[:, None]
         axial = np.einsum("sni,si->sn", spokes, normals)
-        in_plane = np.sqrt(np.maximum(np.sum(spokes**2, axis=2) - axial**2, 0))
+        in_plane = np.linalg.norm(np.cross(spokes, normals[:, None]), axis=2)
         distances = np.hypot(in_plane - radii[:, None], axial)
     medians = np.nan_to_num(np.median(distances, axis=1), nan=np.inf)
     best = distances[int(np.argmin(medians))]

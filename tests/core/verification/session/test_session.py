@@ -382,6 +382,7 @@ def test_a_touch_above_the_cone_does_not_count_in_a_posture(postures: Session) -
 
 
 UPRIGHT = (Hold(tilt=0.0),) * 3
+TWO_AND_A_RING = FIXED_POINT.kind, LENGTH.kind, CIRCLE.kind, DRIFT.kind
 
 
 @pytest.fixture
@@ -494,6 +495,24 @@ def test_what_waits_for_a_visit_waits_with_other_choices_until_none_is_needed(
 
     assert waiting.pending == witnessed.state.pending
     assert not done.pending
+
+
+def test_a_task_chosen_after_the_last_visit_is_witnessed_and_the_others_stay(
+    witnessed: Session,
+) -> None:
+    for holds in ((), leant(4), (), BAR, ()):
+        witnessed.touch(*holds) if holds else visit(witnessed)
+    choices = replace(witnessed.setup.choices, kinds=TWO_AND_A_RING)
+
+    setup, state = with_other_choices(witnessed.setup, witnessed.state, choices)
+
+    assert state.found.keys() == {FIXED_POINT.kind, LENGTH.kind}
+    assert state.task(setup) is CIRCLE
+    assert state.awaits_drift(setup)
+    assert not state.progress(setup, CIRCLE).runs
+    assert state.progress(setup, CIRCLE).n_runs == 1
+    assert len(state.progress(setup, DRIFT).runs) == 3
+    assert state.progress(setup, DRIFT).n_runs == 4
 
 
 def test_a_witness_alone_is_visited_twice(session: Session) -> None:

@@ -3,6 +3,7 @@
 import os
 from dataclasses import dataclass, field, replace
 from io import StringIO
+from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,12 +12,14 @@ import pytest
 from ezdxf.filemanagement import read as read_drawing
 from msgspec import structs
 from tests.accepted_tip import Hold, Holder
+from tests.reference import assert_as_before
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.file_format import FileFormat
+from lightpen.measuring.characteristics import CENTRED
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Nominal, Plan, PlannedFeature, free_plan
@@ -43,6 +46,7 @@ from lightpen.verification.tasks.part_course import (
     course,
     feature_so_far,
     planned_places,
+    with_move,
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
 
@@ -359,6 +363,45 @@ def test_other_datum_points_than_before_are_reported(instrument: Instrument) -> 
 
     assert good.assessment.grade is Grade.PASS
     assert bad.assessment.reason.code == "part.datums-moved"
+
+
+def test_the_datum_points_of_a_moved_part_span_the_largest_triangle(
+    measured: Station, instrument: Instrument
+) -> None:
+    runs = [tuple(points) for _, points in probed_plate(instrument, plate_plan())]
+    features = measured.found.part.features
+    centres = {
+        name: each.feature.origin
+        for name, each in features.items()
+        if each.feature is not None and each.kind in CENTRED
+    }
+
+    def area(names: tuple[str, ...]) -> float:
+        a, b, c = (centres[name] for name in names)
+        return float(np.linalg.norm(np.cross(b - a, c - a)))
+
+    moved = with_move(measured.options, runs, measured.setup.conditions)
+
+    largest = max(area(names) for names in combinations(centres, 3))
+    assert area(moved.moves[0].datums) == pytest.approx(largest, rel=1e-3)
+
+
+def test_what_is_found_of_a_part_is_as_before(
+    measured: Station, instrument: Instrument
+) -> None:
+    found, conditions = measured.found, measured.setup.conditions
+    tables = PART.tables(found, conditions)
+
+    assert_as_before(
+        "verification-part",
+        {
+            "entries": PART.entries(found, instrument),
+            "verdict": {"code": found.assessment.reason.code},
+            "tables": [[row.values for row in table.rows] for table in tables],
+            "deviations": found.deviations(),
+            "budgets": found.budgets(instrument),
+        },
+    )
 
 
 def test_a_part_is_not_moved_before_three_datum_points_are_probed(
