@@ -75,6 +75,7 @@ class DiscFits(NamedTuple):
     sigmas: FloatArray
     # (N,), by how much more than usual each shape differs from the median.
     misshapen: FloatArray
+    noises: FloatArray  # (N,), standard deviation of a dark pixel, digital numbers
 
 
 class _Windows(NamedTuple):
@@ -143,19 +144,19 @@ def fit_discs(
     values[:, HEIGHT] = (pixels * near).sum(axis=1) / near.sum(axis=1)
     values[:, M11] = values[:, M22] = 1 / radii
     values[:, SHARPNESS] = ln_k
-    values, squares, pulls = _fitted(windows, values)
+    values, squares, pulls, noises = _fitted(windows, values)
     field = np.zeros((len(light), 2, light[0].size))
     np.put_along_axis(field, chosen[:, None], pulls, axis=2)
     squares = squares * _correlated(field.reshape(-1, *light.shape[1:]))
     misshapen = _misshapen(values)
     sigmas = np.sqrt(squares + (misshapen * radii) ** 2)
-    return DiscFits(values[:, CENTER], sigmas, misshapen)
+    return DiscFits(values[:, CENTER], sigmas, misshapen, noises)
 
 
 def _fitted(
     windows: _Windows, values: FloatArray
-) -> tuple[FloatArray, FloatArray, _Reals]:
-    """Return values, variances of centres, and pulls of pixels at these, (N, 2, P)."""
+) -> tuple[FloatArray, FloatArray, _Reals, FloatArray]:
+    """Return values, variances of centres, pulls of pixels (N, 2, P), and noises."""
     slope_weight = 0.0
     variances = _variances(windows, _model(windows, values))
     for n_rounds in ROUNDS:
@@ -168,7 +169,7 @@ def _fitted(
     normal = _normal(model.jacobian, weights, slope_weight)
     squares = _diagonal(np.linalg.inv(normal))[:, CENTER].mean(axis=1)
     pulls = model.jacobian[:, CENTER] * (weights * model.residuals)[:, None]
-    return values, squares, pulls
+    return values, squares, pulls, np.sqrt(variances.min(axis=1))
 
 
 def _iterated(

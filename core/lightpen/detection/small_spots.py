@@ -7,8 +7,7 @@ a Gaussian window 0.45 half-level radii wide, iterated until it stays in the mid
 its window [1]_, is little disturbed by what lies beside the LED. From there a blurred
 disc is fitted (`lightpen.detection.disc_fit`).
 
-The part of the window that is odd under a point reflection about the centre holds all
-noise and none of a symmetric LED: it shows LEDs that are partly hidden or merge with
+An LED whose shape differs from those of the others is partly hidden or merges with
 something.
 
 References
@@ -33,7 +32,7 @@ BACKGROUND_QUANTILE = 0.1
 FOOT, HEAD = 0.25, 0.75  # heights between which the area of tiny spots is counted
 BELOW, ABOVE = 0.45, 0.55  # and of others, which light at their feet may join
 
-MIDDLE, NARROW = 0.55, 0.45  # half-level radii, standard deviation
+NARROW = 0.45  # half-level radii, standard deviation
 LEAST_WINDOW = 1.1  # px
 ROUNDS = 10
 FARTHEST = 0.5  # half-level radii, of a centre from its start, and
@@ -41,7 +40,6 @@ FAR = 0.2  # of one that is not clipped; good fits stay within 0.06
 
 SATURATED_PEAK = 0.985  # of the full scale, mean of nine pixels
 
-INTERPOLATED = 1.4  # noise of a pixel over that between pixels, by bilinear weights
 LONGEST = 4.0  # times as long as wide, of a spot
 NEAR = 0.5  # radii, of a place that may be brighter than the middle of a region
 LARGER = 1.5  # times the usual radius of the spots that are measured together
@@ -54,7 +52,6 @@ LEAST_TINY = 1.2  # px; what is smaller is a hot pixel
 LARGEST_TINY = 12  # px, of the box at the foot
 MAX_TINY = 4000  # contours examined
 MISSHAPEN = 0.1  # more stretched than the others, of an LED that is not whole
-LOPSIDED = 0.25  # odd part over the light, of an LED that is not whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,16 +115,14 @@ def measure_small(
     found = np.where(is_near[:, None], fits.centers, narrow)
     sigmas = np.sqrt((fits.sigmas**2 + np.median(fits.sigmas) ** 2) / 2)
     sigmas = np.where(is_near, sigmas, windows.radii)
-    odd = _odd_parts(windows, narrow)
-    noises, lopsided = _asymmetry(windows, odd)
     return SmallSpots(
         centers=np.asarray(windows.middles + found),
         shapes=_shapes(windows, narrow),
         radii=windows.radii,
         peaks=windows.tops,
         sigmas=sigmas,
-        noises=noises,
-        are_whole=is_near & (lopsided < LOPSIDED) & (fits.misshapen < MISSHAPEN),
+        noises=fits.noises,
+        are_whole=is_near & (fits.misshapen < MISSHAPEN),
         saturated=saturated,
         alone=_are_alone(windows, narrow),
     )
@@ -210,10 +205,10 @@ def _about_the_middles(soft: FloatArray) -> FloatArray:
 
 
 def _weights(
-    windows: _Windows, at: FloatArray, width: float
+    windows: _Windows, at: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places from the centres, (N, 2, S), Gaussian weights there, variances."""
-    variances = np.maximum(width * windows.radii, LEAST_WINDOW) ** 2
+    variances = np.maximum(NARROW * windows.radii, LEAST_WINDOW) ** 2
     away = windows.places - at[:, :, None]
     return away, np.exp(-0.5 * away**2 / variances[:, None, None]), variances
 
@@ -222,7 +217,7 @@ def _windowed(windows: _Windows, starts: FloatArray) -> FloatArray:
     """Return the centroids that lie in the middle of their Gaussian windows, (N, 2)."""
     at, farthest = starts, FARTHEST * windows.radii[:, None]
     for _ in range(ROUNDS):
-        away, weights, _ = _weights(windows, at, NARROW)
+        away, weights, _ = _weights(windows, at)
         over_rows = np.einsum("nyx,ny->nx", windows.light, weights[:, 1])
         over_columns = np.einsum("nyx,nx->ny", windows.light, weights[:, 0])
         weighted = np.stack([over_rows, over_columns], axis=1) * weights
@@ -247,7 +242,7 @@ def _are_alone(windows: _Windows, at: FloatArray) -> BoolArray:
 
 def _shapes(windows: _Windows, at: FloatArray) -> FloatArray:
     """Return covariances of half-level areas, as long as the light is, (N, 2, 2)."""
-    away, weights, variances = _weights(windows, at, NARROW)
+    away, weights, variances = _weights(windows, at)
     over_rows, over_columns = weights[:, 1], weights[:, 0]
     x, y = away[:, 0], away[:, 1]
     light = windows.light
@@ -265,24 +260,3 @@ def _shapes(windows: _Windows, at: FloatArray) -> FloatArray:
     round_values = np.sqrt(values.prod(axis=1, keepdims=True)) / values
     scaled = round_values * (windows.radii**2 / 4)[:, None]
     return np.asarray((vectors * scaled[:, None, :]) @ np.swapaxes(vectors, 1, 2))
-
-
-def _odd_parts(windows: _Windows, at: FloatArray) -> FloatArray:
-    """Return the odd part of the light about centres, with the noise of a pixel."""
-    half = windows.light.shape[1] // 2
-    size = (2 * half + 1, 2 * half + 1)
-    odd = np.empty_like(windows.light)
-    for i, (light, (x, y)) in enumerate(zip(windows.light, at.tolist(), strict=True)):
-        there = cv2.getRectSubPix(light.astype(np.float32), size, (half + x, half + y))
-        odd[i] = INTERPOLATED * (there - there[::-1, ::-1]) / np.sqrt(2)
-    return odd
-
-
-def _asymmetry(windows: _Windows, odd: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the noise of a pixel and the odd part over the light, near centres."""
-    _, weights, _ = _weights(windows, np.zeros((len(odd), 2)), MIDDLE)
-    both = weights[:, 1, :, None] * weights[:, 0, None, :]
-    odd_squares = np.einsum("nyx,nyx->n", both, odd**2)
-    squares = np.einsum("nyx,nyx->n", both, windows.light**2)
-    noises = np.sqrt(odd_squares / both.sum(axis=(1, 2)))
-    return noises, np.sqrt(odd_squares / np.maximum(squares, 1e-9))
