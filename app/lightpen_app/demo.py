@@ -46,8 +46,7 @@ class Demo(QObject):
         self._is_measuring = False
 
         # Widgets
-        self._timer = QTimer(self)
-        self._timer.setInterval(TICK_MS)
+        self._timer = QTimer(self, interval=TICK_MS)
 
         # Connections
         self._timer.timeout.connect(self._on_tick)

@@ -24,8 +24,7 @@ class EndSignals(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.number = 0  # of the first signal; 0 before
-        self._timer = QTimer(self)
-        self._timer.setInterval(TICK_MS)
+        self._timer = QTimer(self, interval=TICK_MS)
 
         # Connections
         self._timer.timeout.connect(self._on_tick)

@@ -61,8 +61,7 @@ class Walk(QObject):
         self._swing = swing
         self._next: Callable[[], bool] = self._open
         self.doing = ""  # what it waits for, and what the window says
-        self._timer = QTimer(self)
-        self._timer.setInterval(TICK_MS)
+        self._timer = QTimer(self, interval=TICK_MS)
         self._timer.timeout.connect(self._on_tick)
 
     def start(self) -> None:

@@ -62,18 +62,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     F1 helps, F10 opens the options, F11 the operator view, B mutes. Escape does
     nothing here, so that it cannot end a capture.
 
-    Parameters
-    ----------
-    pages : sequence of Page
-        Pages in the order of the steps, at least one.
-    settings : Settings
-        Where the window's place is kept.
-    preferences : Preferences
-        Current preferences.
-    notifications : Notifications
-        Notifications; those of a page, by its key, are removed with the page.
-    later : iterator of Page, optional
-        More pages, made one by one once the window is painted.
+    The pages are in the order of the steps; those in ``later`` are made one by one once
+    the window is painted. Notifications of a page, by its key, go with the page.
     """
 
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
@@ -382,8 +372,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def _make_actions(self) -> None:
         self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
-        self._operator_action = QAction(self)
-        self._operator_action.setCheckable(True)
+        self._operator_action = QAction(self, checkable=True)
         self._operator_action.setShortcut(Qt.Key.Key_F11)
         self._operator_action.toggled.connect(self._on_operator_toggled)
         self._action(Qt.Key.Key_F10, self._show_options)

@@ -65,9 +65,7 @@ class OperatorView(Translated, QWidget):
         self._dial = PostureDial()
         self._count = FittedText(120, 1)
         self._time_left = FittedText(43, 1)
-        self._progress = QProgressBar()
-        self._progress.setRange(0, 1000)
-        self._progress.setTextVisible(False)
+        self._progress = QProgressBar(maximum=1000, textVisible=False)
         self._banner = StateBanner(speaks=False)  # the page shows it
         self._keys = FittedText(43, 1)
 

@@ -52,8 +52,7 @@ class ReasonBar(AskingBar):
 
         # Widgets
         self._text = text_label(TextSize.BODY)
-        self._edit = EnterEdit()
-        self._edit.setMaxLength(LONGEST_REASON)
+        self._edit = EnterEdit(maxLength=LONGEST_REASON)
         self._usual = PushButton()
         self._menu = QMenu(self._usual)
         self._usual.setMenu(self._menu)

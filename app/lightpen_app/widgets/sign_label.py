@@ -48,13 +48,7 @@ class StatusMessage:
 
 
 class SignLabel(QWidget):
-    """Shows a remark; hidden while there is none.
-
-    Parameters
-    ----------
-    wraps : bool
-        Whether its words may take more than one line.
-    """
+    """Shows a remark, in several lines if it wraps; hidden while there is none."""
 
     def __init__(self, *, wraps: bool = True) -> None:
         super().__init__()

@@ -59,8 +59,7 @@ class StateBanner(QWidget):
         self._long_height = 0  # px; 0 while the sentence is short
         self._detail_px = 0.0
         self._speaks = speaks
-        self._speaking = QTimer(self)
-        self._speaking.setSingleShot(True)
+        self._speaking = QTimer(self, singleShot=True)
         self._word_size = word_size
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
 

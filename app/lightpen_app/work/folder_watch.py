@@ -25,8 +25,7 @@ class FolderWatch(QObject):
         self._n_others = 0
         self._fault = ""
         self._counter: Job | None = None
-        self._timer = QTimer(self)
-        self._timer.setInterval(LOOKING_MS)
+        self._timer = QTimer(self, interval=LOOKING_MS)
 
         # Connections
         self._timer.timeout.connect(self._look)

@@ -27,8 +27,7 @@ class GarbageCollector(QObject):
             (PERIOD_MS, collect_if_due),
             (RELEASE_PERIOD_MS, release_freed_memory),
         ):
-            timer = QTimer(self)
-            timer.setInterval(period_ms)
+            timer = QTimer(self, interval=period_ms)
             timer.timeout.connect(action)
             timer.start()
 

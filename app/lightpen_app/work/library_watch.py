@@ -59,8 +59,7 @@ class LibraryWatch(QObject):
         self._asked: deque[tuple[object, Change]] = deque()
         self._changing: Job | None = None
         self._is_over = False
-        self._timer = QTimer(self)
-        self._timer.setInterval(AGAIN_MS)
+        self._timer = QTimer(self, interval=AGAIN_MS)
         self._n_shared = 0
         self._look = QTimer(self)
         self._look.start(LOOK_MS)

@@ -91,18 +91,8 @@ class LiveView(QObject):
     """Opens one or two cameras and signals their images.
 
     Of two, one is `chosen`: queries, signals and settings are of it, except `failed`
-    and `configured`, which are of both.
-
-    Parameters
-    ----------
-    run : SwingRun
-        Takes every image, but for those of a verification.
-    verifications : sequence of VerificationRun
-        The one that somebody is at takes every image.
-    stream : PoseStream
-        Tells other programs what the first camera shows.
-    notifications : Notifications
-        Receives messages about camera faults.
+    and `configured`, which are of both. Images go to the verification that somebody is
+    at, else to the swing; other programs get what the first camera shows.
     """
 
     # Shown: the newest image; those that the GUI had no time for are skipped

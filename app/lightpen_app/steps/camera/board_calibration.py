@@ -202,10 +202,7 @@ def calibrate_by_views(
 def calibrate_by_folder(folder: str, board: Board, report: Report) -> ComputedCamera:
     """Calibrate the camera by images in a folder.
 
-    Raises
-    ------
-    FileError, CalibrationError
-        There are no images, or they do not show the camera.
+    Raises `CalibrationError` if they do not show the camera.
     """
     images = find_images(folder)
     observed = observe_board(images, board, lambda fraction: report(0.7 * fraction))

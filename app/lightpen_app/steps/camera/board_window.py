@@ -11,21 +11,26 @@ from typing_extensions import override
 
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.calibration import MIN_VIEWS
+from lightpen.intrinsics.calibration import MIN_VIEWS, CameraCalibration
+from lightpen.intrinsics.coverage import cells_of
 from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen.intrinsics.view_progress import ViewProgress, view_progress
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.steps.camera.board_calibration import BoardCalibration, facts_text
+from lightpen_app.steps.camera.board_calibration import (
+    BoardCalibration,
+    facts_text,
+    uncertainty_over_image,
+)
 from lightpen_app.steps.camera.board_capture import (
     BoardCapture,
+    CaptureState,
     fault_message,
     sight_message,
 )
 from lightpen_app.steps.camera.board_form import BoardForm
-from lightpen_app.steps.camera.board_overlay import board_overlay
 from lightpen_app.steps.camera.board_progress import BoardProgress
-from lightpen_app.widgets.board_view import BoardView
+from lightpen_app.widgets.board_view import BoardOverlay, BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.path_field import EnterEdit
@@ -296,6 +301,27 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         for button in (self._shows_residuals, self._shows_uncertainty):
             button.setVisible(found is not None)
         is_wanted = self._shows_uncertainty.isChecked()
-        overlay = board_overlay(state, found, shows_uncertainty=is_wanted)
+        overlay = _overlay(state, found, shows_uncertainty=is_wanted)
         self._image.set_overlay(overlay)
         self._remark.set_value(sight_message(state) or self._calibration.remark())
+
+
+def _overlay(
+    state: CaptureState, found: CameraCalibration | None, *, shows_uncertainty: bool
+) -> BoardOverlay:
+    """Return the overlay of a calibration, or of the views so far."""
+    if found is not None and shows_uncertainty:
+        return BoardOverlay(uncertainty=uncertainty_over_image(found))
+    if found is not None:
+        return _residuals(found)
+    if state.capture is None:
+        return BoardOverlay()
+    points = state.capture.points if state.sought is not None else None
+    return BoardOverlay(points, state.outline, state.capture.cells)
+
+
+def _residuals(found: CameraCalibration) -> BoardOverlay:
+    seen = found.views.seen[:, 0]
+    pixels, residuals = found.views.pixels[:, 0][seen], found.adjustment.residuals[:, 0]
+    arrows = np.concatenate([pixels, residuals[seen]], axis=1)
+    return BoardOverlay(cells=cells_of(found.views), arrows=arrows)

@@ -60,8 +60,7 @@ class ArchivePanel(Translated, QWidget):
             saving: menu.addAction("") for saving in SaveFormat
         }
         self._save.setMenu(menu)
-        self._progress = QProgressBar()
-        self._progress.setRange(0, 100)
+        self._progress = QProgressBar(maximum=100)
         self._cancel = PushButton()
         self._working = QWidget()
         self._delivered = SignLabel()

@@ -35,8 +35,7 @@ class PenWatch(QObject):
         self._compared: tuple[Spots, ...] = ()
         self._last: PenMatch | None = None
         self._job: Job | None = None  # whose outcome is awaited
-        self._timer = QTimer(self)
-        self._timer.setInterval(PERIOD_MS)
+        self._timer = QTimer(self, interval=PERIOD_MS)
 
         # Connections
         self._timer.timeout.connect(self._compare)

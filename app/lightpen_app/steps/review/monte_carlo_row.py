@@ -43,9 +43,7 @@ class MonteCarloRow(Translated, QWidget):
         self._trials.setValue(USUAL_TRIALS)
         self._label.setBuddy(self._trials)
         self._cancel = PushButton()
-        self._progress = QProgressBar()
-        self._progress.setRange(0, PROGRESS_STEPS)
-        self._progress.setTextVisible(False)
+        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
         self._outcome = SignLabel()
         self._table = NumberTable()
 

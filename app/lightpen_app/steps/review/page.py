@@ -53,9 +53,8 @@ class ReviewPage(Page):
         # Widgets
         place = workbench.save_place
         self._view = view = ReviewView(self._run, place)
-        self._accepted, self._reading = QTimer(self), QTimer(self)
-        for timer in (self._accepted, self._reading):
-            timer.setSingleShot(True)
+        self._accepted = QTimer(self, singleShot=True)
+        self._reading = QTimer(self, singleShot=True)
         self._painted: SwingAssessment | None = None  # since it is shown
         self._next = NextTipsControl(
             self._selection, self._run, workbench.library, view.next_tips

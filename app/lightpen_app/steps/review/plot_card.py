@@ -48,8 +48,7 @@ class PlotCard(Translated, QFrame):
 
         # Widgets
         self._menu = QMenu(self)
-        self._enlarge = QAction(self)
-        self._enlarge.setCheckable(True)
+        self._enlarge = QAction(self, checkable=True)
         self._save_png = QAction(self)
         self._save_csv = QAction(self)
         self._menu.addActions([self._enlarge, self._save_png, self._save_csv])

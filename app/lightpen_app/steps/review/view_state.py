@@ -134,14 +134,8 @@ def review_action(
 ) -> MainAction:
     """Return the present action of the main button.
 
-    Parameters
-    ----------
-    is_new : bool
-        Whether the tip was accepted a moment ago.
-    is_read : bool
-        Whether the result was shown long enough to be read before it is accepted.
-    next_tip : str
-        Tip that is swung next; empty where something is missing for a swing.
+    A new tip was accepted a moment ago; a result is read once it was shown long enough.
+    ``next_tip`` is empty where something is missing for a swing.
     """
     if status.result is not None:
         why_not = translate("ReviewPage", "Tip accepted.") if is_new else ""

@@ -29,9 +29,7 @@ class BarcodeListener(QObject):
         self._held: list[QKeyEvent] = []
         self._last_ms = 0
         self._hands_on = False
-        self._patience = QTimer(self)
-        self._patience.setSingleShot(True)
-        self._patience.setInterval(PATIENCE_MS)
+        self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
 
         # Connections
         self._patience.timeout.connect(self._let_go)

@@ -38,8 +38,7 @@ class DayControl(QObject):
         self._workbench, self._library, self._view = workbench, library, view
         self._selection, self._live = workbench.selection, workbench.live
         self._misfits: deque[float] = deque(maxlen=N_MISFITS)
-        self._refreshing = QTimer(self)
-        self._refreshing.setInterval(REFRESH_MS)
+        self._refreshing = QTimer(self, interval=REFRESH_MS)
 
         # Connections
         self._refreshing.timeout.connect(self.refresh_readiness)

@@ -33,9 +33,7 @@ class EntryPresenter(QObject):
         super().__init__(names)
         self._selection, self._library = selection, library
         self._names, self._limits, self._assumed = names, limits, assumed
-        self._typing = QTimer(self)
-        self._typing.setSingleShot(True)
-        self._typing.setInterval(TYPING_PAUSE_MS)
+        self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
 
         # Connections
         names.value_edited.connect(self._on_edited)

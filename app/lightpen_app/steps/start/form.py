@@ -62,7 +62,7 @@ class NamesForm(Translated, QWidget):
         # Widgets: the order of making them is the order of the Tab key
         self._place = QGroupBox()
         self._station = StationField()
-        self._operator = _name_edit()
+        self._operator = QLineEdit(maxLength=LONGEST_NAME)
         self._probe = QGroupBox()
         self._pen = _ListedEdit()
         self._tip = _ListedEdit()
@@ -341,12 +341,6 @@ class _ListedEdit(QLineEdit):
             self.list_requested.emit()
         else:
             super().keyPressEvent(event)
-
-
-def _name_edit() -> QLineEdit:
-    edit = QLineEdit()
-    edit.setMaxLength(LONGEST_NAME)
-    return edit
 
 
 def _panel(group: QGroupBox) -> QGridLayout:

@@ -67,8 +67,7 @@ class InterruptedControl(QObject):
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
         self._continued: VerificationCheckpoint | None = None
-        self._searching = QTimer(self)
-        self._searching.setSingleShot(True)
+        self._searching = QTimer(self, singleShot=True)
 
         # Connections
         self._searching.timeout.connect(self._search_now)

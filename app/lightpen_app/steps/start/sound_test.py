@@ -28,9 +28,7 @@ class SoundTest(Translated, QWidget):
         self._button = PushButton()
         self._button.setSizePolicy(FIXED, FIXED)
         self._words = SignLabel()
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(step_ms)
+        self._timer = QTimer(self, singleShot=True, interval=step_ms)
 
         # Layout
         horizontal_layout(self, self._button, (self._words, 1), 0, spacing=2 * GRID)

@@ -61,11 +61,8 @@ class SwingPage(Page):
         self._face = SwingView(self)
         self._hand = SwingSimulatorControls(self._live, self)
         self._question = QuestionBar()
-        self._showing = QTimer(self)
-        self._showing.setSingleShot(True)
-        self._showing.setInterval(SHOWING_MS)
-        self._plotting = QTimer(self)
-        self._plotting.setInterval(PLOTTING_MS)
+        self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
+        self._plotting = QTimer(self, interval=PLOTTING_MS)
 
         # Layout
         vertical_layout(self, self._question, (self._face, 1), self._hand)

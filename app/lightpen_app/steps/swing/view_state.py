@@ -147,14 +147,9 @@ class SwingWords(QObject):
         return OperatorValue(instruction.short, instruction.hint, state)
 
     def waiting_value(self, refusal: Message | None, *, is_near: bool) -> OperatorValue:
-        """Return the content before a swing.
+        """Return the content before a swing, which a refusal prevents.
 
-        Parameters
-        ----------
-        refusal : Message or None
-            Why none can begin; None while images are waited for.
-        is_near : bool
-            Whether images come, so that a swing begins at any moment.
+        It is near if images come, so that it begins at any moment.
         """
         if is_near and refusal is None:
             instruction = phrase(SHOW_PEN)

@@ -28,9 +28,7 @@ class ImagesRow(Translated, QWidget):
         self._place.add_button(self._choose)
         self._is_still = QCheckBox()
         self._read = PushButton()
-        self._progress = QProgressBar()
-        self._progress.setRange(0, STEPS)
-        self._progress.setTextVisible(False)
+        self._progress = QProgressBar(maximum=STEPS, textVisible=False)
         self._cancel = PushButton()
 
         # Layout

@@ -70,9 +70,7 @@ class PenPanel(Translated, QWidget):
         self._table = NumberTable()
         self._improve = PushButton()
         self._cancel = PushButton()
-        self._progress = QProgressBar()
-        self._progress.setRange(0, PROGRESS_STEPS)
-        self._progress.setTextVisible(False)
+        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
         self._label = SignLabel()
         self._use = PushButton()
 

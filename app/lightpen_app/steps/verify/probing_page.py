@@ -75,9 +75,7 @@ class ProbingPage(ResponsiveLayout, Page):
             self._pages.add(panel)
         self._image = ImageView()
         self._hand = ProbingSimulatorControls(self._live, presenter.tasks)
-        self._showing = QTimer(self)
-        self._showing.setSingleShot(True)
-        self._showing.setInterval(SHOWING_MS)
+        self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
 
         # Layout
         layout = vertical_layout(self, self._progress)

@@ -76,9 +76,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
         self._count = FittedText(TextSize.DISPLAY)
         self._count.setMaximumHeight(self._count.sizeHint().height())  # one line
-        self._progress = QProgressBar()
-        self._progress.setRange(0, PROGRESS_STEPS)
-        self._progress.setTextVisible(False)
+        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
 
         # Layout
         layout = vertical_layout(self, self._question, self._reason)
