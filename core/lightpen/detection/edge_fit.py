@@ -84,11 +84,10 @@ class EdgeStart(NamedTuple):
 
     center: FloatArray  # (2,), of the region, px
     shape: FloatArray  # (2, 2), covariance of its area, px^2
-    # Blur of the same disc in the image before, px, whose shape this is then; None for
-    # a disc seen for the first time.
+    # Blur of this disc in the previous image, px, which has this shape; None for a new
+    # disc.
     sigma: float | None = None
-    # (2,), by how much the region's centre was off the disc's there, px, as by light
-    # reflected beside it.
+    # (2,), from the disc's centre to the region's in the previous image, px.
     offset: FloatArray = np.zeros(2)
 
 

@@ -24,9 +24,8 @@ class Exposure:
 
     # Peak of each LED as a fraction of full scale; 1 if saturated.
     peaks: tuple[float, ...] = ()
-    # False where no LED could be identified, and these are of all that is bright.
-    are_leds: bool = True
-    # Numbers of the LEDs, counted from 1; empty where no LED could be identified.
+    are_leds: bool = True  # false if no LED was identified: peaks of all spots
+    # Numbers of the LEDs, from 1; empty if none was identified.
     leds: tuple[int, ...] = ()
 
     @property
@@ -147,7 +146,7 @@ class StraySearch:
     """A search for stray light, image by image, while the pen is covered."""
 
     images: tuple[Spots, ...] = ()  # bright spots in the images so far
-    n_with_pen: int = 0  # images of them that show the pen all the same
+    n_with_pen: int = 0  # images among these that show the pen
 
     @property
     def is_over(self) -> bool:

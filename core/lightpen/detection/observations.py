@@ -64,8 +64,7 @@ class Observations:
     lamps: FloatArray
     # Why an image cannot be used; `Reason.NONE` where it can.
     reasons: tuple[Reason, ...]
-    # More on that, where the reason does not say all.
-    details: tuple[Message | None, ...]
+    details: tuple[Message | None, ...]  # further explanation of the reasons
     # Likely problem of the whole set; None if most images with spots are labelled.
     advice: Message | None = None
     # Time from one image to the next; None if not known.

@@ -57,11 +57,11 @@ class PenDetection:
     # (6, 6), covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm; NaN
     # without a pose or where it is a rough one.
     cofactors: FloatArray = field(default_factory=lambda: np.full((6, 6), np.nan))
-    # Standard deviation of one image coordinate, by this image alone, px; NaN likewise.
+    # Noise of a coordinate by this image alone, px; NaN without a pose.
     sigma: float = float("nan")
     spots: Spots | None = None  # all that was found in the image
     labels: Labels | None = None  # assignment of spots to LEDs
-    # Detections in the simultaneous images of the other cameras of a rig.
+    # Of the simultaneous images of a rig's other cameras.
     others: tuple["PenDetection", ...] = ()
     posed_by: int = 0  # index of the camera that determines the pose, from 0
 

@@ -128,7 +128,6 @@ class Calibration:
     # Whether the files of camera or pen were found from these images, which are not
     # counted twice.
     shares_images: bool
-    # Numbers of the files that the images contradict.
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit  # the paper's method on the same images, of the first camera
     # (6, 6), of its (tip, cone) by the covariances of the poses, mm^2.
@@ -139,8 +138,7 @@ class Calibration:
     halves: SplitHalfCheck
     leds: LedQuality
     coverage: Coverage
-    # Time lag of each camera of a rig but the first.
-    lags: tuple[TimeLag | None, ...] = ()
+    lags: tuple[TimeLag | None, ...] = ()  # of each camera of a rig but the first
     second: SecondCone | None = None
 
     @property
@@ -305,13 +303,13 @@ class _SingleCameraFits:
 class _Start:
     """Step 2: the fit that the adjustment starts from, parameters of the files held."""
 
-    rig: Rig  # the file's cameras where the images put them
-    # (6 (C - 1),), their extrinsics less those of the rig file, rad and mm; None of one
+    rig: Rig  # cameras of the file, with extrinsics by the images
+    # (6 (C - 1),), these less those of the rig file, rad and mm; None for a single
     # camera.
     extrinsics: FloatArray | None
     lags: tuple[TimeLag | None, ...]
     reasons: npt.NDArray[np.object_]  # (N, C)
-    moments: IntArray  # (M,), moments of which an image takes part
+    moments: IntArray  # (M,), moments with an image that takes part
     # (M, C, L, 2), of these, px; NaN of images that do not take part.
     pixels: FloatArray
     joint: JointFit
@@ -326,7 +324,7 @@ class _Adjusted:
     stated: Priors
     # (M, C, L, 2), LED centres less the effects of lens and mechanics, px
     pixels: FloatArray
-    second: SecondImages | None  # images of a second swing, which are the last adjusted
+    second: SecondImages | None  # of a second swing; the last of the adjusted images
 
 
 def _fit_single_cameras(

@@ -60,7 +60,7 @@ OF_OTHERS = {
 class Trials:
     """The distributions that all trials draw from."""
 
-    # `camera` and `pen`: the truth, with what their files state of themselves.
+    # `camera` and `pen`: the truth, with the uncertainties that their files state.
     camera: Camera
     pen: Pen
     tip_pen: FloatArray
@@ -69,14 +69,14 @@ class Trials:
     seen: BoolArray  # (N, L), LEDs that the images show
     sigma: float  # noise of one image coordinate, px
     led_covariance: FloatArray  # (3 L, 3 L), of all LED coordinates of a file, mm^2
-    # (N, m), in which the seat may follow the lean, and the cone drift.
-    forms: FloatArray
-    move_covariance: FloatArray  # (3 m, 3 m), of the moves of the cone in them, mm^2
+    forms: FloatArray  # (N, m), modes of the seat and of drift
+    # (3 m, 3 m), of the moves of the cone in these modes, mm^2.
+    move_covariance: FloatArray
     jitter: FloatArray  # (3, 3), covariance of the seat from image to image, mm^2
-    # (N, L, 2, k), derivative of the LEDs' images by the unknowns of mechanics, px by
-    # mm or px
+    # (N, L, 2, k), derivative of the LEDs' images by the unknowns of mechanics, px per
+    # mm or px.
     mechanics: FloatArray
-    mechanics_covariance: FloatArray  # (k, k), mean square of these by their priors
+    mechanics_covariance: FloatArray  # (k, k), of these unknowns by their priors
     edge_widths: FloatArray  # (N,), of the LEDs, px; NaN where no areas are known
     priors: Priors
     assumptions: Assumptions

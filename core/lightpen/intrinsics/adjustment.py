@@ -66,8 +66,9 @@ class LinearSight(NamedTuple):
     """Points of one camera and their derivatives, 0 where not seen."""
 
     residuals: FloatArray  # (V, N, 2), px
-    # `shared`, `own` and `by_board`: (V, N, 2, p) and (V, N, 2, 6) and (V, N, 2, 3), by
-    # all but the poses, by the pose of the view, and by the points on the board.
+    # `shared`, `own` and `by_board`: (V, N, 2, p), (V, N, 2, 6) and (V, N, 2, 3),
+    # derivatives by all but the poses, by the pose of the view, and by the points on
+    # the board.
     shared: FloatArray
     own: FloatArray
     by_board: FloatArray

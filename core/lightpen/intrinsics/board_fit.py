@@ -23,7 +23,7 @@ class BoardState:
     translations: FloatArray
     poses: BoardPoses  # poses of rig_from_board
     shape: FloatArray  # (5,), stretch, shear, and three bends, mm
-    # (3,) and (N, 3), of the single points from where shape has them, mm
+    # (3,) or (N, 3), of the points from the shape, mm.
     offsets: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
@@ -36,8 +36,8 @@ class BoardFit:
     # (V, C, N, 2), observed minus modelled, px; NaN where not seen.
     residuals: FloatArray
     sigma: float  # noise of one coordinate, px
-    # `information` and `scores`: (V, p, p) and (V, p), of each view about all but its
-    # pose, for points of 1 px noise; their gradient.
+    # `information` and `scores`: (V, p, p) and (V, p), of each view on all but its
+    # pose, and its gradient, for points of 1 px noise.
     information: FloatArray
     scores: FloatArray
     prior: FloatArray  # (p, p), information of the priors

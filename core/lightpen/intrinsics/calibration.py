@@ -82,9 +82,8 @@ class ViewHalves:
 
     difference: FloatArray  # (4,), of fx fy cx cy, px
     expanded_uncertainty: FloatArray  # (4,), U (k = 2) of it
-    in_image: float  # distance that the two put between the images of one point, px rms
-    # Least zoom from the first half in time to the second that is found, relative.
-    detectable_zoom: float
+    in_image: float  # difference of the two projections of a point, px rms
+    detectable_zoom: float  # smallest zoom found between the halves in time, relative
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +92,13 @@ class CameraCalibration:
 
     camera: Camera
     views: Views  # views with a detected board; excluded points are NaN
-    # The final fit, with what board, lens and single views do beside the model.
-    effects: MixedFit
-    duplicates: tuple[str, ...]  # views in which the board is where it was in another
-    left_out: tuple[str, ...]  # views that fit no other
+    effects: MixedFit  # final fit, with the random effects of board, lens and views
+    duplicates: tuple[str, ...]  # views in which the board is where another has it
+    left_out: tuple[str, ...]  # excluded views
     n_points_left_out: int  # excluded points in the accepted views
     choice: Choice
-    # (V,), distance of the points of each view by the others, px rms.
-    held_out: FloatArray
-    # Of the camera in time, or of every second view, too small to refuse the set; U
-    # contains it.
+    held_out: FloatArray  # (V,), cross-validated residual of each view, px rms
+    # In time, or of every second view; too small to refuse the set, but in U.
     change: CameraChange | None
     halves: ViewHalves | None  # None where there are too few views
     remarks: tuple[Message, ...]  # warnings

@@ -21,10 +21,10 @@ LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 class CameraChange:
     """A camera that changed while its views were taken."""
 
-    name: str  # of the first view after it; empty if it continued gradually
+    name: str  # first view after it; empty if the change is gradual
     # (4 + n,), of the intrinsics, after less before, or last less first.
     difference: FloatArray
-    in_image: float  # distance that it puts between the images of one point, px rms
+    in_image: float  # difference of the projections of a point, px rms
 
 
 def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:

@@ -49,14 +49,13 @@ class Choice:
     """Choice of the lens model."""
 
     n_coefficients: int  # 5 or 8, or 4 of a fisheye
-    # Distance of points in views that were not fitted to, px rms, with each number of
-    # coefficients that the views show.
+    # Cross-validated residual, px rms, by number of coefficients.
     held_out: dict[int, float]
-    # Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they folded
-    # the image; None where they did not.
+    # Prior standard deviation of k3, or of k4 k5 k6, that keeps the image from folding;
+    # None if it does not fold.
     pull: float | None = None
-    # Between images of the chosen model and of the other one of a wide lens that is
-    # near to the views, px rms over the image: mostly where no view shows the board.
+    # Distance of the images by this model and by another that fits a wide lens as well,
+    # px rms; largest where no view shows the board.
     apart: float = 0.0
 
     @property

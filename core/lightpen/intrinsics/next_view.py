@@ -35,7 +35,7 @@ class SuggestedView:
 
     # (4, 2), of its points in the image, px, from its first corner on.
     outline: FloatArray
-    gain: float  # share of the uncertainty that it takes away
+    gain: float  # relative reduction of the uncertainty
 
 
 def choose_next_view(adjustment: BoardFit, board: Board) -> SuggestedView:

@@ -36,7 +36,7 @@ class ObservedBoard:
     """Views of a board."""
 
     views: Views
-    unseen: tuple[str, ...]  # names of the images, or moments, in which none did
+    unseen: tuple[str, ...]  # images, or moments, without a detected board
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ class PairLag:
     views: float
     sigma: float
     interval_ms: float | None  # interval between two views, if known
-    px_per_ms: float  # what a millisecond costs at the pen's speed of 100 mm/s
+    px_per_ms: float  # displacement of a pen moved at 100 mm/s
 
     @property
     def is_significant(self) -> bool:

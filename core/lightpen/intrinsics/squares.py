@@ -39,7 +39,7 @@ class _Beyond(Enum):
 class CornerCount:
     """Number of visible inner corners of a chessboard."""
 
-    # `columns` and `rows`: the more first.
+    # `columns` and `rows`: the larger number first.
     columns: int
     rows: int
     is_whole: bool  # whether the rim is seen all round; else there may be more

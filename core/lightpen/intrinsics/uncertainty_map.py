@@ -24,7 +24,7 @@ COLUMNS, ROWS = 9, 7
 class UncertaintyMap:
     """Standard uncertainty of projections over the image."""
 
-    pixels: FloatArray  # (7, 9, 2), where in the image, px
+    pixels: FloatArray  # (7, 9, 2), positions in the image, px
     # (7, 9), along the worst direction there, px; NaN where a fisheye sees nothing.
     sigmas: FloatArray
 

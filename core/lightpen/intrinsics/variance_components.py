@@ -69,11 +69,10 @@ class MixedFit:
     # (p, p), share of the covariance by noise and by errors of single views, which
     # another set of views draws again.
     repeatability: FloatArray
-    # Of each camera; None where the likelihood does not support one.
-    fields: tuple[LensField | None, ...]
+    fields: tuple[LensField | None, ...]  # of each camera; None if not supported
     field_gain: float  # twice the gain of log-likelihood by the fields
-    # Variance of the views' scores over what the components make of it [1]_; the
-    # covariance is multiplied by it where it is above 1.
+    # Variance of the views' scores relative to that by the components [1]_; above 1 it
+    # multiplies the covariance.
     clustering: float
     scores: ViewScores  # of each view, for tests of groups of views
 

@@ -19,11 +19,10 @@ def listed_names(names: tuple[str, ...]) -> str:
 class BoardTolerances:
     """Standard uncertainties of a board's geometry, priors of the adjustment."""
 
-    flatness: float = 0.1  # by how much its corners bend away from the plane, mm
-    # Relative tolerance of the aspect ratio and of the right angle: printers stretch
-    # the paper along its path.
+    flatness: float = 0.1  # bend of the corners out of the plane, mm
+    # Aspect ratio and right angle, relative; printers stretch the paper.
     squareness: float = 5e-4
-    scale: float = 1e-4  # Relative tolerance of the scale. No view determines it.
+    scale: float = 1e-4  # relative; no view determines it
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ class Constellation:
     leds: FloatArray
     normals: FloatArray
     radius: float  # radius of the discs, mm
-    min_leds: int  # LEDs to be explained before a labelling is believed
+    min_leds: int  # fewest LEDs of an accepted labelling
     triples: IntArray  # (Q, 3), all ordered triples of LEDs that form a triangle
     sides: FloatArray  # (Q, 3), sides 01, 02, 12 of the triangles, mm
     # `self_rotations` and `self_translations`: (M, 3, 3) and (M, 3). Motions of the pen

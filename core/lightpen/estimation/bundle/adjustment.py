@@ -56,14 +56,14 @@ MOST_SHRUNK = 0.01  # of an assumed standard deviation
 class Adjustment:
     """An adjustment of tip, cone and all parameters of the files."""
 
-    # The estimate, with assumed camera priors shrunk, and without unlikely mechanics.
+    # Estimate, with assumed camera priors shrunk and without unlikely mechanics.
     bundle: Bundle
-    unshrunk: Bundle  # the same with these priors as assumed
+    unshrunk: Bundle  # the same with the priors as assumed
     whole: Bundle  # the same with all mechanics, too; its covariance is the uncertainty
     priors: Priors  # priors of ``unshrunk`` with contradicted numbers released
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
-    # Of lens and timing; candidates are unknowns of all three.
+    # Lens and timing; candidates are unknowns of all three bundles.
     effects: tuple[SearchedEffect, ...]
 
     def shift_from(self, other: Bundle) -> FloatArray:

@@ -73,13 +73,13 @@ class Bundle:
     prior_information: FloatArray  # (p, p), L of equation (14)
     # (p, p), M of equation (14), of disc areas and the distance of two cones.
     measured_information: FloatArray
-    # (p, p), part of the covariance of the right side that is from a significant jitter
-    # of the seat: J of equation (15).
+    # (p, p), J of equation (15): covariance of the gradient by a significant jitter of
+    # the seat.
     jitter_information: FloatArray
-    # (p, p), the same of the expected jitter where it is not significant.
+    # (p, p), the same of the expected jitter if it is not significant.
     insignificant_jitter: FloatArray
-    # Standard deviation by which LEDs were weighted, px: ``sigma``, and more where
-    # noise is correlated.
+    # Standard deviation that weights the LEDs, px; above ``sigma`` if noise is
+    # correlated.
     weight_sigma: float
     covariance: FloatArray  # (p, p), P of equation (14), images taken as independent
 

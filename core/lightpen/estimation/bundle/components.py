@@ -14,8 +14,7 @@ NONE = Component(0.0, 0.0)
 class Components(NamedTuple):
     """Estimated standard deviations of the random effects."""
 
-    # Of one LED coordinate, mm; none where the images do not contradict the file.
-    leds: Component
+    leds: Component  # of an LED coordinate, mm; 0 if the images agree with the file
     seat: tuple[Component, ...]  # of the seat by each kind of mode, mm
     oval: Component  # of the two coefficients of an oval seat, see `oval_seat`, mm
     drift: Component  # of the cone over the whole range of each drift mode, mm

@@ -32,7 +32,7 @@ SCALE = message("file.scale")
 class Contradiction:
     """A number of a file that the images contradict."""
 
-    what: Message  # name of it
+    what: Message  # name of the number
     unit: str
     # `stated` and `stated_uncertainty`: value in the file and its U (k = 2), in
     # ``unit``.
@@ -43,9 +43,9 @@ class Contradiction:
     estimated: float
     estimated_uncertainty: float
     deviations: float  # their difference in standard deviations
-    camera: str  # camera whose file is concerned; empty for a single camera
-    of_rig: bool  # whether it is the rig's file that says so, and not the camera's
-    of_pen: bool = False  # whether it is the LED file
+    camera: str  # name of the camera concerned; empty for a single camera
+    of_rig: bool  # whether the rig file states it, not a camera file
+    of_pen: bool = False  # whether the LED file states it
 
     @property
     def message(self) -> Message:

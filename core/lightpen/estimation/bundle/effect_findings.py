@@ -42,16 +42,13 @@ class FoundEffect:
     """An effect that is fitted."""
 
     name: EffectName
-    # Of a rig, whose images it shifts; empty of a single camera, and of the pen.
-    camera: str
-    # Its value where it has one unknown, else the length of the vector of its values,
-    # of a lens the root mean square shift: mm, of lens and camera tilt px, of time
-    # image intervals.
+    camera: str  # name of the camera of a rig whose images it shifts; else empty
+    # Value (norm of several unknowns, RMS shift of a lens): mm; of lens and camera tilt
+    # px, of timing image intervals.
     size: float
     sigma: float | None  # standard uncertainty of the size; None of a lens
-    # Twice the logarithm of the likelihood ratio of this effect to no effect.
-    gain: float
-    interval_ms: float | None = None  # time from one image to the next, if known
+    gain: float  # twice the log likelihood ratio to no effect
+    interval_ms: float | None = None  # between successive images, if known
 
     @property
     def is_certain(self) -> bool:

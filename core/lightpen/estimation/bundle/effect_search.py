@@ -29,7 +29,7 @@ class SearchedEffect:
 
     effect: Effect
     component: EffectComponent
-    # (6, k), error of (tip, cone) by its unknowns where they are held at 0.
+    # (6, k), error of (tip, cone) per unknown of the effect if it is left out.
     by_unknowns: FloatArray
     is_candidate: bool  # whether the images support it
 

@@ -93,13 +93,12 @@ class Effect:
     """One effect with k unknowns."""
 
     name: EffectName
-    # Of the rig, whose images it shifts; 0 of an effect that all cameras see.
-    camera: int
+    camera: int  # index of the camera whose images it shifts; 0 if all cameras see it
     # (N, C, L, 2, k), derivative of the LEDs' images, px by mm or px
     columns: FloatArray
-    # Each (k, k), covariances that it may have, for a standard deviation of 1.
+    # Each (k, k), possible covariances for a standard deviation of 1.
     shapes: tuple[FloatArray, ...]
-    # Standard deviation that is stated, assumed or usual, mm or px; 0 if none is.
+    # Stated, assumed or usual standard deviation, mm or px; 0 if none.
     stated: float = 0.0
     # Whether the covariance is ``shapes[0]`` times the stated variance.
     is_exact: bool = False
@@ -149,11 +148,10 @@ class EffectComponent(NamedTuple):
     """Size of an effect by likelihood."""
 
     sigma: float  # standard deviation of maximum likelihood, mm or px
-    # Twice the logarithm of the likelihood ratio of this effect to no effect.
-    gain: float
-    covariance: FloatArray  # (k, k), of the unknowns with that
-    # (k, k), of the unknowns, averaged over what their size may be; of timing their
-    # mean square given the images; of mechanics their prior.
+    gain: float  # twice the log likelihood ratio to no effect
+    covariance: FloatArray  # (k, k), of the unknowns by ``sigma``
+    # (k, k), the same averaged over the likelihood of sigma; of timing the mean square
+    # given the images, of mechanics the prior.
     expected: FloatArray
 
     @property
@@ -246,8 +244,7 @@ class _Spectrum(NamedTuple):
     """Unknowns ``root x`` as independent x of one variance s^2 and information."""
 
     root: FloatArray  # (k, k)
-    # `seen` and `right`: (k,), information about each, and the right side that belongs
-    # to it.
+    # `seen` and `right`: (k,), information about each x, and its right side.
     seen: FloatArray
     right: FloatArray
 
@@ -277,11 +274,11 @@ class _Spectrum(NamedTuple):
 class ConeMoves(NamedTuple):
     """Moves of the tip against the cone, mm, in the frame of the rig."""
 
-    # (N, 2), the pen's axis across the axis of the cone, right and away.
+    # (N, 2), tilt of the pen's axis from that of the cone, right and away.
     lean: FloatArray
-    # (N, 3, 2), by 1 mm of compliance of the stylus, and of seat or stand.
+    # (N, 3, 2), per mm of compliance of the stylus, and of seat or stand.
     compliance: FloatArray
-    loose: FloatArray  # (N, 3, 3), by the three unknowns of a loose stylus
+    loose: FloatArray  # (N, 3, 3), per unknown of a loose stylus
 
 
 def cone_moves(rotations: FloatArray, axes: FloatArray) -> ConeMoves:

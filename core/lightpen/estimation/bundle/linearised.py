@@ -67,12 +67,12 @@ class CameraView:
     turn: FloatArray
     cone: FloatArray
     led: FloatArray
-    # (N, L, 2, k), by the intrinsics of the camera and, unless it is the first of the
-    # rig, by its rotation and translation in the rig.
+    # (N, L, 2, k), derivative by the intrinsics and, unless the camera is the first of
+    # the rig, by its rotation and translation in the rig.
     own: FloatArray
     # (N, L, 2, E), by the unknowns of `lightpen.estimation.bundle.effects`.
     effects: FloatArray
-    diameter: FloatArray  # (N, L, 2), by the diameter of the discs
+    diameter: FloatArray  # (N, L, 2), by the disc diameter
 
     def in_units_of(self, noise: FloatArray) -> "CameraView":
         """Return residuals and derivatives by the noise of each LED, (N, L)."""
@@ -146,17 +146,17 @@ class NormalEquations:
 
     N: FloatArray  # (K, K)
     b: FloatArray  # (K,)
-    # (N, 3, K), what each image adds to the three rows of the cone.
+    # (N, 3, K), contribution of each image to the rows of the cone.
     cone_rows: FloatArray
-    cone_right: FloatArray  # (N, 3), what it adds to their right side
+    cone_right: FloatArray  # (N, 3), contribution to their right side
 
 
 @dataclass(frozen=True, eq=False)
 class Eliminated(NormalEquations):
     """The same with the rotations eliminated, equation (3)."""
 
-    # (N, q), step of the eliminated unknowns of each image where the others stand: its
-    # rotation, and with jitter its seat.
+    # (N, q), step of the eliminated unknowns of each image with all others held:
+    # rotation, and with jitter the seat.
     turn: FloatArray
     turn_by_step: FloatArray  # (N, q, K)
     # (N, q, q), inverse of the normal matrix of the eliminated unknowns.

@@ -42,13 +42,12 @@ NOISE_PASSES = 2  # over variance and components
 class Correlation:
     """Correlation of the noise, and its effect on the covariance."""
 
-    # F of equation (12), of the errors of a coordinate from one image to the next; 0
-    # where it is not significant.
+    # F of equation (12): correlation of a coordinate's errors in successive images; 0
+    # if it is not significant.
     coefficient: float
     noise: FloatArray  # (6, 6), covariance of (tip, cone) by noise, equation (13), mm^2
     factor: float  # ratio of that to the covariance by independent noise, on average
-    # Components of LEDs, seat and drift in addition to correlated noise; None without
-    # correlation.
+    # Of LEDs, seat and drift beside correlated noise; None without.
     components: Components | None
     # (p, p), covariance of the fitted values by equation (13), less that of the fit;
     # None without correlation.

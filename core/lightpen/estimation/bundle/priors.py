@@ -46,19 +46,17 @@ class Priors:
     scale: Prior  # relative scale of all LED coordinates, from the LED measurement
     temperature: Prior  # scale by temperature
     diameter: Prior  # of the discs, mm
-    # Of one LED coordinate, mm; None: to be found from the images.
-    led_sigma: float | None
+    led_sigma: float | None  # of an LED coordinate, mm; None: estimated from images
     form_error: float  # standard deviation of the seat along each axis in each mode, mm
     # Standard deviation of errors of a centre that repeat with the posture, px
     center_bias: float
-    # Standard deviation of how far stylus, seat or stand give way, mm by the sine of
-    # the lean.
+    # Standard deviation of the deflection of stylus, seat or stand, mm per sine of the
+    # tilt.
     compliance: float = 0.0
-    # (3 L, 3 L), of all of them, mm^2, where more is known than ``led_sigma``.
+    # (3 L, 3 L), of all LED coordinates, mm^2; None: only ``led_sigma`` is known.
     led_covariance: FloatArray | None = None
     reading: DiameterReading | None = None  # disc diameter from the image areas
-    # Separation of the second cone from the first.
-    separation: ConeSeparation | None = None
+    separation: ConeSeparation | None = None  # of the second cone from the first
 
     @property
     def size_covariance(self) -> FloatArray:

@@ -21,7 +21,7 @@ class WhitenedEquations(NamedTuple):
     # Sum of the squared residuals after the unknowns of single images were eliminated.
     squares: float
     log_volume: float  # log determinants of the noise and of the eliminated unknowns
-    n_free: int  # observations more than unknowns eliminated
+    n_free: int  # observations less eliminated unknowns
 
 
 RIDGE = 1e-12  # of the mean of a diagonal, where an image shows nothing

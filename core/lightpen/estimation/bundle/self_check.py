@@ -37,7 +37,7 @@ class SelfCheck(NamedTuple):
     """Cross-validation: prediction of LEDs by the others."""
 
     value: float  # 1 by chance; larger where errors follow the posture
-    limit: float  # which noise alone exceeds in one of a hundred swings
+    limit: float  # 99 % quantile for noise alone
 
     @property
     def is_passed(self) -> bool:

@@ -19,10 +19,10 @@ FEWEST_LEDS = 4  # that define a frame
 class TipFrames(NamedTuple):
     """The tip in both frames, (3,) each, mm."""
 
-    # (3,), in the frame in which the LEDs that are not displaced fit the file best.
+    # (3,), in the frame in which the undisplaced LEDs fit the file best.
     of_file: FloatArray
-    of_all: FloatArray  # (3,), in the frame in which all LEDs as they are fit it best
-    # Whether result and U refer to the former: the displaced LEDs were left out.
+    of_all: FloatArray  # (3,), in the frame in which all LEDs as fitted fit it best
+    # Whether result and U refer to ``of_file``: displaced LEDs are left out.
     is_of_file: bool
 
 

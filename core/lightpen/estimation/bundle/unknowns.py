@@ -63,8 +63,8 @@ class Unknowns:
     basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs but those of the pen as a whole
     scaling: FloatArray  # (3 L,), move of the LEDs by a scale of 1
     priors: Priors
-    effects: tuple[Effect, ...]  # that are fitted
-    noise: FloatArray  # (N, C, L), noise of the LEDs' centres, by that of a usual one
+    effects: tuple[Effect, ...]  # the fitted ones
+    noise: FloatArray  # (N, C, L), noise of each LED centre relative to a usual one
 
     @classmethod
     def of(

@@ -62,11 +62,10 @@ class JointFit:
     # (N, L, 2). Observed minus modelled ellipse centres, px; NaN where an LED was not
     # seen. Of C cameras (N, C L, 2): the LEDs of one camera after those of the other.
     residuals: FloatArray
-    # (N, L), LEDs below the outlier threshold; none of an image that has fewer than
-    # three.
+    # (N, L), LEDs below the outlier threshold; none of an image with fewer than three.
     used: BoolArray
     sigma: float  # standard deviation of one image coordinate, px
-    # (N, 6, 6), what each image says of (tip, cone), rotation eliminated, 1/mm^2.
+    # (N, 6, 6), of each image on (tip, cone), rotation eliminated, 1/mm^2.
     information: FloatArray
     # (N, 6), ``information`` times the step that the image alone would take, 1/mm
     gradients: FloatArray
@@ -255,7 +254,7 @@ class _Reduced:
 
     S: FloatArray
     b: FloatArray
-    turn: FloatArray  # (N, 3), rotation step at a standing tip and cone
+    turn: FloatArray  # (N, 3), rotation step with tip and cone held
     turn_by_step: FloatArray  # (N, 3, 6)
 
     def step(self) -> FloatArray:

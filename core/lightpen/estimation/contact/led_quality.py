@@ -25,10 +25,8 @@ class LedQuality:
     # (L,), root mean square residual of the images that use the LED, px; NaN if none.
     rms: FloatArray
     mean: FloatArray  # (L, 2), mean residual of these, px; NaN if none
-    # (L, 3), how far the LED sits off its place in the file, pen frame, mm
-    displacement: FloatArray
-    # Numbers of the LEDs, from 1, that stand out by their displacement.
-    displaced: tuple[int, ...]
+    displacement: FloatArray  # (L, 3), fitted less stated position, pen frame, mm
+    displaced: tuple[int, ...]  # numbers of the displaced LEDs, from 1
 
 
 def measure_leds(rig: Rig, pen: Pen, pixels: FloatArray, joint: JointFit) -> LedQuality:

@@ -34,7 +34,7 @@ class PosedImages:
     poses: Poses
     # (F,), images whose pose most LEDs agree with; ``pivot`` is of these.
     fitted: IntArray
-    kept: IntArray  # (K,), those among the M whose tip is where most have it
+    kept: IntArray  # (K,), those of the M whose tip agrees with most
     pivot: PivotFit  # tip and cone, from poses of which most are ``kept``
 
     @property

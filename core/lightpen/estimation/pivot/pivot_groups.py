@@ -48,8 +48,7 @@ class PoseGroups:
     # `tips_pen` and `pivots_cam`: (2, 3), of both groups, mm
     tips_pen: FloatArray
     pivots_cam: FloatArray
-    # Whether it is the tip that differs most plainly; else it is the pivot.
-    has_two_tips: bool
+    has_two_tips: bool  # whether the tips differ more significantly than the pivots
 
     @property
     def minor_share(self) -> float:

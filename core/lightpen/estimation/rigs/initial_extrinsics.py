@@ -26,10 +26,9 @@ class InitialExtrinsics:
     """The extrinsics of a rig by the images."""
 
     rig: Rig  # with the file's cameras, without a covariance
-    # Time lag of each camera but the first; None if the images do not determine it.
+    # Of each camera but the first; None: not determined.
     lags: tuple[TimeLag | None, ...]
-    # (N, C), images that are of other moments than those of the cameras before.
-    apart: BoolArray
+    apart: BoolArray  # (N, C), images of other moments than those of the cameras before
 
     def deviations(self, file: Rig) -> FloatArray:
         """Return the deviations from a file's extrinsics, as in `Rig.covariance`."""

@@ -58,7 +58,7 @@ class _Distance(NamedTuple):
     camera: int
     angle: float  # rad
     length: float  # mm
-    size: float  # in what is usual
+    size: float  # the larger of both relative to the usual deviation
 
 
 def require_usual_rig(

@@ -36,7 +36,7 @@ class PenRotations:
 
     rotations: FloatArray  # (N, 3, 3)
     variances: FloatArray  # (N,), of the three axes of each together, rad^2
-    known: BoolArray  # (N,), where there is one
+    known: BoolArray  # (N,), whether there is one
 
     @classmethod
     def of(cls, images: PosedImages) -> "PenRotations":
@@ -62,7 +62,7 @@ class PenRotations:
         )
 
     def completed(self, other: "PenRotations", rotation: FloatArray) -> "PenRotations":
-        """Return extrinsics, completed by those of a camera rotated by 180 degrees."""
+        """Return these, completed by those of a camera rotated by `rotation`."""
         new = other.known & ~self.known
         return PenRotations(
             np.where(new[:, None, None], rotation.T @ other.rotations, self.rotations),
@@ -75,11 +75,11 @@ class PenRotations:
 class RelativeRotation:
     """Relative rotation of two cameras at P common moments."""
 
-    rotation: FloatArray  # (3, 3), from the one to the other
-    pairs: IntArray  # (P,), the moments
-    # (P, 3), turns by which each lies off it, in the frame of the one, rad
+    rotation: FloatArray  # (3, 3), from the first camera to the second
+    pairs: IntArray  # (P,), the common moments
+    # (P, 3), rotation vector of each moment's deviation, frame of the first, rad.
     off: FloatArray
-    usual: float  # length of such turns by what the poses are uncertain by, rad
+    usual: float  # length of these expected from the poses' uncertainty, rad
 
     @property
     def scatter(self) -> float:
@@ -100,7 +100,7 @@ class TimeLag:
     # `value` and `sigma`: lag in image intervals, and its standard deviation.
     value: float
     sigma: float
-    turn: float  # that it makes of the usual motion, rad
+    turn: float  # rotation of the pen in this time in the usual motion, rad
 
     @property
     def is_noticeable(self) -> bool:

@@ -93,7 +93,7 @@ class ContributionName(StrEnum):
     SAG = "sag"
     TILT = "camera tilt"
     TIMING = "timing"
-    SHRINKAGE = "not followed"  # by the estimate: what assumed priors allow beyond it
+    SHRINKAGE = "not followed"  # assumed priors beyond the shrunk ones
 
 
 SHARES_OF_EFFECTS = {
@@ -126,8 +126,7 @@ class UncertaintyContribution:
 
     name: ContributionName
     covariance: FloatArray  # (6, 6), of (tip_pen, cone_cam), mm^2
-    # Whether it rests on an assumption, as a file does not state it.
-    assumed: bool = False
+    assumed: bool = False  # whether a default value replaces what a file leaves out
 
     @property
     def standard_uncertainty(self) -> FloatArray:
@@ -146,11 +145,10 @@ class Budget:
     # (6, 6), from the scatter between blocks of consecutive images, all but tip and
     # cone held, mm^2; None with too few images.
     blocks: FloatArray | None
-    # Variance between blocks over that of independent noise, and of a jitter of the
-    # seat where there is one; 1 on average.
+    # Variance between blocks relative to independent noise and jitter of the seat; 1 on
+    # average.
     block_ratio: float
-    # Correlation of one coordinate's errors between successive images; 0 if not
-    # significant.
+    # Of a coordinate's errors in successive images; 0 if not significant.
     autocorrelation: float
     correlation_factor: float  # factor on the covariance of independent noise
 

@@ -30,8 +30,8 @@ TURN = 1e-3  # rad, of a difference
 class NormalEffect(NamedTuple):
     """Effect of a rotation of all normals on a bundle with fixed normals."""
 
-    gain: FloatArray  # (p, 2), change of the unknowns by the turn, a rad
-    # (2, 2), what the images show of the turn, all else unknown, 1/rad^2.
+    gain: FloatArray  # (p, 2), change of the unknowns per rad of rotation
+    # (2, 2), of the images on the rotation, all else unknown, 1/rad^2.
     information: FloatArray
 
     def covariance(self, of_turn: FloatArray) -> FloatArray:

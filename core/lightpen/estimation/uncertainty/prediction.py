@@ -75,9 +75,9 @@ class UncertaintyPrediction:
     equations: NormalEquations  # for a noise of 1 px
     n_whole: int  # images that were linearised together
     mechanics: tuple[Effect, ...]  # with their columns in these images
-    # What these images leave open of lens and timing.
+    # Of lens and timing, as far as these images determine them.
     effects: tuple[SearchedEffect, ...] = ()
-    # What endless images of this kind leave open, errors of centres apart.
+    # Contributions that remain with endless images of this kind.
     lasting: tuple[UncertaintyContribution, ...] = ()
 
     @property

@@ -52,11 +52,11 @@ class ImprovedPen:
 
     pen: Pen
     camera: Camera
-    moves: FloatArray  # (L, 3), new less old places of the LEDs, mm
+    moves: FloatArray  # (L, 3), new less old LED positions, mm
     pooled: tuple[str, ...]  # names of the swings
     held_out: str  # name of the swing that confirms it
-    sigma_before: float  # residuals of that swing with the old and the new LEDs, px
-    sigma_after: float  # residuals of that swing with the old and the new LEDs, px
+    sigma_before: float  # noise of that swing by the old LEDs, px
+    sigma_after: float  # the same by the new LEDs, px
 
 
 def calibrate_again(

@@ -58,9 +58,8 @@ class SwingOfPen:
 
     name: str
     shifts: FloatArray  # (L, 3), of LEDs since the first swing, mm; NaN if not seen
-    # Since the first swing that tells its size. None of that swing, if cone or
-    # camera was moved in between, the images contradict a file, or of several
-    # cameras, which see the size itself.
+    # Since the first swing that determines it; None for that swing, if cone or camera
+    # was moved, if the images contradict a file, or with several cameras.
     growth: Growth | None
 
 

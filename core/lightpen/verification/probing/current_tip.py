@@ -39,7 +39,7 @@ class CurrentTip:
     tip_file: InputFile
     pen_file: InputFile
     temperature_c: float | None = None  # of the pen on that day
-    humidity_percent: float | None = None  # of the room, likewise
+    humidity_percent: float | None = None  # of the room on that day
 
     @property
     def region(self) -> RegionOfInterest:

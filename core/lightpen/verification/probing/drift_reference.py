@@ -116,9 +116,9 @@ def _lights(
 class LampDrift:
     """Drift of fixed lamps during a verification."""
 
-    lamps: FloatArray  # (K, 2), where they are in the image, px
+    lamps: FloatArray  # (K, 2), positions in the image, px
     moves: FloatArray  # (B, 2), of each block since the first, along u and v, mm
-    uncertainty: float  # U (k = 2) of one of them, mm
+    uncertainty: float  # U (k = 2) of one move, mm
     assessment: VerificationAssessment = field(repr=False)
 
     @property

@@ -50,8 +50,8 @@ class ProbingPhase(StrEnum):
     AT_REST = "at rest"  # not seen to move since probing began
     MOVING = "moving"  # or not seen
     HOLDING = "holding"
-    RECORDED = "recorded"  # the pen has to move on
-    KNOWN = "known"  # likewise: this point was touched before
+    RECORDED = "recorded"  # the pen must move
+    KNOWN = "known"  # the same after a point that was touched before
 
 
 class ProbingEventKind(StrEnum):
@@ -67,8 +67,8 @@ class ProbingRules:
 
     n_frames: int = FAST  # images of a touch
     n_settling: int = SETTLING  # images before them, the pen being still
-    min_turn: float = 0.0  # of posture against touches before, rad; or
-    min_distance: float = 0.0  # of place, mm: one of the two is enough
+    min_turn: float = 0.0  # from the posture of each touch before, rad; or
+    min_distance: float = 0.0  # from its position, mm: one of both suffices
 
     def __post_init__(self) -> None:
         if self.n_frames < 1 or self.n_settling < 0:
@@ -94,9 +94,9 @@ class ProbingState:
     phase: ProbingPhase = ProbingPhase.MOVING
     held: tuple[TipObservation, ...] = ()  # while still; at rest the first and last
     deviating: TipObservation | None = None  # the last one, if it disagrees
-    rejected: tuple[RejectedFrame, ...] = ()  # rejected between those held
+    rejected: tuple[RejectedFrame, ...] = ()  # between those held
     n_lost: int = 0  # images in a row without the pen
-    path: tuple[FloatArray, ...] = ()  # where the tip was before, (3,) each, mm
+    path: tuple[FloatArray, ...] = ()  # earlier positions of the tip, (3,) each, mm
     taken: tuple[StillFrames, ...] = ()  # points probed so far
     places: tuple[TipObservation, ...] = ()  # one observation of each point
     is_sliding: bool = False  # seen without a break since the last point

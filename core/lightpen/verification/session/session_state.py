@@ -83,10 +83,12 @@ class SessionState:
 
     touching: ProbingState = field(default_factory=ProbingState)
     touches: Points = ()
-    runs: tuple[Points, ...] = ()  # runs of the task at hand that are done
-    fault: Message | None = None  # of the last point, or of all though enough
+    runs: tuple[Points, ...] = ()  # completed runs of the current task
+    # Of the last point, or of all points once they suffice.
+    fault: Message | None = None
     found: Mapping[str, Found] = field(default_factory=dict)  # of completed tasks
-    measured: Mapping[str, RunsOfTask] = field(default_factory=dict)  # likewise
+    # Runs of completed tasks.
+    measured: Mapping[str, RunsOfTask] = field(default_factory=dict)
     visits: tuple[Points, ...] = ()  # visits of the reference cone so far
     pending: tuple[RunsOfTask, ...] = ()  # results that lack the next drift
 

@@ -30,8 +30,8 @@ N_SAMPLES = 500  # of three points each
 class CircleFit:
     """A circle of least squares in its own plane."""
 
-    center_cam: FloatArray  # (3,), mm; the normal points to the camera
-    normal_cam: FloatArray  # (3,), mm; the normal points to the camera
+    center_cam: FloatArray  # (3,), mm
+    normal_cam: FloatArray  # (3,), unit vector, towards the camera
     radius: float  # mm
     radial: FloatArray  # (N,), distances from the circle in its plane, outwards, mm
     axial: FloatArray  # (N,), distances from its plane, mm

@@ -103,7 +103,7 @@ class FixedPoint(Found):
     calibrated: Scatter
     nominal: Scatter | None  # with the nominal tip, if known
     uncertainty: FloatArray  # (3,), U (k = 2) of the mean, mm
-    expected_deviation: FloatArray  # (3,), of the touches, as is known, mm
+    expected_deviation: FloatArray  # (3,), of a touch by its covariance, mm
     tip: TipEvidence
     moved: FloatArray | None  # (3,), mean less the calibration's cone, mm
 

@@ -43,8 +43,8 @@ class ProbingFrame:
 
     name: str  # file or frame
     pixels: FloatArray  # (C, L, 2), centres of the LEDs, px; NaN if not seen
-    rotation: FloatArray  # (3, 3), rough cam_from_pen of the first camera, mm
-    translation: FloatArray  # (3,), rough cam_from_pen of the first camera, mm
+    rotation: FloatArray  # (3, 3), rough cam_from_pen of the first camera
+    translation: FloatArray  # (3,), of the same, mm
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,12 @@ class ProbedPoint:
     """A measured point."""
 
     point_cam: FloatArray  # (3,), tip centre, or the surface touched, mm
-    noise: FloatArray  # (3, 3), covariance by what is its own, mm^2
+    # (3, 3), part of the covariance independent of other points, mm^2.
+    noise: FloatArray
     sensitivity: FloatArray  # (3, q), derivative by the parameters of the instrument
     rotation: FloatArray  # (3, 3), of cam_from_pen
     names: tuple[str, ...]
-    rms: float  # root mean square residual of an LED in them, px
+    rms: float  # root mean square residual of an LED, px
     rejected: tuple[RejectedFrame, ...] = ()
     approach_cam: FloatArray | None = None
 

@@ -54,7 +54,7 @@ class NumberOption:
     """A number among the options of a task."""
 
     name: str  # attribute of the options
-    label: Message | None  # None of one that the window does not show
+    label: Message | None  # None: not shown in the window
     least: float = 0.0
     most: float = LONGEST
     unit: str = "mm"
@@ -113,7 +113,7 @@ BALL_OPTION = NumberOption(
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Under which points are measured and judged."""
+    """Conditions under which points are measured and judged."""
 
     instrument: Instrument
     limits: VerificationLimits = field(default_factory=VerificationLimits)
@@ -203,8 +203,8 @@ class HandGoal:
     """Goal of a simulated operator for the next point."""
 
     point: FloatArray | None = None  # (3,), from the cone's bottom, mm
-    tilt: float = 0.0  # how the pen is held in the cone, rad
-    direction: float = 0.0  # how the pen is held in the cone, rad
+    tilt: float = 0.0  # of the pen in the cone, rad
+    direction: float = 0.0  # of the tilt, rad
     outwards: FloatArray | None = None  # (3,), normal of the surface there
 
 

@@ -54,7 +54,7 @@ LARGEST = 1.0  # mm: what shows no smaller error shows none
 class TipEvidence:
     """The evidence of points on the tip."""
 
-    change: FloatArray  # (3,), required tip less the given one, pen frame, mm
+    change: FloatArray  # (3,), required less given tip, pen frame, mm
     covariance: FloatArray  # (3, 3), of the change of a correct tip, mm^2
     is_significant: bool  # whether it is more than chance
     detectable: float  # found with 95 % probability, mm; inf if never
