@@ -28,8 +28,8 @@ class Demo(QObject):
     A demo that is watched leaves time to read.
     """
 
-    message_sent = Signal(str)  # a sentence on what is going on
-    ended = Signal()  # the tip is accepted, or the swing gave none
+    message_sent = Signal(str)  # progress, a sentence
+    ended = Signal()  # the tip is accepted, or the swing failed
 
     def __init__(
         self, window: MainWindow, workbench: Workbench, *, is_watched: bool = True

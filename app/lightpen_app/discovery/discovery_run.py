@@ -50,7 +50,7 @@ class DiscoveryState:
     # Postures so far, and the next one; None before the first solution.
     guide: Guide | None = None
     posture: Posture | None = None  # of the pen in the last image
-    progress: float | None = None  # of the final computation; None while there is none
+    progress: float | None = None  # of the final computation; None before and after
     fault: str = ""  # why the last trial found nothing
     # Whether its files are in use, and the images are being opened.
     is_saved: bool = False
@@ -75,7 +75,7 @@ class DiscoveryRun(QObject):
     """Records and solves a swing of a pen of which nothing is known."""
 
     changed = Signal()  # `state` is different
-    found_changed = Signal()  # so is what is found
+    found_changed = Signal()  # the result has changed
     # Both files and the images are in use, and the first of these was read.
     saved = Signal()
     _unwritten = Signal(object)

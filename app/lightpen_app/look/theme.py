@@ -76,8 +76,8 @@ class Colors:
     on_warn: str
     bad: str
     on_bad: str
-    partial: str  # filling of what is begun; `text` is read on it
-    pointer: str  # arrow and frame that show where to go; a shape, never words
+    partial: str  # filling of a started item; `text` is read on it
+    pointer: str  # arrow and frame that show where to go; never text
 
     def tone(self, tone: Tone) -> QColor:
         """Return the tone of the state."""

@@ -55,8 +55,8 @@ class Block:
     paint: Callable[[QPainter], None]
     height: float  # dots
     space: float = 0.0  # above it, but for the first of a page, dots
-    keeps: bool = False  # whether what follows stands on the same page
-    head: "Block | None" = None  # block that is repeated at the top of each page
+    keeps: bool = False  # whether the next block is kept on the same page
+    head: "Block | None" = None  # repeated at the top of each page
 
 
 @dataclass(frozen=True)

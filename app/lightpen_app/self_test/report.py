@@ -46,7 +46,7 @@ class Report:
     versions: dict[str, str] = field(default_factory=dict)
     is_complete: bool = False
     last_lines: Callable[[], Sequence[str]] = tuple  # of the log
-    doing: Callable[[], str] = str  # what is done just now
+    doing: Callable[[], str] = str  # returns the current step
     # Where each thread was when the test was given up, by its name.
     threads: Mapping[str, Sequence[str]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)

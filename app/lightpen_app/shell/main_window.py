@@ -69,12 +69,11 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
     completed = Signal()  # the window was painted, and all pages are made
-    discovery_requested = Signal()  # as of `Page`
+    discovery_requested = Signal()  # as in `Page`
     preferences_changed = Signal(object)  # Preferences: the user chose otherwise
     # Whether anybody may be looking at live images now.
     attention_changed = Signal(bool)
-    # The pages are shut down; what they share must be, too, and whoever does so waits
-    # for what is still under way.
+    # Pages are shut down; receivers shut down shared objects and wait for them.
     closing = Signal()
 
     def __init__(

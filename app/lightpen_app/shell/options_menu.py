@@ -23,7 +23,7 @@ class OptionsMenu(Translated, QMenu):
     data_folder_chosen = Signal()  # the user wants to keep swings and results elsewhere
     # The user wants others to follow the pen, or to see who does.
     stream_chosen = Signal()
-    about_chosen = Signal()  # the user wants to know what the program is
+    about_chosen = Signal()  # show the description of the program
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -18,7 +18,7 @@ class NoticeBar(Translated, QFrame):
     another one is chosen, and is reported once.
     """
 
-    value_changed = Signal(str)  # what it says; empty once it says nothing any more
+    value_changed = Signal(str)  # its text; empty if it shows none
 
     def __init__(self) -> None:
         super().__init__()

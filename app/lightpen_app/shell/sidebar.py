@@ -33,8 +33,8 @@ class Subject:
     """Item under calibration, as shown beside the steps."""
 
     names: Names  # names of the swing, or the selected ones without a swing
-    origin: Origin | None  # origin of the images; None if the swing does not state it
-    statuses: StationStatus = field(default_factory=StationStatus)  # how all tips stand
+    origin: Origin | None  # of the images; None if the swing does not state it
+    statuses: StationStatus = field(default_factory=StationStatus)  # of all tips
 
 
 def subject_of(

@@ -30,9 +30,9 @@ class Status:
     """Status of a page."""
 
     title: str
-    complete: bool  # all that the step asks for is there
+    complete: bool  # whether the step has all its inputs
     why_closed: str  # why the step cannot be entered; empty when it can
-    doubtful: bool = False  # whether what is complete was taken with doubts
+    doubtful: bool = False  # whether it was completed despite warnings
 
 
 @dataclass(frozen=True)

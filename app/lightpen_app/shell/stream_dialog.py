@@ -26,7 +26,7 @@ class StreamState:
     status: StreamStatus = field(default_factory=StreamStatus)
     # Whether the place of a tip is streamed, and not the pose alone.
     has_tip: bool = False
-    fault: str = ""  # why nobody can listen, though somebody should
+    fault: str = ""  # why the enabled stream cannot listen
 
 
 class StreamDialog(FittedWindow, Translated, QDialog):

@@ -55,15 +55,13 @@ class Page(Translated, QWidget):
     # Names the step in the settings and its help file: "start", "camera" and so on.
     key = ""
     shows_images = False  # whether live images are shown on it
-    # Something that the page says of itself, such as its main action, is different.
-    changed = Signal()
-    advance_requested = Signal()  # the step is done; show the next
-    # The step of this key must be shown, such as that of a swing to continue with.
+    changed = Signal()  # properties of the page, such as its main action, have changed
+    advance_requested = Signal()  # show the next step
+    # Key of the step to show, such as that of a resumed swing.
     step_requested = Signal(str)
-    # OperatorValue: what the operator view shows
-    operator_value_changed = Signal(object)
-    data_folder_requested = Signal()  # another data folder is to be chosen
-    discovery_requested = Signal()  # pen and camera are to be found without files
+    operator_value_changed = Signal(object)  # OperatorValue
+    data_folder_requested = Signal()  # choose another data folder
+    discovery_requested = Signal()  # find pen and camera without files
 
     def title(self) -> str:
         """Return the name of the step."""

@@ -13,7 +13,7 @@ N_CAMERAS = 2
 class CameraSwitch(Translated, QWidget):
     """A button for each camera, of which one is pressed."""
 
-    value_changed = Signal(int)  # another camera is to be shown, by its number from 0
+    value_changed = Signal(int)  # index of the camera to show
 
     def __init__(self) -> None:
         super().__init__()

@@ -17,7 +17,7 @@ class DateField(Translated, EnterEdit):
     The example is shown while it is empty.
     """
 
-    value_changed = Signal()  # another day is typed, or none
+    value_changed = Signal()
 
     def __init__(self, example: date = EXAMPLE) -> None:
         super().__init__()

@@ -34,7 +34,7 @@ class OperatorValue:
     state: State = field(default_factory=State)
     count: str = ""  # such as "60 kept, 40 to go"
     time_left: str = ""  # such as "about 20 s left"; empty where nothing is waited for
-    fraction: float | None = None  # how much is done, 0 to 1
+    fraction: float | None = None  # fraction done, 0 to 1
     keys: str = ""  # keys of this view besides closing it
     dial: DialValue | None = None
 

@@ -14,7 +14,7 @@ class PageScroll(QScrollArea):
     The page keys, which a presenter's remote sends, are left to the window.
     """
 
-    height_changed = Signal(int)  # of what is seen at once, px
+    height_changed = Signal(int)  # of the visible part, px
 
     def __init__(self) -> None:
         super().__init__()

@@ -58,7 +58,7 @@ class DialValue:
     posture: Posture | None = None  # of the pen at present
     target: Posture | None = None  # of the next image
     turns: tuple[float, float] | None = None  # least and greatest turn kept, rad
-    turns_needed: tuple[float, float] | None = None  # what they should reach, rad
+    turns_needed: tuple[float, float] | None = None  # required turns, rad
     # By how much the drawing is turned, counter-clockwise, so that the operator finds
     # left and right as his own: 0 behind the camera, pi facing it; rad.
     heading: float = 0.0

@@ -17,8 +17,7 @@ class SizeClass:
     is_narrow: bool = False
     is_low: bool = False
     is_large: bool = False
-    # Whether it has so much that it may show more than what is needed.
-    is_vast: bool = False
+    is_vast: bool = False  # whether there is room for more than the essentials
 
     @property
     def margin(self) -> int:

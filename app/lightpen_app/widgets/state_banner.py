@@ -30,7 +30,7 @@ class State:
     detail: str = ""  # a sentence
     sign: Sign = Sign.NONE
     tone: Tone = Tone.PLAIN
-    # How far a wait has come, 0 to 1; drawn as a ring about the sign.
+    # Progress of a wait, 0 to 1; drawn as a ring about the sign.
     fraction: float | None = None
 
 

@@ -28,7 +28,7 @@ class CameraSetup(QObject):
     """
 
     cameras_found = Signal(object)  # tuple of FoundDevice
-    search_failed = Signal(str)  # the sentence why no cameras can be looked for
+    search_failed = Signal(str)  # reason, text for the user
 
     def __init__(
         self,

@@ -15,8 +15,7 @@ class FolderWatch(QObject):
 
     # Number of other windows of the program that use it, when it changes.
     counted = Signal(int)
-    # Why nothing can be stored in it; empty when it can again.
-    fault_changed = Signal(str)
+    fault_changed = Signal(str)  # why the folder cannot be written; empty if it can
 
     def __init__(self, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -28,8 +28,8 @@ class Job(QObject):
     """
 
     progressed = Signal(float)  # fraction done, 0 to 1
-    succeeded = Signal(object)  # what the function returned
-    failed = Signal(str)  # text for the user, in the language that is chosen
+    succeeded = Signal(object)  # result of the function
+    failed = Signal(str)  # text for the user, translated
     crashed = Signal()  # it ended by a bug, without an outcome
     # The last of all, whether it succeeded, failed, was cancelled or crashed.
     ended = Signal()

@@ -10,7 +10,7 @@ from lightpen_app.look.theme import Tone
 class Notifications(QObject):
     """The active notifications, each until its cause has ended."""
 
-    raised = Signal(str, object)  # str, Tone: a sentence to be read
+    raised = Signal(str, object)  # str, Tone: text for the user
     # A sentence of `raised` whose cause is gone, in the language it was raised in.
     withdrawn = Signal(str)
     status_changed = Signal(str)  # a sentence for the status line

@@ -26,7 +26,8 @@ class PenFiles(QObject):
     A simulated pen has its own files, whatever its name.
     """
 
-    changed = Signal()  # `doubt` may be another one
+    # `doubt` may have changed.
+    changed = Signal()
 
     def __init__(
         self,

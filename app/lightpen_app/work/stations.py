@@ -52,7 +52,7 @@ class Station:
     # Its centre by design, mm, pen frame; None for that of the LED file.
     nominal_tip: Triple | None = None
     camera: StoredCamera = field(default_factory=StoredCamera)
-    second: StoredCamera | None = None  # None where one camera is used
+    second: StoredCamera | None = None  # None for a single camera
     files: FilePaths = field(default_factory=FilePaths)
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL

@@ -71,7 +71,7 @@ class _Swing:
 
     sightings: Sightings
     centers: tuple[FloatArray, ...]  # spots that are no lamps, px
-    kept: tuple[IntArray, ...]  # their numbers in the sightings
+    kept: tuple[IntArray, ...]  # (S,) each, their numbers in the sightings
     pieces: Pieces
     found: Labelled
     hypotheses: tuple[Hypothesis, ...]

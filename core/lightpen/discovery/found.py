@@ -37,13 +37,12 @@ class Discovery:
     covariance: FloatArray
     # (3, 3), share of lens and mechanics in the covariance of the tip, mm^2
     beyond_fit: FloatArray
-    calibration: Calibration  # by which they were adjusted
+    calibration: Calibration  # the final adjustment
     lengths: tuple[KnownLength, ...]
     is_relative: bool  # whether there was no length
     hypotheses: tuple[Hypothesis, ...]
     n_lamps: int  # lights that did not move with the pen
-    # Why this lens model; None where the camera is known.
-    lens_choice: Choice | None = None
+    lens_choice: Choice | None = None  # None if the camera is known
 
     @property
     def parameters(self) -> Parameters:

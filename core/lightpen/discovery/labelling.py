@@ -47,7 +47,7 @@ class Labelled:
     state: BundleState  # of the M images that have a rotation
     images: IntArray  # (M,)
     spots: IntArray  # (N, L), spot of each LED in each image; -1 without one
-    unexplained: BoolArray  # (N, P), where pieces that move and are no LEDs are seen
+    unexplained: BoolArray  # (N, P), where moving pieces that are no LEDs are seen
 
 
 def label(

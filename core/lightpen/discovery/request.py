@@ -25,7 +25,7 @@ class Request:
     # cones gives the scale where there is no length.
     second: "SecondSightings | None" = None
     touched: "TouchedLength | None" = None  # a certified length
-    n_coefficients: int | None = None  # that other swings need; None: it is chosen
+    n_coefficients: int | None = None  # required by other swings; None: chosen
 
     @property
     def is_relative(self) -> bool:

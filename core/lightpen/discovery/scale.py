@@ -24,7 +24,7 @@ class MeasuredLength:
 
     leds: tuple[int, int] | None  # numbers from 1; None: the two farthest apart
     length: float  # mm
-    sigma: float  # its standard uncertainty, mm
+    sigma: float  # standard uncertainty, mm
 
 
 def known_lengths(

@@ -38,7 +38,7 @@ class HeldOut:
     """
 
     tip: FloatArray  # (3,), difference of the tips, mm
-    tip_sigma: FloatArray  # (3,), its standard uncertainty, mm
+    tip_sigma: FloatArray  # (3,), standard uncertainty, mm
     focal_length: float  # difference of fx, px
     focal_length_sigma: float
 
@@ -55,7 +55,7 @@ class Together:
 
     found: Discovery  # of all; its calibration is that of the first swing
     swings: tuple[Discovery, ...]  # of each
-    held_out: HeldOut  # the last against the others
+    held_out: HeldOut  # the last swing against the others
 
 
 def discover_together(

@@ -24,7 +24,7 @@ class Entries:
     which the file may have one.
     """
 
-    name: str | Message  # name of the file, or of a place in it, for messages
+    name: str | Message  # of the file, or of a place in it, for messages
     values: dict[str, tuple[str, Tree]]  # by plain name: name in the file, value
 
     @staticmethod

@@ -29,7 +29,7 @@ class Limit:
     unit: str  # empty of a count, and of a choice
     range: tuple[float, float]
     choices: tuple[Message, ...] = ()  # the value is the index of one of them
-    options: tuple[Any, ...] = ()  # what each choice stands for
+    options: tuple[Any, ...] = ()  # value of each choice
 
     @property
     def key(self) -> str:
@@ -124,7 +124,7 @@ class VerificationLimits:
     repeatability: float = _limit(0.01, message("limit.repeatability"))
     # How far a drift reference may move during a session.
     drift: float = _limit(0.02, message("limit.drift"))
-    rule: DecisionRule = _RULE  # how a value with its U is compared with its limit
+    rule: DecisionRule = _RULE  # comparison of a value and its U with its limit
     # Of a wrong decision, where the rule is the risk, percent.
     risk: float = _limit(5.0, message("limit.risk"), "%", (0.1, 50.0))
 

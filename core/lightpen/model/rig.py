@@ -28,7 +28,7 @@ class Rig:
     # (6 (C - 1), 6 (C - 1)), of the rotation vectors (left, rad) and translations (mm)
     # of all but the first camera, in this order camera by camera
     covariance: FloatArray | None = None
-    names: tuple[str, ...] = ()  # for display; none for a single camera
+    names: tuple[str, ...] = ()  # for display; empty for a single camera
 
     @property
     def n_cameras(self) -> int:

@@ -129,10 +129,10 @@ class PenDraft:
 class DraftCheck:
     """Result of checking a draft."""
 
-    flaw: Message | None = None  # why it is no pen: the cell and what is wrong with it
+    flaw: Message | None = None  # cell and fault, if it is not a valid pen
     pen: Pen | None = None  # the pen as it is typed
-    frame: FrameCheck | None = None  # how that fares with the pen frame
-    sought: Pen | None = None  # in images: in the pen frame if it can be put there
+    frame: FrameCheck | None = None  # its agreement with the pen frame
+    sought: Pen | None = None  # to be found in images; in the pen frame if possible
 
     @property
     def usable(self) -> Pen | None:
@@ -231,7 +231,7 @@ class OpenedPen:
 
     path: Path
     file: PenFile | None = None  # the pen, fit for use
-    draft: PenDraft | None = None  # else its LEDs to be mended, if they can be shown
+    draft: PenDraft | None = None  # LEDs to be corrected, of an invalid file
     needs_units: bool = False  # it must be read again with units
     problem: Message | None = None  # why it cannot be used
 

@@ -48,7 +48,7 @@ class StreamPlace:
     """Address and port of a stream."""
 
     address: str = LOOPBACK  # to listen on
-    port: int = PORT  # 0 for any that is free
+    port: int = PORT  # 0: any free one
 
     @property
     def is_local(self) -> bool:

@@ -15,7 +15,7 @@ class OperatorPresence:
     """
 
     is_here: bool = False  # waits for a swing, which begins when nothing is missing
-    is_away: bool = False  # has left: the capture is paused meanwhile
+    is_away: bool = False  # the capture is paused
     paused_by_leaving: bool = False  # for that reason alone: it resumes automatically
     choices: Preparation | None = None
     begun_with: Preparation | None = None  # when the swing began, or confirmed since

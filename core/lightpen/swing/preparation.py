@@ -68,7 +68,7 @@ class Preparation:
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
     has_unsaved_leds: bool = False  # edited or opened ones, not of the file in use
-    second: SecondCamera | None = None  # None where one camera looks alone
+    second: SecondCamera | None = None  # None for a single camera
     heading: float | None = None  # operator's right in the image, rad, once learnt
     temperature_day: str = ""  # ISO date of the temperature in the assumptions
 

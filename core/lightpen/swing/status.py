@@ -44,10 +44,10 @@ class SwingStatus:
     record_folder: Path | None = None
     names: Names = field(default_factory=Names)
     origin: Origin | None = None
-    solution: Solution | None = None  # None until it is solved
+    solution: Solution | None = None  # None until solved
     assessment: SwingAssessment | None = None
     pressed: Solution | None = None  # with firm pressure, for the press test
-    failed: FailedSwing | None = None  # None where the images gave a tip
+    failed: FailedSwing | None = None  # None if the images give a tip
     result: Result | None = None  # that was accepted
     revoked: Result | None = None  # that was revoked last, of this swing or another
     activity: Activity = Activity.NONE

@@ -46,7 +46,7 @@ class BoardCalibration(QObject):
     found_changed = Signal()  # `found` is different
     remark_changed = Signal()  # `remark` is different
     saved = Signal(str)  # a camera file was written
-    concluded = Signal(object)  # CameraTrial: what became of an attempt
+    concluded = Signal(object)  # CameraTrial: outcome of an attempt
 
     def __init__(self, capture: BoardCapture, live: LiveView, parent: QObject) -> None:
         super().__init__(parent)

@@ -45,7 +45,7 @@ class CaptureState:
     """State of the capture."""
 
     sought: Board | None = None  # board to detect; None while no views are captured
-    capture: Capture | None = None  # the views so far; None before the first image
+    capture: Capture | None = None  # None before the first image
     outline: FloatArray | None = None  # (4, 2), where the board should be held next, px
     why_unseen: Message | None = None  # why it has not been seen for a while
     # When it was seen, or last asked why it is not, s on the clock of the images.

@@ -27,10 +27,9 @@ N_FACTS = 5
 class IntrinsicsPanel(Translated, QGroupBox):
     """Shows the file in use and the size of the live image."""
 
-    path_chosen = Signal(str)  # a file is to be read
-    calibration_requested = Signal()  # the camera is to be calibrated by a board
-    # There is no such file: the camera is to be found by a swing.
-    discovery_requested = Signal()
+    path_chosen = Signal(str)  # path of the file to open
+    calibration_requested = Signal()  # calibrate the camera with a board
+    discovery_requested = Signal()  # no such file: find the camera by a swing
 
     def __init__(self) -> None:
         super().__init__()

@@ -36,8 +36,7 @@ WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 class LivePanel(Translated, QWidget):
     """Shows images and how they come."""
 
-    # The other of two cameras is to be shown, by its number from 0.
-    camera_chosen = Signal(int)
+    camera_chosen = Signal(int)  # index of the camera to show
 
     def __init__(self) -> None:
         super().__init__()

@@ -22,7 +22,7 @@ class RigPanel(Translated, QGroupBox):
     """Asks for a second camera, and for the rig file that belongs to it."""
 
     wanted = Signal(bool)  # whether two cameras are to look at once
-    path_chosen = Signal(str)  # a rig file is to be read
+    path_chosen = Signal(str)  # path of the rig file to open
 
     def __init__(self) -> None:
         super().__init__()

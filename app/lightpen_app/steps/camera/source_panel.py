@@ -33,8 +33,8 @@ class SourcePanel(Translated, QGroupBox):
     """
 
     value_changed = Signal(object)  # SourceChoice
-    search_requested = Signal()  # the cameras of the chosen source are to be looked for
-    samples_requested = Signal()  # the files of the simulated pen are to be used
+    search_requested = Signal()  # search for cameras of the selected source
+    samples_requested = Signal()  # use the files of the simulated pen
     retry_requested = Signal()  # open the same source once more
     # FilesBeside: the files beside the recorded images are to be used
     files_requested = Signal(object)

@@ -24,7 +24,7 @@ class StrayLightPanel(Translated, QGroupBox):
     clear_requested = Signal()  # leave nothing out any more
     # The simulated operator is to cover the LEDs, or to uncover them.
     cover_requested = Signal(bool)
-    drawing_toggled = Signal(bool)  # the mask is to be drawn on the image, or no longer
+    drawing_toggled = Signal(bool)  # start or end drawing the mask on the image
 
     def __init__(self) -> None:
         super().__init__()

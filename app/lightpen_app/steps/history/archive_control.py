@@ -30,7 +30,7 @@ class ArchiveControl(QObject):
     The filter tells which entries are saved.
     """
 
-    checked = Signal()  # a check has ended; the panel shows what it found
+    checked = Signal()  # a check has ended
     imported = Signal()  # there may be other entries
 
     def __init__(

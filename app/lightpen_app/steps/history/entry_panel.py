@@ -38,11 +38,9 @@ class EntryPanel(Translated, QWidget):
     """Shows an entry with the notes on it; takes a note, or puts its tip in force."""
 
     note_given = Signal(object, str)  # Written, str: a note on an entry
-    # Written, str, Signature or None: the tip of an entry shall be in force again, for
-    # a reason
+    # Written, str, Signature or None: entry whose tip to reinstate, and reason.
     restore_requested = Signal(object, str, object)
-    # Written: the record on paper of an entry's tip shall be shown
-    paper_requested = Signal(object)
+    paper_requested = Signal(object)  # Written: entry whose printed report to show
 
     def __init__(self) -> None:
         super().__init__()

@@ -26,7 +26,7 @@ LEAST_CHOICE = 12 * GRID
 class FilterBar(Translated, QWidget):
     """Four lists and two days."""
 
-    value_changed = Signal()  # other entries are to be shown
+    value_changed = Signal()
 
     def __init__(self) -> None:
         super().__init__()

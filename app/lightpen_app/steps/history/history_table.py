@@ -48,8 +48,7 @@ class HistoryModel(TitledModel):
     """One row for each entry; visible rows are read."""
 
     n_columns = WORDS + 1
-    # Number of the first line of a block that is to be shown.
-    block_wanted = Signal(int)
+    block_wanted = Signal(int)  # number of the first line of a block to read
 
     def __init__(self) -> None:
         super().__init__()

@@ -38,7 +38,7 @@ class FirstEntries:
     n_lines: int
     first: tuple[Line, ...]  # the newest
     names: KnownNames
-    # How far the server has what was entered here; None if there is no server.
+    # Replication to the server; None without a server.
     delivery: ReplicationState | None = None
 
 
@@ -47,11 +47,11 @@ class HistoryReader(QObject):
 
     opened = Signal(object)  # Opening
     block_read = Signal(int, object)  # number of the first line, and the lines
-    block_passed = Signal(int)  # a block that is not read: others are wanted more
+    block_passed = Signal(int)  # number of a block that is no longer needed
     trend_read = Signal(object)  # Trend
     messages_read = Signal(object)  # entries that concern the one asked about
     due_read = Signal(object)  # the current tips, each a `DueTip`
-    failed = Signal(str)  # a sentence to be read
+    failed = Signal(str)  # text for the user
 
     def __init__(self, logbook: LazyLogbook, parent: QObject | None = None) -> None:
         super().__init__(parent)

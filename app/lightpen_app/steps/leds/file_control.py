@@ -34,7 +34,7 @@ T = TypeVar("T")
 class LedFileControl(QObject):
     """Carries out requests of the file panel; asks before edits are lost."""
 
-    status_changed = Signal(str)  # what was done, for the status line
+    status_changed = Signal(str)  # text of the status line
 
     def __init__(
         self,

@@ -24,16 +24,14 @@ from lightpen_app.work.job import Job
 class LedFilePanel(Translated, QWidget):
     """Path and buttons, with messages and questions about the file."""
 
-    path_chosen = Signal(str)  # a file is to be opened
+    path_chosen = Signal(str)  # path of the file to open
     # The path of a file that does not say its units, and the units.
     units_chosen = Signal(str, str)
-    # Path: the LEDs are to be saved there; a file that exists may be replaced
+    # Path of the file to write; an existing file may be replaced.
     save_chosen = Signal(object)
-    samples_requested = Signal()  # the file of the simulated pen is to be used
-    # pair of int: two LEDs, by number, are to be exchanged
-    exchange_requested = Signal(object)
-    # There is no such file: the LEDs are to be found by a swing.
-    discovery_requested = Signal()
+    samples_requested = Signal()  # use the file of the simulated pen
+    exchange_requested = Signal(object)  # pair of int: numbers of two LEDs to swap
+    discovery_requested = Signal()  # no such file: find the LEDs by a swing
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -26,7 +26,7 @@ class FramePanel(Translated, QGroupBox):
     """Draws a pen and lists the rules of its frame."""
 
     led_chosen = Signal(int)  # the LED of this number was clicked
-    move_requested = Signal()  # the coordinates are to be put into the pen frame
+    move_requested = Signal()  # transform the coordinates into the pen frame
 
     def __init__(self) -> None:
         super().__init__()

@@ -38,8 +38,7 @@ class LedTable(Translated, QTableView):
     """Shows a draft; cells without a number, and LEDs that do not fit, are marked."""
 
     value_changed = Signal(object)  # PenDraft: the user typed into a cell
-    # The number of the LED whose row is now current; 0 for none.
-    led_chosen = Signal(int)
+    led_chosen = Signal(int)  # number of the LED in the current row; 0 for none
 
     def __init__(self) -> None:
         super().__init__()

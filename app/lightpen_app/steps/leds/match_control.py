@@ -23,9 +23,7 @@ PERIOD_MS = 1000
 class PenWatch(QObject):
     """Compares a pen with the detections, at most once a second."""
 
-    # PenMatch: how the pen fits the views so far; None when that must be found out
-    # again
-    value_changed = Signal(object)
+    value_changed = Signal(object)  # PenMatch of the views so far; None until computed
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)

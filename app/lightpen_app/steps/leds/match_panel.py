@@ -88,8 +88,7 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 class MatchPanel(Translated, QGroupBox):
     """Shows images with numbered LEDs and the match of each."""
 
-    # Finding: the table is to be mended as this finding says
-    mend_requested = Signal(object)
+    mend_requested = Signal(object)  # Finding by which to correct the table
 
     def __init__(self, foot: QWidget) -> None:
         super().__init__()

@@ -32,8 +32,8 @@ class LedTablePanel(Translated, QGroupBox):
     """Shows a draft and lets it be edited."""
 
     value_changed = Signal(object)  # PenDraft: the user changed it
-    discard_requested = Signal()  # the changes are to be given up
-    led_chosen = Signal(int)  # the number of the LED that is now current, 0 for none
+    discard_requested = Signal()  # discard the changes
+    led_chosen = Signal(int)  # number of the current LED, 0 for none
 
     def __init__(self, undo: QWidget) -> None:
         super().__init__()

@@ -89,8 +89,7 @@ class ImageTable(Translated, RowTable):
     """Shows the images; current item and selection survive changes."""
 
     number_changed = Signal(int)  # of the current image
-    # Other images are selected, or what they are has changed.
-    selection_changed = Signal()
+    selection_changed = Signal()  # selected images, or their state, have changed
 
     def __init__(self) -> None:
         self._model = ImageModel()

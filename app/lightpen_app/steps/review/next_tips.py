@@ -28,7 +28,7 @@ LONGEST = 12  # characters of a tip on its button
 class NextTipsRow(Translated, QWidget):
     """Shows other tips with their status; hidden without any."""
 
-    chosen = Signal(object)  # NextTip: it is to be calibrated
+    chosen = Signal(object)  # NextTip: the tip to calibrate next
 
     def __init__(self) -> None:
         super().__init__()

@@ -34,8 +34,8 @@ class PlotCard(Translated, QFrame):
 
     # The plot shall fill the place of its neighbours, too, or no longer.
     enlarge_toggled = Signal(bool)
-    saved = Signal(str)  # a sentence that says where
-    failed = Signal(str)  # a sentence to be read: nothing was saved
+    saved = Signal(str)  # text for the user: where
+    failed = Signal(str)  # text for the user
 
     def __init__(self, plot: Plot, file_stem: str) -> None:
         super().__init__()

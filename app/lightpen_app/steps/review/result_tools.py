@@ -28,11 +28,11 @@ EXPORTS = (ALL, *(Export((each,)) for each in FORMATS), PLOTS)
 class ResultTools(Translated, QWidget):
     """Three buttons; that to save has a menu."""
 
-    folder_requested = Signal()  # the folder of the swing is to be opened
-    copy_requested = Signal()  # the tip is to be put on the clipboard
+    folder_requested = Signal()  # open the folder of the swing
+    copy_requested = Signal()  # copy the tip to the clipboard
     save_requested = Signal(object)  # Export
-    paper_requested = Signal()  # the record on paper is to be shown
-    press_requested = Signal()  # the tip is to be swung with firm pressure
+    paper_requested = Signal()  # show the printed report
+    press_requested = Signal()  # start the press test
 
     def __init__(self) -> None:
         super().__init__()

@@ -18,7 +18,7 @@ from lightpen_app.work.notifications import Notifications
 class DataFolderPanel(Translated, QGroupBox):
     """Shows and opens the data folder, and other windows that use it."""
 
-    change_requested = Signal()  # another one is to be chosen
+    change_requested = Signal()  # choose another folder
 
     def __init__(self, folder: Path, notifications: Notifications) -> None:
         super().__init__()

@@ -29,7 +29,7 @@ class DayControl(QObject):
     """Shows tips and readiness in the view; chooses tips."""
 
     changed = Signal()  # `main_action` may be different
-    step_requested = Signal(str)  # the step of this key is to be shown
+    step_requested = Signal(str)  # key of the step to show
 
     def __init__(
         self, workbench: Workbench, library: LibraryControl, view: DayView

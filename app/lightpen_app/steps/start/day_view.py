@@ -69,7 +69,7 @@ class DayView(Translated, QWidget):
     """Daily settings; the station setup is a view of its own."""
 
     tip_chosen = Signal(str, str)  # pen and tip of the row that was chosen
-    tip_entered = Signal(str)  # what was typed and entered
+    tip_entered = Signal(str)  # text of the field
     # Temperature of the pen, degrees Celsius, or None if not measured.
     temperature_entered = Signal(object)
     step_requested = Signal(str)  # where something is put right

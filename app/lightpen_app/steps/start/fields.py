@@ -88,7 +88,7 @@ ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 class StationField(ChoiceField):
     """A list of the known stations in which another name can be typed."""
 
-    value_edited = Signal(str)  # the name that is being typed; it may be unfinished
+    value_edited = Signal(str)  # text of the field, possibly unfinished
     value_changed = Signal(str)  # the name is finished, or chosen from the list
     entered = Signal()  # it was finished by the Enter key
 

@@ -51,7 +51,7 @@ class NamesForm(Translated, QWidget):
     # The name of the station is finished, or chosen from the list.
     station_changed = Signal(str)
     station_entered = Signal()  # it was finished by the Enter key
-    nominal_tip_changed = Signal()  # the nominal centre of the tip is another one
+    nominal_tip_changed = Signal()
     # ItemKind, str: a pen, tip or cone was chosen from its list
     item_chosen = Signal(object, str)
     library_requested = Signal(object)  # ItemKind: the tip library shall be shown

@@ -44,7 +44,7 @@ class InterruptedControl(QObject):
     ``settle`` takes over what is being typed on the page.
     """
 
-    step_requested = Signal(str)  # key of the step that what is gone on with shows at
+    step_requested = Signal(str)  # key of the step that shows the resumed swing
 
     def __init__(
         self,

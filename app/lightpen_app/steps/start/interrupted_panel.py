@@ -112,7 +112,7 @@ class InterruptedPanel(Translated, QGroupBox):
     discard_requested = Signal(object)
     continue_requested = Signal(object)  # InterruptedVerification
     close_requested = Signal(object)  # InterruptedVerification
-    search_requested = Signal()  # they are to be looked for again
+    search_requested = Signal()  # search again
 
     def __init__(self) -> None:
         super().__init__()

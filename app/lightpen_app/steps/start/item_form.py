@@ -50,8 +50,7 @@ class ItemForm(Translated, QWidget):
     """
 
     value_edited = Signal()  # something is typed
-    # The axis is to be found by spinning the pen, or this has ended.
-    spin_toggled = Signal(bool)
+    spin_toggled = Signal(bool)  # start or end determining the axis by a spin
 
     def __init__(self, folder: Path) -> None:
         super().__init__()

@@ -20,7 +20,7 @@ from lightpen_app.work.swing_run import SwingRun
 class LastResultPresenter(QObject):
     """Shows the last result in one panel, its swing in another."""
 
-    verification_requested = Signal()  # the tip that is shown shall be verified
+    verification_requested = Signal()  # verify the displayed tip
 
     def __init__(
         self,

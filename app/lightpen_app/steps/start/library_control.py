@@ -42,9 +42,7 @@ class LibraryControl(QObject):
 
     # ItemKind, str: an item was chosen, in a list, in the dialog or by its barcode
     chosen = Signal(object, str)
-    # A barcode is of no tip in the library, and none is to be added: whatever tip is in
-    # the field is not the one at hand.
-    unknown_declined = Signal()
+    unknown_declined = Signal()  # barcode of an unknown tip that is not to be added
 
     def __init__(
         self,

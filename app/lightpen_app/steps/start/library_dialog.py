@@ -55,11 +55,11 @@ class RequestedChange:
     """A change that is requested."""
 
     item: AnyItem
-    picture: str  # path of another picture; empty for none
-    is_new: bool  # whether the item is to be added
+    picture: str  # path of a new picture; empty for none
+    is_new: bool  # whether to add the item
     reason: str
     signature: Signature | None  # signature of a supervisor, if one is required
-    before: AnyItem | None = None  # the item as it was shown; None for a new one
+    before: AnyItem | None = None  # the item as displayed; None for a new one
 
 
 class LibraryDialog(FittedWindow, Translated, QDialog):
@@ -69,7 +69,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
     """
 
     change_asked = Signal(object)  # RequestedChange
-    chosen = Signal(object, str)  # ItemKind, str: an item is to be calibrated with
+    chosen = Signal(object, str)  # ItemKind, str: item to calibrate with
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)

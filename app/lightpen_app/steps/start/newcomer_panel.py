@@ -19,7 +19,7 @@ WIDTH = 112 * GRID  # px
 class Introduction(FittedWindow, QDialog):
     """Shows item, method and steps."""
 
-    trial_requested = Signal()  # a simulated pen is to be calibrated
+    trial_requested = Signal()  # calibrate a simulated pen
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -57,7 +57,7 @@ DEMO = (sys.executable, ["-m", "lightpen_app", "--demo"])
 class NewcomerPanel(Translated, QGroupBox):
     """Introduces the program, plays the demo, and starts a trial."""
 
-    trial_requested = Signal()  # a simulated pen is to be calibrated
+    trial_requested = Signal()  # calibrate a simulated pen
 
     def __init__(self) -> None:
         super().__init__()

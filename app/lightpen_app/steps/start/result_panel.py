@@ -44,7 +44,7 @@ SIZES = (  # of age, words and figures, where there is little room, plenty, and 
 class LastResult:
     """Data of the current tip."""
 
-    result: Result | None = None  # None if there is none yet
+    result: Result | None = None  # None before the first
     is_named: bool = True  # whether pen and tip are named at all
     fault: str = ""  # why it is unknown; else empty
     is_simulated: bool = False  # whether the pen is simulated
@@ -53,10 +53,9 @@ class LastResult:
 class LastResultPanel(Translated, QGroupBox):
     """Shows the last accepted calibration: age, verdict, tip and uncertainty."""
 
-    # Result, str, Signature or None: the result that is shown shall not be in force any
-    # more
+    # Result, str, Signature or None: result to revoke, and reason.
     take_back_requested = Signal(object, str, object)
-    verification_requested = Signal()  # the tip that is shown shall be verified
+    verification_requested = Signal()  # verify the displayed tip
 
     def __init__(self, now: Callable[[], datetime]) -> None:
         super().__init__()

@@ -17,8 +17,7 @@ MOST = 500  # postures
 class SpinRecorder(QObject):
     """Keeps the postures of the pen while it is spun."""
 
-    # How far the spin is, or why it does not show the axis yet.
-    message_sent = Signal(str)
+    message_sent = Signal(str)  # progress of the spin, or why it shows no axis yet
 
     def __init__(self, live: LiveView, parent: QObject | None = None) -> None:
         super().__init__(parent)

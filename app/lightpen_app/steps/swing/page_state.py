@@ -61,7 +61,7 @@ class SwingPageState:
     operator_value: OperatorValue
     note: str  # images that are not counted
     warning: StatusMessage
-    stand: DisplayedPosture | None  # how the pen is drawn in space
+    stand: DisplayedPosture | None  # posture of the drawn pen
     is_verdict: bool
     is_capturing: bool
     has_fault: bool

@@ -19,12 +19,10 @@ class RemainingImages:
 
     # Images at the end; the remaining ones are rounded to the accuracy of the estimate.
     n_in_all: int
-    n_kept: int  # number of images at present
-    n_before: int  # images that remained when the number in all was last changed
-    # Of all images, that are there; it goes back only when images are dropped.
-    fraction: float
-    # Whether more remained at the last change than at the one before, though none were
-    # dropped.
+    n_kept: int  # present images
+    n_before: int  # remaining images at the last change of ``n_in_all``
+    fraction: float  # of all images; decreases only when images are excluded
+    # Whether the last change increased the number, although none were excluded.
     has_risen: bool = False
 
     @property

@@ -72,24 +72,23 @@ class SwingViewState:
     setup: SwingSetup
     state: SwingState
     short: Shortfall
-    connection: Connection = Connection.STREAMING  # how the camera is
+    connection: Connection = Connection.STREAMING  # of the camera
     seen: str = ""  # content of the last image in a few words
     # Whether the last images show enough spots, but not those of the pen.
     has_unfit_spots: bool = False
     # Whether the swing was paused because an image could not be recorded.
     has_fault: bool = False
-    # How far the tip is computed, 0 to 1; None while it is not.
+    # Progress of the solution, 0 to 1; None if it does not run.
     solving: float | None = None
     verdict: Verdict | None = None
     is_accepted: bool = False  # whether the tip is in force
-    # How long the pen has been upright and still after the verdict: 1 is enough.
+    # Elapsed fraction of the confirmation hold, after the verdict.
     stillness: float = 0.0
     origin: Origin | None = None  # origin of the images
     # Whether the pen is led by the mouse, so that it leans as the camera sees it.
     is_simulated: bool = False
     is_away: bool = False  # whether another step is shown
-    # How many images are to go, by this moment and those before it.
-    to_go: RemainingImages | None = None
+    to_go: RemainingImages | None = None  # remaining images
 
     @cached_property
     def dial(self) -> DialValue:

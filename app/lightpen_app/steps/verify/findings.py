@@ -48,7 +48,8 @@ class TaskPicture:
     """A picture of a task beside its figures."""
 
     make: Callable[[], Any]  # returns the widget, which has `set_value`
-    value: Callable[[SessionSetup, SessionState, AnyTask], Any]  # returns what it shows
+    # Returns the value to show.
+    value: Callable[[SessionSetup, SessionState, AnyTask], Any]
 
 
 def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> DialValue:

@@ -35,7 +35,7 @@ class VerifyView:
     lamps: StatusMessage = field(default_factory=StatusMessage)
     titles: tuple[StatusMessage, ...] = ()  # titles of the tasks with their progress
     task: AnyTask | None = None  # current task
-    # How much of recorded images is read, 0 to 1; None while none are.
+    # Loaded fraction of recorded images; None if there are none.
     reading: float | None = None
     pause: str = ""
     can_be_accepted: bool = False

@@ -38,7 +38,7 @@ class EntryFilter:
     station: str = ""
     kinds: tuple[Kind, ...] = ()
     begin: datetime | None = None  # by the clock of the entry
-    end: datetime | None = None  # before that, likewise
+    end: datetime | None = None  # before that time
     is_simulated: bool | None = None
 
 

@@ -48,17 +48,17 @@ class CalibrationFile:
     doubts: tuple[StoredMessage, ...]
     origin: Origin | None
     names: Names = NOBODY  # empty of a record that nobody accepted
-    accepted: datetime | None = None  # None of such a record, too
-    reason: str = ""  # why, though it was to be checked, or was reinstated
+    accepted: datetime | None = None  # None for such a record, too
+    reason: str = ""  # for acceptance despite a CHECK, or for reinstating
     change: TipChange | None = None
-    restores: str | None = None  # entry whose tip is in force again by it
+    restores: str | None = None  # hash of the entry that it reinstates
     swing: Path | None = None  # folder of the swing as a result names it
-    measured: datetime | None = None  # when its swing began, where that was looked up
+    measured: datetime | None = None  # start of its swing, if looked up
     library_status: tuple[str, ...] = ()  # retired, overdue, if looked up
-    due: date | None = None  # next due date of the tip by its age, likewise
-    supervisor: str = ""  # who signed it; empty where none was needed
-    traced: tuple[TracedItem, ...] = ()  # what it was measured with, likewise
-    is_entered: bool | None = None  # in the archive, likewise
+    due: date | None = None  # next due date of the tip by its age, if looked up
+    supervisor: str = ""  # who signed it; empty if not needed
+    traced: tuple[TracedItem, ...] = ()  # items it was measured with, if looked up
+    is_entered: bool | None = None  # in the archive; None if not looked up
 
     @property
     def when(self) -> datetime:

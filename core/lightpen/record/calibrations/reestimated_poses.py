@@ -28,15 +28,15 @@ N_COEFFICIENTS = (4, 5, 8)  # of distortion that a camera may have; 4 a fisheye
 
 @dataclass(frozen=True, eq=False)
 class ReestimatedPoses:
-    """What the images show that take part."""
+    """Tips and residuals of the images in use."""
 
     numbers: IntArray  # (M,), images up to which a tip is known, from 1
-    tips: FloatArray  # (M, 3), the tip by the images up to there, mm
-    uncertainties: FloatArray  # (M, 3), U (k = 2): noise by these images, mm
-    tilts: FloatArray  # (N,), as of `lightpen.model.posture.Posture`, rad
-    directions: FloatArray  # (N,), likewise
-    points: FloatArray  # (K, 2), where LEDs were seen, and what is left there, px
-    residuals: FloatArray  # (K, 2), where LEDs were seen, and what is left there, px
+    tips: FloatArray  # (M, 3), tip by the images up to each of these, mm
+    uncertainties: FloatArray  # (M, 3), U (k = 2) by the noise of these images, mm
+    tilts: FloatArray  # (N,), as in `lightpen.model.posture.Posture`, rad
+    directions: FloatArray  # (N,), the same, rad
+    points: FloatArray  # (K, 2), LED centres, px
+    residuals: FloatArray  # (K, 2), observed minus modelled, px
 
 
 def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:

@@ -56,7 +56,7 @@ class StoredVerification(Struct, frozen=True):
     tip: str = ""
     origin: Origin | None = None
     temperature_c: float | None = None  # of the pen; None if not measured
-    humidity_percent: float | None = None  # of the room, likewise
+    humidity_percent: float | None = None  # of the room; None if not measured
     camera_serials: tuple[str, ...] = ()  # of the cameras that saw the pen
     verdict: _Verdict | None = None
     ended: TrialOutcome | None = field(name="outcome", default=None)

@@ -66,7 +66,7 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
     at: ZonedTime
     supervisor: str
     station: str = ""
-    password: PasswordVerifier | None = None  # None where the password stays
+    password: PasswordVerifier | None = None  # None: unchanged
     # By `Limit.key`.
     limits: dict[str, float] | None = None
     previous: Digest = NOTHING_BEFORE

@@ -58,7 +58,7 @@ class Supervision:
     # By the name of the station, as it was written last
     limits: Mapping[str, StationLimits] = field(default_factory=dict)
     chain: str = ""  # begun by the first station key; empty without files
-    station_keys: tuple[str, ...] = ()  # whose signatures count, the present last
+    station_keys: tuple[str, ...] = ()  # valid keys, the present one last
     known: Mapping[str, str] = field(default_factory=dict)  # as of `LimitsChange`
     hashes: tuple[str, ...] = ()  # of the files, the oldest first
 

@@ -88,8 +88,8 @@ class Item(Struct, frozen=True, kw_only=True):
     kind: ClassVar[ItemKind]
 
     id: Id  # unique identifier, printed as a barcode on the label
-    due: date | None = None  # last day of use before it is looked after
-    certificate: str = ""  # its number; empty where there is none
+    due: date | None = None  # expiry date
+    certificate: str = ""  # number; empty without one
     certified: date | None = None  # date of the certificate
     note: str = ""
     is_retired: bool = False

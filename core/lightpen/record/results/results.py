@@ -56,10 +56,10 @@ class ResultHeading(Struct):
     """The heading of a result, for look-ups."""
 
     format: Annotated[int, Meta(ge=1)]
-    pen: str | None = None  # as of `Names`; None where a later version does not say
-    tip: str | None = None  # likewise
-    record: str | None = None  # as of `Result`, likewise
-    takes_back: str | None = None  # file, without suffix, that is revoked
+    pen: str | None = None  # as in `Names`; None if a later version omits it
+    tip: str | None = None  # the same
+    record: str | None = None  # as in `Result`, the same
+    takes_back: str | None = None  # revoked file, without suffix
     origin: str | None = None
     supervisor: str = ""
 
@@ -161,14 +161,14 @@ class Result:
     accepted: datetime
     grade: Grade
     record: Path  # folder of the swing that it comes from
-    images: tuple[int, ...] | None  # not taken out; None of a reinstated tip
+    images: tuple[int, ...] | None  # not excluded; None for a reinstated tip
     calibration: CalibrationRecord
     origin: Origin | None = None  # None if neither it nor its swing states it
     reason: str = ""  # why it was accepted though it does not pass, by who did
     why: StoredMessage | None = None
     doubts: tuple[StoredMessage, ...] = ()
     change: TipChange | None = None  # since the result in force before, if any
-    supervisor: str = ""  # who approved it; empty if none was needed
+    supervisor: str = ""  # who approved it; empty if not needed
     restores: str | None = None  # hash of the entry whose tip it reinstates
 
     @property

@@ -17,7 +17,7 @@ class ImageRow:
     number: int  # number in the record
     misfit: float  # rms residual with the tip in the cone, px; NaN without the pen
     n_leds: int  # LEDs that were seen, by all cameras together
-    reason: Reason  # why it does not take part; `Reason.NONE` where it does
+    reason: Reason  # for not using it; `Reason.NONE` for a used one
     is_taken_out: bool  # and may be put back; else the computation left it out
 
     @property

@@ -44,7 +44,7 @@ class RecordSource:
     assumptions: Assumptions = USUAL
     origin: Origin | None = None
     units: str | None = None  # as of `Header`
-    led_diameter: float | None = None  # as of `Header`
+    led_diameter: float | None = None  # as in `Header`
     rig: Rig | None = None
     rig_file: Path | None = None
     other_images: tuple[ImageSource, ...] = ()

@@ -41,10 +41,10 @@ class GuidanceInput:
     pen: Pen
     tip_pen: FloatArray  # (3,), mm
     cone_cam: FloatArray  # (3,), mm
-    information: FloatArray  # (6, 6), of all that is known of (tip, cone), 1/mm^2
+    information: FloatArray  # (6, 6), all information on (tip, cone), 1/mm^2
     sigma: float  # noise of one image coordinate, px
     rotations: FloatArray  # (N, 3, 3), postures of the images kept so far; cam_from_pen
-    spacing: float  # angle by which a new posture must differ from all of these, rad
+    spacing: float  # least angle between a new posture and these, rad
 
 
 def next_posture(

@@ -37,7 +37,7 @@ class Shortfall:
     """Images that a swing still needs."""
 
     wanted: IntArray  # (3, 8), in each field of the dial
-    fields: IntArray  # (3, 8), of these missing
+    fields: IntArray  # (3, 8), missing ones of these
     n_images: int  # missing in all, at the least
     # That the uncertainty still needs, estimated; 0 if it suffices or no number does.
     n_for_uncertainty: int

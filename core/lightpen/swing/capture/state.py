@@ -98,7 +98,7 @@ class SwingSetup:
     # Whether its images were recorded before: all are read, once and in their order,
     # and nobody is asked to lean the pen.
     is_recording: bool = False
-    beside: Rig | None = None  # the camera with those beside it, where there are any
+    beside: Rig | None = None  # the rig of this camera, if there is one
     other_masks: tuple[FloatArray, ...] = ()  # of the other cameras
     is_press_test: bool = False  # with firm pressure, compared with another swing
 
