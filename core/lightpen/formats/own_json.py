@@ -64,11 +64,11 @@ def parse_checked(data: bytes, shape: type[T]) -> T:
     return parse_own_json(data, shape)
 
 
-def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
-    """Convert a parsed value; see `parse_own_json`. Strict: texts are no numbers."""
+def in_shape(tree: Any, shape: type[T]) -> T:
+    """Convert a parsed value; see `parse_own_json`."""
     try:
         with _ONE_READER:
-            return convert(tree, shape, strict=strict)
+            return convert(tree, shape)
     except (ValueError, OverflowError, RecursionError) as error:
         raise DamagedError(str(error)) from error
 

@@ -207,8 +207,9 @@ def note_delivered(database: Database, chain: str, number: int) -> None:
         connection.execute(noted.values(delivered=number))
 
 
-def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[StoredEntry]:
-    """Yield the entries of a chain after that of a number, in their order."""
+def entries_of(database: Database, chain: str) -> Iterator[StoredEntry]:
+    """Yield the entries of a chain, in their order."""
+    after = 0
     while True:
         batch = batch_of(database, chain, after)
         yield from batch

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, ClassVar, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from msgspec import Meta, Struct, to_builtins
@@ -252,16 +252,10 @@ def read_library(data: Path) -> Library:
     Raises `FileError` if it was changed: an older limit must not count again in
     silence.
     """
-    found: dict[ItemKind, dict[str, AnyItem]] = {kind: {} for kind in ItemKind}
+    found: dict[ItemKind, dict[str, Any]] = {kind: {} for kind in ItemKind}
     for _, change in library_changes(data):
         found[change.item.kind][change.item.id] = change.item
-    return Library(
-        pens=dict(_of(found, ListedPen)),
-        tips=dict(_of(found, ListedTip)),
-        cones=dict(_of(found, ListedCone)),
-        cameras=dict(_of(found, ListedCamera)),
-        references=dict(_of(found, ListedReference)),
-    )
+    return Library(*found.values())  # whose fields are in the order of the kinds
 
 
 def item_entries(item: AnyItem) -> dict[str, Plain]:
@@ -315,14 +309,6 @@ def read_change(file: Path, supervision: Supervision | None = None) -> LibraryCh
 def parse_change(content: bytes) -> LibraryChange:
     """Return the change that a file of the library of any station holds."""
     return parse_upgraded(content, LibraryChange, upgrades.LIBRARY)
-
-
-def _of(
-    found: Mapping[ItemKind, Mapping[str, AnyItem]], shape: type[ItemT]
-) -> Iterator[tuple[str, ItemT]]:
-    for name, item in found[shape.kind].items():
-        if isinstance(item, shape):
-            yield name, item
 
 
 def _alike(items: Mapping[str, ItemT], name: str) -> ItemT | None:
