@@ -38,10 +38,12 @@ from lightpen.formats.pairing import pair_images
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
+from lightpen.model.lens_field import LensField
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import from_first
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.postures import Postures
 from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -52,6 +54,7 @@ from lightpen.simulator.swings import (
     perturbed_pen,
     seen_from,
     simulate_centers,
+    swing_from_postures,
     swing_poses,
 )
 
@@ -86,6 +89,14 @@ def observed(
     )
     centers = Centers(np.arange(len(swing)) + 1, exact + errors, Path("simulated"))
     return observe_centers(centers, camera, pen)
+
+
+def disc_areas(swing: Swing, diameter: float, rng: np.random.Generator) -> FloatArray:
+    """Return areas of discs, (N, L), px^2, with noise of 0.2 percent."""
+    leds, normals = leds_in_camera(PEN, swing.rotations, swing.translations)
+    shapes = disc_images(CAMERA, leds, normals, diameter / 2).shapes
+    areas = 4 * np.pi * np.sqrt(np.linalg.det(shapes))
+    return np.asarray(areas * (1 + 0.002 * rng.standard_normal(areas.shape)))
 
 
 def usual() -> Calibration:
@@ -142,12 +153,22 @@ def followed() -> Calibration:
     lamps = np.array([[1100.0, 900.0], [1300.0, 1100.0]]) + way[:, None]
     lamps += 0.02 * rng.standard_normal(lamps.shape)
     seen = observed(swing, way[:, None] + 0.03 * lasting(5, 0.0))
-    leds, normals = leds_in_camera(PEN, swing.rotations, swing.translations)
-    shapes = disc_images(CAMERA, leds, normals, 1.002 * PEN.diameter / 2).shapes
-    areas = 4 * np.pi * np.sqrt(np.linalg.det(shapes))
-    areas *= 1 + 0.002 * rng.standard_normal(areas.shape)
+    areas = disc_areas(swing, 1.002 * PEN.diameter, rng)
     seen = replace(seen, lamps=lamps, areas=areas, edge_widths=np.full(N_IMAGES, 2.2))
     return calibrate(CAMERA, PEN, seen)
+
+
+def larger_discs() -> Calibration:
+    """Discs larger than in the file, and a lens whose field the camera file states."""
+    swing, rng = swing_of(9, 25), np.random.default_rng(9)
+    field = LensField.of(CAMERA.width, CAMERA.height, 0.05, 300.0)
+    waves = 0.1 * np.sin(field.nodes / 260.0)
+    field = replace(field, values=waves, covariance=0.1 * field.covariance)
+    camera = replace(CAMERA, lens_field=field)
+    seen = observed(swing, 0.03 * lasting(9, 0.5, 25), camera)
+    areas = disc_areas(swing, 1.02 * PEN.diameter, rng)
+    seen = replace(seen, areas=areas, edge_widths=np.full(25, 2.2))
+    return calibrate(camera, replace(PEN, diameter_sigma=0.002), seen)
 
 
 def by_two_cones() -> Calibration:
@@ -184,11 +205,36 @@ def by_two_cameras() -> Calibration:
     return calibrate_rig(filed, PEN, observe_rig_centers(centers, pairing, filed, PEN))
 
 
+def uneven() -> Calibration:
+    """LEDs that blink in turn and differ in noise, on a stylus that bends."""
+
+    def at(times: FloatArray) -> Swing:
+        phase = 2 * np.pi * times / N_IMAGES
+        tilts = np.radians(22 + 7 * np.sin(0.37 * phase))
+        swing = swing_from_postures(Postures(tilts, phase, 0.4 * np.sin(0.71 * phase)))
+        axes = swing.rotations[:, :, 1]
+        bent = swing.translations + 0.06 * (axes - axes.mean(axis=0))
+        return replace(swing, translations=bent)
+
+    rng, pixels = np.random.default_rng(8), np.zeros((N_IMAGES, PEN.n_leds, 2))
+    for j in range(PEN.n_leds):
+        swing = at(np.arange(N_IMAGES, dtype=float) + 0.004 * (j - 4.5))
+        poses = swing.rotations, swing.translations
+        pixels[:, j] = simulate_centers(CAMERA, PEN, *poses, 0.0, rng)[:, j]
+    sigmas = 0.03 * np.exp(0.5 * rng.standard_normal(pixels.shape[:2]))
+    sigmas[:, 3] *= 5
+    pixels += sigmas[..., None] * rng.standard_normal(pixels.shape)
+    sigmas[:, 3] /= 5
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    seen = observe_centers(centers, CAMERA, PEN)
+    return calibrate(CAMERA, PEN, replace(seen, sigmas=sigmas))
+
+
 SWINGS: dict[str, Callable[[], Calibration]] = {
     each.__name__: each
     for each in (
         *(usual, restless, unstated, spoilt_files),
-        *(followed, by_two_cones, by_two_cameras),
+        *(followed, uneven, larger_discs, by_two_cones, by_two_cameras),
     )
 }
 

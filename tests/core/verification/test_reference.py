@@ -53,6 +53,7 @@ Ring = Callable[..., FloatArray]
 Named = tuple[tuple[str, tuple[ProbedPoint, ...]], ...]
 
 ENDS = PAPER_CONE + np.array([[-75.0, 0.0, 0.0], [75.0, 4.0, 20.0]])
+LIMITS = VerificationLimits(form=0.12)
 DENTS = 0.003 * (-1.0) ** np.arange(25)
 DRIFT = np.array([0.004, 0.001, 0.006])
 
@@ -161,6 +162,7 @@ CASES = (
 def conditions(instrument: Instrument) -> Conditions:
     return Conditions(
         instrument,
+        LIMITS,
         ball_diameter=10.0,
         nominal_tip=np.array([0.0, -90.0, -25.0]),
         cone_cam=PAPER_CONE + np.array([0.002, 0.0, 0.001]),
@@ -193,10 +195,9 @@ def test_what_a_task_finds_is_as_before(
     options, named = runs[case]
     task = task_of(case.partition(",")[0])
     found = task.measure(named, conditions, options)
-    limits = VerificationLimits()
     record = verification_record(
         *(task.kind, task.entries(found, conditions.instrument), found.assessment),
-        *({name: getattr(limits, name) for name in task.limits}, {}),
+        *({name: getattr(LIMITS, name) for name in task.limits}, {}),
     )
     del record["program"], record["created"]
 
@@ -210,7 +211,7 @@ def test_what_a_task_finds_is_as_before(
                     task.tables(found, conditions),
                     found.assessment,
                     (),
-                    rule_in_words(limits),
+                    rule_in_words(LIMITS),
                 )
             ),
         },

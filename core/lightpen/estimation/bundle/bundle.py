@@ -177,7 +177,7 @@ def fit_bundle(
     start: BundleState,
     priors: Priors,
     modes: SeatModes,
-    inflation: float = 1.0,
+    inflation: float,
     places: FloatArray | None = None,
     effects: tuple[Effect, ...] = (),
     noise: FloatArray | None = None,

@@ -56,7 +56,7 @@ def pair(camera: Camera = CAMERA) -> Rig:
 def adjusted(rig: Rig, pen: Pen, swing: Swing, pixels: FloatArray) -> Bundle:
     start = BundleState(rig, pen, swing.tip_pen, swing.cone_cam, swing.rotations)
     priors = priors_of(rig, pen, USUAL)
-    return fit_bundle(pixels, start, priors, seat_modes_of(swing.rotations))
+    return fit_bundle(pixels, start, priors, seat_modes_of(swing.rotations), 1.0)
 
 
 def in_frame_of(measured: Pen, swing: Swing) -> FloatArray:

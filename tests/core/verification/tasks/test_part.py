@@ -12,7 +12,6 @@ import pytest
 from ezdxf.filemanagement import read as read_drawing
 from msgspec import structs
 from tests.accepted_tip import Hold, Holder
-from tests.reference import assert_as_before
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
@@ -384,24 +383,6 @@ def test_the_datum_points_of_a_moved_part_span_the_largest_triangle(
 
     largest = max(area(names) for names in combinations(centres, 3))
     assert area(moved.moves[0].datums) == pytest.approx(largest, rel=1e-3)
-
-
-def test_what_is_found_of_a_part_is_as_before(
-    measured: Station, instrument: Instrument
-) -> None:
-    found, conditions = measured.found, measured.setup.conditions
-    tables = PART.tables(found, conditions)
-
-    assert_as_before(
-        "verification-part",
-        {
-            "entries": PART.entries(found, instrument),
-            "verdict": {"code": found.assessment.reason.code},
-            "tables": [[row.values for row in table.rows] for table in tables],
-            "deviations": found.deviations(),
-            "budgets": found.budgets(instrument),
-        },
-    )
 
 
 def test_a_part_is_not_moved_before_three_datum_points_are_probed(
