@@ -10,6 +10,7 @@ MESSAGES = {
     "board.dictionary": "The board {text} names an unknown dictionary of markers. Name the dictionary as in OpenCV, such as DICT_5X5_100.",
     "board.markers": "The board {text} needs {needed} markers; {dictionary} has {known}. Name the dictionary of the print.",
     "board.scale-check": "The measured length {measured:g} mm (stated {stated:g}, U {u:g} mm) is not valid: all must be above 0, and U at most a twentieth of the length. Measure over as many squares as possible.",
+    "board.scale-check-far": "The board measures {measured:g} mm where {stated:g} mm are stated. No printer errs by that much: check both lengths and their unit (mm). If the board was printed at another size, state the squares as they are.",
     "board.scale-check-form": "{text} is not a scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.",
     "intrinsics.few-views": "{n_views} images show the board; at least {least} are needed, {enough} are better. Add views with the board tilted by 20 to 40 degrees to each side, and in each corner of the image.",
     "intrinsics.misfit": "The points are {rms:.2f} px from those of a flat board {board}: its squares differ from the description, it is bent, or the images are not from one camera with one focus. Count and measure its squares again.",

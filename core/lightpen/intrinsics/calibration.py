@@ -240,7 +240,6 @@ class _Found:
         return bool(
             self.denied.any()
             or self.left_out
-            or self.choice.remark is not None
             or self.effects.clustering > CLUSTERED
             or components.view > UNEVEN_VIEWS * noise
             or (components.lenses[0] > UNEVEN_LENS * noise and self.has_skew)

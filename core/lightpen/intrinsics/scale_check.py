@@ -11,6 +11,7 @@ from lightpen.messages import printable
 COVERAGE_FACTOR = 2.0
 PIXEL = 1.0  # length of a screen that its pixel pitch measures
 LARGEST_U = 0.05  # of the length
+FARTHEST = 0.1  # of the stated length: more is another unit or a slip, no printer
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,8 @@ class ScaleCheck:
     Raises
     ------
     UsageError
-        The lengths are not above 0, or U is more than a twentieth of the length.
+        The lengths are not above 0, U is more than a twentieth of the length, or a
+        print is far from what was stated.
     """
 
     stated: float  # as the description of the board has it: mm, or pixels of a screen
@@ -36,6 +38,11 @@ class ScaleCheck:
                 stated=self.stated,
                 measured=self.measured,
                 u=self.expanded_uncertainty,
+            )
+        off = abs(self.measured - self.stated)
+        if self.stated != PIXEL and off > FARTHEST * self.stated:
+            raise UsageError(
+                "board.scale-check-far", stated=self.stated, measured=self.measured
             )
 
     @property

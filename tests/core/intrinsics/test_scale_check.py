@@ -49,3 +49,11 @@ def test_another_text_is_refused_with_what_is_needed(text: str) -> None:
 def test_impossible_lengths_are_refused(values: tuple[float, float, float]) -> None:
     with pytest.raises(UsageError, match="is not valid"):
         ScaleCheck(*values)
+
+
+@pytest.mark.parametrize("measured", [20.01, 231.0])
+def test_a_length_that_no_printer_makes_of_the_stated_one_is_questioned(
+    measured: float,
+) -> None:
+    with pytest.raises(UsageError, match="check both lengths and their unit"):
+        ScaleCheck(200, measured, 0.04)

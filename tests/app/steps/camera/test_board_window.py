@@ -418,12 +418,12 @@ def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_reported(
     window.read_folder(written(tmp_path, images))
     assert "such as 200 200.12 0.04" in remark(window)
 
-    measured.setText("100 200.4 0.1")
+    measured.setText("200 200.4 0.1")
     with qtbot.waitSignal(window.concluded) as concluded:
         window.read_folder(str(tmp_path))
         qtbot.waitUntil(lambda: views_listed(window) == 7)
         window.close()
-    assert "40.08" in concluded.args[0].board
+    assert "20.04" in concluded.args[0].board
 
 
 def test_a_simulated_operator_holds_the_board_while_views_are_captured(
