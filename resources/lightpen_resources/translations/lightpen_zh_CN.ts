@@ -8553,6 +8553,10 @@ mm</translation>
         <translation>LED 不在光笔坐标系中：LED {led} 与规定位置相差 {distance:.2f} mm（原点在 LED 1 前方，y 轴沿 LED 1-4，LED 5-10 位于 z = 0）。请将测量机坐标转换到光笔坐标系。</translation>
     </message>
     <message>
+        <source>The LEDs are {width:.0f} px wide in the images, too small to show whether their faces are flat. The light of a dome comes from up to {depth:.2f} mm behind its disc. U refers to the light as seen, which is also what this pen measures with at about this distance. To refer the tip to the discs, use flat LEDs or images in which they are larger.</source>
+        <translation>LED 图像宽 {width:.0f} px，太小，无法显示其发光面是否为平面。圆顶 LED 的光看起来来自其圆片后方，最多 {depth:.2f} mm。U 以所见的光为准，光笔在大致相同的距离测量时也以此为准。如需使测头以圆片为基准，请使用平面 LED，或使其图像更大。</translation>
+    </message>
+    <message>
         <source>The LEDs are {width:.1f} px wide in most images; at least {needed:.0f} px are needed. Bring the camera nearer, or use a longer focal length or a camera of higher resolution.</source>
         <translation>大多数图像中 LED 宽度为 {width:.1f} px；至少需要 {needed:.0f} px。请将相机移近，或使用更长的焦距或更高分辨率的相机。</translation>
     </message>

@@ -5,6 +5,8 @@ from collections import Counter
 import numpy as np
 
 from lightpen.detection.reasons import Reason
+from lightpen.detection.small_spots import LARGEST_RADIUS
+from lightpen.estimation.bundle.disc_diameter import SMALL_DOME_DEPTH, modelled_areas
 from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
@@ -47,6 +49,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *_noise_warnings(calibration),
         *_self_check_warnings(calibration),
         *_frame_warnings(calibration),
+        *_small_led_warnings(calibration),
     ]
     warnings += [
         message("warning.led-unseen", led=int(led) + 1)
@@ -112,6 +115,20 @@ def _frame_warnings(calibration: Calibration) -> list[Message]:
             message("warning.frame-of-file", leds=leds, by_file=by_file, by_all=by_all)
         ]
     return [message("warning.frame-of-all", leds=leds, by_file=by_file, by_all=by_all)]
+
+
+def _small_led_warnings(calibration: Calibration) -> list[Message]:
+    """Return a warning on LEDs too small for the images to show their faces."""
+    seen = [each.observations.edge_widths for each in calibration.cameras]
+    if calibration.stated.reading is not None or not np.isfinite(seen).any():
+        return []
+    bundle = calibration.bundle
+    areas = modelled_areas(bundle.state, 0)[bundle.used[:, 0]]
+    width = 2 * float(np.sqrt(np.median(areas) / np.pi))
+    if width > 2 * LARGEST_RADIUS:
+        return []
+    depth = SMALL_DOME_DEPTH * bundle.unknowns.start.pen.diameter
+    return [message("warning.small-leds", width=width, depth=depth)]
 
 
 def _seat_warnings(calibration: Calibration) -> list[Message]:

@@ -536,3 +536,27 @@ def test_copies_of_images_count_once(good: Calibration) -> None:
     assert judge(doubled, limits).reason == message(
         Code.TOO_FEW_IMAGES, n_kept=150, needed=200
     )
+
+
+@pytest.mark.parametrize(
+    ("diameter", "edge_width", "is_small"),
+    [(2.0, 2.5, True), (10.0, 2.5, False), (2.0, np.nan, False)],
+)
+def test_faces_of_small_leds_in_images_are_said_to_be_unknown(
+    diameter: float, edge_width: float, is_small: bool
+) -> None:
+    swing = swing_poses(30, np.random.default_rng(0))
+    pen = replace(PEN, diameter=diameter)
+    pixels = simulate_centers(
+        CAMERA, pen, swing.rotations, swing.translations, 0.05, np.random.default_rng(1)
+    )
+    centers = Centers(np.arange(30), pixels, Path("simulated"))
+    seen = replace(
+        observe_centers(centers, CAMERA, pen), edge_widths=np.full(30, edge_width)
+    )
+    warnings = warnings_of(calibrate(CAMERA, pen, seen))
+    found = [each for each in warnings if each.code == "warning.small-leds"]
+    assert bool(found) is is_small
+    if found:
+        assert found[0].values["width"] == pytest.approx(8.4, abs=0.5)
+        assert found[0].values["depth"] == pytest.approx(0.1)
