@@ -8601,6 +8601,10 @@ mm</translation>
         <translation>标定板弯曲 {bend:.2f} mm，假定值为 {stated:.2f} mm。计算中已考虑，但请将其固定在平板上。</translation>
     </message>
     <message>
+        <source>The board measures {measured:g} mm where {stated:g} mm are stated. No printer errs by that much: check both lengths and their unit (mm). If the board was printed at another size, state the squares as they are.</source>
+        <translation>标定板测得 {measured:g} mm，而给定为 {stated:g} mm。打印机不会有如此大的偏差：请检查两个长度及其单位 (mm)。如果标定板以其他尺寸打印，请按实际尺寸给出方格边长。</translation>
+    </message>
+    <message>
         <source>The board {board} is {width:.0f} x {height:.0f} mm and needs a white margin of {foot:g} mm, which exceeds the paper. Choose a larger paper, or a smaller board.</source>
         <translation>标定板 {board} 为 {width:.0f} x {height:.0f} mm，还需 {foot:g} mm 白边，超出纸张。请选择更大的纸张或更小的标定板。</translation>
     </message>
