@@ -165,7 +165,7 @@ def larger_discs() -> Calibration:
     waves = 0.1 * np.sin(field.nodes / 260.0)
     field = replace(field, values=waves, covariance=0.1 * field.covariance)
     camera = replace(CAMERA, lens_field=field)
-    seen = observed(swing, 0.03 * lasting(9, 0.5, 25), camera)
+    seen = observed(swing, 0.03 * lasting(9, 0.7, 25), camera)
     areas = disc_areas(swing, 1.02 * PEN.diameter, rng)
     seen = replace(seen, areas=areas, edge_widths=np.full(25, 2.2))
     return calibrate(camera, replace(PEN, diameter_sigma=0.002), seen)

@@ -274,10 +274,17 @@ def test_how_well_tips_repeat_is_as_before(tmp_path: Path) -> None:
         *(tips, VerificationLimits()), tolerance=0.05, reference=PAPER_TIP
     )
 
+    off = [
+        replace(tips[0], name=f"off {by}", tip_pen=PAPER_TIP + by) for by in (-0.1, 0.1)
+    ]
     charts = []
-    for name in ("chart.svg", "chart.csv"):
-        write_chart(found, tmp_path / name)
-        charts.append(text_figures((tmp_path / name).read_text(encoding="utf-8")))
+    for shown_tips in (tips, [*tips, off[0]], [*tips, off[1]]):
+        for name in ("chart.svg", "chart.csv"):
+            chart = tmp_path / name
+            write_chart(
+                measure_repeatability(shown_tips, LIMITS, tolerance=0.05), chart
+            )
+            charts.append(text_figures(chart.read_text(encoding="utf-8")))
     few = measure_repeatability(tips[:3], VerificationLimits())
     for n_tips in (STUDY - 1, STUDY):
         many = measure_repeatability(
