@@ -181,6 +181,19 @@ def test_a_pen_that_is_lost_ends_the_touch(instrument: Instrument) -> None:
     assert state.phase is ProbingPhase.MOVING
 
 
+@pytest.mark.parametrize(("n_lost", "is_one"), [(5, True), (6, False)])
+def test_a_touch_goes_on_after_a_few_images_without_the_pen(
+    instrument: Instrument, n_lost: int, is_one: bool
+) -> None:
+    lost = [None] * n_lost
+    state, events = run(instrument, [*moving(), *[HELD] * 5, *lost, *[HELD] * 2])
+    resting, _ = run(instrument, [*[HELD] * 5, *lost], state=at_rest(ProbingState()))
+
+    assert len(state.taken) == is_one
+    assert (events[0].what is ProbingEventKind.RECORDED) == is_one
+    assert bool(resting.held) == is_one
+
+
 def test_the_same_posture_counts_once_where_postures_count(
     instrument: Instrument,
 ) -> None:

@@ -211,7 +211,9 @@ def test_a_length_is_touched_at_each_of_its_places(session: Session) -> None:
     session.touch(*BAR)
     assert LENGTH.kind not in session.state.found
     assert fraction_done(session.setup, session.state) == 0.5
-    session.touch(*(Hold((x, 10.0, 0.0)) for x in (-75.0, 75.0)))
+    session.touch(Hold((-75.0, 10.0, 0.0)))
+    assert fraction_done(session.setup, session.state) == 0.75
+    session.touch(Hold((75.0, 10.0, 0.0)))
 
     assert LENGTH.kind in session.state.found
     assert len(found_by(session.state, LENGTH).runs) == 2

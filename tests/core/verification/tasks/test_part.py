@@ -1,6 +1,7 @@
 """A part as a task of a session: the simulated plate, undone points, what is kept."""
 
 import os
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from io import StringIO
 from itertools import combinations
@@ -18,6 +19,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.file_format import FileFormat
+from lightpen.measuring.alignment import THIN
 from lightpen.measuring.characteristics import CENTRED
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import taught_plan
@@ -45,9 +47,11 @@ from lightpen.verification.tasks.part_course import (
     course,
     feature_so_far,
     planned_places,
+    touches_of_part,
     with_move,
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
+from lightpen.verification.tasks.task import Conditions
 
 BALL = 10.0  # mm
 QIF = Path(os.environ.get("LIGHTPEN_DATA", "no such folder")) / "qif/QIFDocument.xsd"
@@ -383,6 +387,40 @@ def test_the_datum_points_of_a_moved_part_span_the_largest_triangle(
 
     largest = max(area(names) for names in combinations(centres, 3))
     assert area(moved.moves[0].datums) == pytest.approx(largest, rel=1e-3)
+
+
+@pytest.mark.parametrize(("share", "is_thin"), [(0.8, True), (1.25, False)])
+def test_datum_points_nearly_on_a_line_are_none(
+    instrument: Instrument, share: float, is_thin: bool
+) -> None:
+    places = (-40.0, 0.0), (40.0, 0.0), (0.0, share * THIN * 80.0)
+    holes = [
+        structs.replace(
+            planned, nominal=structs.replace(planned.nominal, origin=(*place, 0.0))
+        )
+        for planned, place in zip(plate_plan().features[2:5], places, strict=True)
+        if planned.nominal is not None
+    ]
+    plan = Plan("Holes", tuple(holes))
+    runs = [tuple(points) for _, points in probed_plate(instrument, plan)]
+    setup = station(instrument, plan).setup
+    with pytest.raises(CalibrationError) if is_thin else nullcontext():
+        with_move(PartOptions(plan), runs, setup.conditions)
+
+
+def test_a_camera_that_moved_counts_in_each_point(instrument: Instrument) -> None:
+    name, points = probed_plate(instrument, plate_plan())[0]
+    found, drift = [(name, each) for each in points], np.array([0.005, 0.002, 0.001])
+
+    still, moved = (
+        touches_of_part(found, conditions, PartOptions())
+        for conditions in (Conditions(instrument), Conditions(instrument, drift=drift))
+    )
+
+    np.testing.assert_allclose(
+        np.diag(moved.covariance - still.covariance).reshape(-1, 3),
+        np.tile(drift**2, (len(points), 1)),
+    )
 
 
 def test_a_part_is_not_moved_before_three_datum_points_are_probed(
