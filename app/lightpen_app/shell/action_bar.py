@@ -16,7 +16,7 @@ from lightpen_app.widgets.translated import Translated
 
 MAIN_WIDTH = 22 * GRID + 34  # px; with the padding and the border
 HEIGHT, LOW_HEIGHT = 9 * GRID, 8 * GRID  # px, at least
-GUARD_MS = 800  # after which a key is meant for what the main button does by now
+GUARD_MS = 800  # for which keys are ignored after the main button has changed
 
 
 class ActionBar(Translated, QFrame):

@@ -32,13 +32,7 @@ UPGRADES: dict[str, tuple[Upgrade, ...]] = {
 
 
 class LaterFormatError(ValueError):
-    """A file was written by a later version of the program.
-
-    Attributes
-    ----------
-    number : int
-        Its format.
-    """
+    """A file was written by a later version, which has the format ``number``."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"Format {number} is not known.")

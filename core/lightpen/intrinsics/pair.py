@@ -94,31 +94,16 @@ class PairLag:
 
 @dataclass(frozen=True, eq=False)
 class PairCalibration:
-    """Extrinsics and intrinsics of two cameras.
+    """Extrinsics and intrinsics of two cameras."""
 
-    Attributes
-    ----------
-    rig : Rig
-        With the covariance of its places, the board's scale included.
-    alone : tuple of CameraCalibration
-        Each camera by its own views; empty where files state them.
-    n_pairs : int
-        Views in which both cameras saw the board.
-    left_out : tuple of str
-        Views that do not agree with the others.
-    view_rms : (V, 2) array
-        px.
-    lag : PairLag or None
-        None where the board did not move enough between views to tell.
-    """
-
-    rig: Rig
+    rig: Rig  # with the covariance of the extrinsics, the board's scale included
     views: Views
     effects: MixedFit
+    # Each camera by its own views; empty if files state the intrinsics.
     alone: tuple[CameraCalibration, ...]
-    n_pairs: int
-    left_out: tuple[str, ...]
-    lag: PairLag | None
+    n_pairs: int  # views in which both cameras see the board
+    left_out: tuple[str, ...]  # excluded views
+    lag: PairLag | None  # None if the board did not move enough between views
     remarks: tuple[Message, ...]
 
     @property

@@ -11,6 +11,7 @@ from benchmarks.small_records import small_record
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.stored_messages import StoredMessage
+from lightpen.formats.upgrades import newest_format
 from lightpen.model.origin import Origin
 from lightpen.record.results.results import (
     CALIBRATION,
@@ -60,7 +61,8 @@ def test_the_head_tells_whose_it_is_and_needs_no_more_of_the_file() -> None:
     assert has_head(written[:length])
     assert not has_head(written[: length - 1])
     heading = parse_heading(written[:length], FILE)
-    assert (heading.format, heading.pen, heading.tip) == (1, "LP-04", "T-10")
+    assert heading.format == newest_format("result")
+    assert (heading.pen, heading.tip) == ("LP-04", "T-10")
     assert heading.record == "records/1"
     assert list(json.loads(written))[-2:] == ["checksum", "calibration"]
 
