@@ -79,7 +79,7 @@ def main() -> int:
 
 def _run() -> int:
     if len(sys.argv) == 3 and sys.argv[1] == SELF_TEST:
-        # A damaged file is to be named, also one that all commands need.
+        # Names a damaged file, also one that all commands need.
         return Launchers().test_itself(Path(sys.argv[2]))
     from lightpen.cli import main as run
 

@@ -54,7 +54,7 @@ class Demo(QObject):
 
     @property
     def is_accepted(self) -> bool:
-        """Whether it has led to a tip in force."""
+        """Whether its tip is accepted."""
         return self._is_accepted
 
     def start(self) -> None:

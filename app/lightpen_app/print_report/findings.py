@@ -111,7 +111,7 @@ def result_blocks(calibration_file: CalibrationFile) -> Iterable[Block]:
 
 
 def _as_found_rows(change: TipChange) -> list[tuple[str, ...]]:
-    """Return the tip that was in force before."""
+    """Return the previous tip."""
     tip = np.array(change.as_found_mm)
     u = np.array(change.as_found_expanded_uncertainty_mm)
     return [

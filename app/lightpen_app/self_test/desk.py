@@ -117,7 +117,7 @@ N_IMAGES = 60
 PERIOD = 0.1  # s from image to image
 # With blanks and letters that a Windows of another language has no code page for.
 NAMES = Names("Prüfstand 1", "自检", "SELF-TEST", "T-1 ä", "C-1", 10.0)
-# A quarter of the usual pixels: the test is to be over soon.
+# A quarter of the usual pixels makes the test short.
 SCENE = Scene(n_images=N_IMAGES, camera=paper_camera(binning=2), led_noise=0.0)
 
 
@@ -260,5 +260,5 @@ class Desk:
             NAMES.pen, NAMES.tip, is_simulated=True
         )
         if result is None:
-            raise SelfTestError("The accepted result is not in force.")
+            raise SelfTestError("The accepted result is not current.")
         return result

@@ -22,8 +22,8 @@ GUARD_MS = 800  # for which keys are ignored after the main button has changed
 class ActionBar(Translated, QFrame):
     """One main button, with the reason when it cannot be pressed.
 
-    Its first moments with another meaning, or on another page, are for what is still
-    being pressed: a second Enter does nothing.
+    Keys are ignored for a moment after the button or the page has changed, so that a
+    second Enter does nothing.
     """
 
     main_pressed = Signal()

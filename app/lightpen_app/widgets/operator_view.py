@@ -144,7 +144,7 @@ class OperatorView(Translated, QWidget):
         self._resize_letters()
 
     def letters(self) -> int:
-        """Return the size of letters that the distance asks for, px."""
+        """Return the size of letters for the viewing distance, px."""
         return letters_for(self._distance_m, _dots_per_inch(self.screen()))
 
     def instruction_px(self) -> float:

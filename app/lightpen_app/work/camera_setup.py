@@ -70,7 +70,7 @@ class CameraSetup(QObject):
     def search(self, kind: str, producer: str) -> None:
         """Search for the cameras of a source, with a GenTL producer if needed.
 
-        Of a search before nothing is reported any more.
+        An earlier search reports nothing any more.
         """
         source = source_named(kind)
         if source is None:

@@ -23,7 +23,7 @@ from lightpen_app.work.notifications import Notifications
 AGAIN_MS = 15 * 60 * 1000  # after which a tip may be overdue that was not
 LOOK_MS = 5000  # at what was taken over from other stations
 MOST_SHOWN = 5  # changes; the newest
-SHARED = "shared_library"  # cause of what is to be read
+SHARED = "shared_library"  # cause of its notifications
 
 Change = Callable[[], Library]
 
@@ -100,7 +100,7 @@ class LibraryWatch(QObject):
 
         def read(_: Report) -> StationStatus:
             library = read_library(folder)
-            if not FolderArchive(folder).all_files():  # nothing was ever in force
+            if not FolderArchive(folder).all_files():  # without any accepted result
                 return StationStatus(library, now=now())
             with suppress(ArchiveError):  # which the runner reports
                 opened = logbook.opened()

@@ -100,8 +100,8 @@ class LiveView(QObject):
     connection_changed = Signal(object)  # Connection
     # Connection: the camera that is not chosen is in this state now
     other_changed = Signal(object)
-    settings_applied = Signal(object)  # CameraSettings: the camera has these in force
-    # int, CameraSettings: a camera, by its number from 0, has these in force
+    settings_applied = Signal(object)  # CameraSettings: those of the camera now
+    # int, CameraSettings: index of a camera, and its settings now
     configured = Signal(int, object)
     failed = Signal()  # no more images come until another `open`; `why_no_images` shows
     _closing_failed = Signal(str)

@@ -1,6 +1,6 @@
 """Settings, stored in a JSON file.
 
-What is chosen is in force at once, and written by its own thread: neither a disk
+What is chosen applies at once, and is written by its own thread: neither a disk
 that does not answer nor another program that keeps the settings to itself holds the
 window.
 """

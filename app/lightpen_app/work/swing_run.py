@@ -25,9 +25,9 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     `progressed` reports solving; the verdict is an event, too.
     """
 
-    # A result was accepted or revoked: another tip may be in force.
+    # A result was accepted or revoked: another tip may be current.
     result_changed = Signal()
-    # Path: what leads to a recorded swing is to be opened
+    # Path that leads to a recorded swing to open
     open_requested = Signal(object)
 
     def __init__(

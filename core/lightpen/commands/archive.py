@@ -97,7 +97,7 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         )
         action.set_defaults(data_folder=data_folder)
     for action in (export, taken):
-        action.add_argument("file", type=Path, metavar="FILE")
+        action.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
     for name in ("pen", "tip", "station"):
         listed.add_argument(
             f"--{name}", default="", help="list entries of this item only"

@@ -91,7 +91,12 @@ def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         help="output file (default: named by pen, tip and date, in this folder)",
     )
     languages = desktop.languages()
-    parser.add_argument("--language", choices=languages, default=languages[0])
+    parser.add_argument(
+        "--language",
+        choices=languages,
+        default=languages[0],
+        help=f"language of the report ({languages[0]})",
+    )
 
 
 def _report(desktop: Desktop, options: argparse.Namespace) -> None:

@@ -146,7 +146,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.squareness,
         metavar="SHARE",
-        help="standard uncertainty of its aspect ratio, relative "
+        help="relative standard uncertainty of the board's aspect ratio "
         f"({USUAL.squareness:g})",
     )
     parser.add_argument(
@@ -154,7 +154,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.scale,
         metavar="SHARE",
-        help=f"standard uncertainty of its scale, relative ({USUAL.scale:g})",
+        help=f"relative standard uncertainty of the board's scale ({USUAL.scale:g})",
     )
     check = parser.add_mutually_exclusive_group()
     check.add_argument(

@@ -73,7 +73,10 @@ def add_improve_pen(parser: argparse.ArgumentParser) -> None:
         help="new LED file to write",
     )
     add_file(
-        parser, "--out-camera", "NEW.yaml", "camera file by the same swings to write"
+        parser,
+        "--out-camera",
+        "NEW.yaml",
+        "new camera file to write, by the same swings",
     )
 
 

@@ -17,7 +17,7 @@ from lightpen.commands.arguments import (
 T = TypeVar("T")
 
 KINDS = ("pen", "tip", "cone", "camera", "reference")
-NOTHING = "none"  # typed in place of a value that is to be forgotten
+NOTHING = "none"  # instead of a value, clears it
 FORGOTTEN = object()
 
 

@@ -34,7 +34,7 @@ class ExposureState(StrEnum):
     DONE = "done"
     NO_LEDS = "no LEDs"
     TOO_BRIGHT = "too bright"  # at the shortest exposure and the least gain
-    TOO_DARK = "too dark"  # at the longest exposure that is of use, and all gain
+    TOO_DARK = "too dark"  # at the longest useful exposure and full gain
     UNSTEADY = "unsteady"  # the light changes from image to image
 
 
@@ -53,7 +53,7 @@ class AutoExposure:
 
     @classmethod
     def begun(cls, settings: CameraSettings) -> Self:
-        """Return an adjustment that begins with the settings in force."""
+        """Return an adjustment that begins with the current settings."""
         return cls(
             CameraSettings(exposure_us=settings.exposure_us, gain_db=settings.gain_db)
         )

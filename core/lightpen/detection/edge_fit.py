@@ -60,8 +60,8 @@ LARGEST_SHARPENING = 0.3  # of the blur in one round
 START_SIGMA = 0.7  # of the blur that all rays together seem to have
 HALF_WIDTH = sqrt(2 * log(2))  # of a Gaussian at half its height, standard deviations
 SMOOTHED = 7  # rays whose mean shows the brightness at one
-BRIGHTEST = 1.5  # times the usual brightness: brighter rays count no more
-DARK = 0.1  # of the usual brightness inside the rim, which shows no place of it
+BRIGHTEST = 1.5  # times the usual brightness, at which rays are capped
+DARK = 0.1  # of the usual brightness inside the rim; darker rays show no rim
 
 # A sliver of 1 px off a disc of 42 px leaves 0.5 px.
 MAX_DENT = 0.15  # px, of three neighbouring rays off the ellipse

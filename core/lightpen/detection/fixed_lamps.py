@@ -20,7 +20,7 @@ from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 NEARLY_ALL = 0.8  # of the images show a lamp
 STAYS = 5.0  # px about its place
 FARTHEST = 200.0  # px that a lamp jumps; what goes farther is another light
-MAX_PLACES = 3  # of a lamp; what rests more often goes with the pen
+MAX_PLACES = 3  # of a lamp; lights with more places move with the pen
 BRIEFEST = 3  # images of a lamp in one place
 BETWEEN = 0.1  # of the images, that may show neither of two places
 N_LOOKED_AT = 5  # images in which lamps are looked for first
@@ -127,7 +127,7 @@ class _Stay:
 
 
 def _with_jumps(paths: Sequence[FloatArray]) -> list[FloatArray]:
-    """Return paths, each gone on with by where its lamp jumps to."""
+    """Return paths, each continued by where its lamp jumps to."""
     stays = list(map(_stay, paths))
     steps = {
         (a, b): other.place - one.place

@@ -10,7 +10,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.labels import Labels
 from lightpen.detection.spots import SATURATED_LEVEL, SpotFlaw, Spots
 
-DARK_PEAK = 0.25  # of the full range; noise then costs more than it need
+DARK_PEAK = 0.25  # of the full range; below, noise is avoidably large
 SHARP_EDGE = 3.5  # px from dark to bright; a sharp lens and 20 ms of stillness give 2
 STRAY_MARGIN = 1.5  # times the radius of a stray spot that is masked
 SEARCHED_IMAGES = 10
@@ -190,17 +190,17 @@ def with_circle(mask: FloatArray, circle: FloatArray) -> FloatArray:
 def clicked(mask: FloatArray, spots: Spots, point: FloatArray) -> FloatArray:
     """Return a mask after a click on the image.
 
-    A click into circles takes them away, one on or beside a spot puts one over it, and
-    one anywhere else changes nothing.
+    A click into circles removes them, one on or beside a spot adds a circle, any other
+    changes nothing.
 
     Parameters
     ----------
     mask : (M, 3) array
         x, y and radius, px.
     spots : Spots
-        All that is bright in the image and not masked.
+        Bright spots that are not masked.
     point : (2,) array
-        Where the click was, px.
+        Position of the click, px.
     """
     is_hit = _distances(mask, point) <= mask[:, 2]
     if is_hit.any():

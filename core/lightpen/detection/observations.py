@@ -31,7 +31,7 @@ from lightpen.model.pen import Pen
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 SAME = 0.002  # px, rms: the noise of any two images is more, that of a new coding less
-SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
+SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and the saturated ones
 
 Report = Callable[[float], None]
 

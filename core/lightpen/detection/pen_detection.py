@@ -189,7 +189,7 @@ def detections_of(
 ) -> list[PenDetection]:
     """Return the detections of images by their spots and labels.
 
-    An image is of use if its LEDs are labelled, four of them or more are whole, and
+    An image is usable if its LEDs are labelled, four of them or more are whole, and
     few are too small. If not, the reason is the first that holds:
 
     * too small, where most spots are tiny;

@@ -82,7 +82,7 @@ MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign li
 SATURATED_LEVEL = 0.99  # of the full scale
 BLURRED_EDGE = 5.0  # px; a sharp image has 2 to 3
 DIM_SIGMAS = 16.0
-EXACT_SIGMA = 0.01  # px: better ones are outdone by what the lens leaves
+EXACT_SIGMA = 0.01  # px; lens errors exceed smaller ones
 
 
 class SpotFlaw(IntFlag):
@@ -561,8 +561,7 @@ def _with_small(
 ) -> Spots:
     """Return spots with the small ones measured again.
 
-    These are the ones that blur leaves without an even inside, or foreign light without
-    a foot.
+    Blur leaves these without a plateau, or foreign light without a foot.
     """
     raised = np.array([not disc.is_whole or disc.cut_height > RAISED for disc in discs])
     rough_radii = np.sqrt(spots.areas / np.pi)

@@ -61,7 +61,7 @@ def choose_lens(
 ) -> tuple[BundleState, Choice]:
     """Return the start with the lens model that predicts images best, and the choice.
 
-    The start has 5 coefficients; ``needed`` are to be used instead, unless they fold
+    The start has 5 coefficients; ``needed`` are used instead, unless they fold
     the image. Pixels (M, L, 2) are LED centres; NaN where one was not seen.
     """
     if needed is not None and needed != FEW:

@@ -196,7 +196,7 @@ def remarks_of(discovery: Discovery) -> tuple[Message, ...]:
 
 
 def _remarks_on_camera(discovery: Discovery) -> list[Message]:
-    """Return what is to be said of the lens found, or of the file of the camera."""
+    """Return the statement on the lens found, or on the file of the camera."""
     choice = discovery.lens_choice
     if choice is not None:
         drawn = message("discover.drawn-in", coefficients=choice.drawn_coefficients)

@@ -44,9 +44,9 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
 
-MIN_TRIALS = 20  # fewer tell a standard deviation to worse than a sixth
+MIN_TRIALS = 20  # fewer give a standard deviation to worse than a sixth
 COVERED = 0.95
-BY_CHANCE = 3.0  # standard errors, that one of three axes differs by at most
+BY_CHANCE = 3.0  # standard errors, largest difference of three axes by chance
 IMMATERIAL = 10.0  # percent of U: about half a unit of its only significant digit
 OF_OTHERS = {
     ContributionName.DISTANCE,

@@ -257,7 +257,7 @@ def _cost_of(
 def _away(state: BoardState, origin: BoardState) -> FloatArray:
     """Return the deviations of the unknowns from their priors.
 
-    No prior is about the cameras' places.
+    Extrinsics have no prior.
     """
     intrinsics = [
         one.intrinsics - other.intrinsics

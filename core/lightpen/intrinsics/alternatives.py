@@ -40,8 +40,8 @@ from lightpen.model.quantiles import chi_square_quantile
 MAX_ROUNDS = 8
 CORRELATED = 4.0  # points of a view that tell as much as an independent one
 MAX_PASSES = 8  # of turning one view
-ENOUGH = 0.998  # of the rms before, or one turned view more is not worth it
-LESSENED = 0.97  # of the rms without it, or an alternative is no explanation
+ENOUGH = 0.998  # of the rms before; less gain justifies no further turned view
+LESSENED = 0.97  # of the rms without it; above, an alternative explains nothing
 LEAST_EFFECT = 0.01  # px rms, that turned images remove; less is a lens's field
 HALVED = 0.5  # the same, of views that no single camera fits
 USELESS = 0.001  # of the image's longer side, by which a change moves the image

@@ -10,15 +10,15 @@ from lightpen.intrinsics.views import BoardTolerances
 from lightpen.messages import Message, message
 
 CONTRADICTED = 3.0  # standard deviations
-STRETCHED = 1e-3  # relative: less is no printer's doing
-LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that contradicts its description
+STRETCHED = 1e-3  # relative: printers stretch by more
+RELEASED, RELEASED_MM = 0.1, 5.0  # tolerances of a contradicted board
 MOST_BENT = 0.02  # of the longer side of a board; paper in a hand bends less
 USUAL_SIDES = 10.0, 3000.0  # mm, of a board
 
 
 def released_tolerances(stated: BoardTolerances) -> BoardTolerances:
     """Return tolerances by which the views show how the board is."""
-    return BoardTolerances(LET_GO_MM, LET_GO, stated.scale)
+    return BoardTolerances(RELEASED_MM, RELEASED, stated.scale)
 
 
 def board_contradictions(fitted: BoardFit, tolerances: BoardTolerances) -> BoolArray:

@@ -70,10 +70,10 @@ MIN_POINTS = 6  # of a view
 LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CLUSTERED = 2.0  # times the variance that views of one camera scatter by
-UNEVEN_LENS = 10.0  # times the noise: a residual field that is no lens'
+UNEVEN_LENS = 10.0  # times the noise; no lens has such a residual field
 LEAST_NOISE = 0.01  # px: beside less, usual fields and blur look large
 SKEW_ALONE = 0.1  # of a field's squares, that a skew of the image may leave
-UNEVEN_VIEWS = 2.0  # times the noise: a smooth error of views that is no blur
+UNEVEN_VIEWS = 2.0  # times the noise; no blur makes such errors of views
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.quantiles import chi_square_quantile, normal_quantile
 
 FEWEST = 3  # views of a group
-CHANCE = 1e-3  # of a change, by chance
+CHANCE = 1e-3  # probability of a change by chance
 N_WAYS = 3  # of a change: zoom; zoom and axis; all
 LEAST_KNOWN = 1e-10  # least eigenvalue of an information matrix scaled to ones
 

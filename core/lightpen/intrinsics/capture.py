@@ -17,9 +17,9 @@ from lightpen.intrinsics.next_view import choose_next_view, first_views
 from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.views import BoardTolerances, Views
 
-STILL = 0.0015  # of the image's longer side, from one look to the next, rms
+STILL = 0.0015  # of the image's longer side, between detections, rms
 STILL_TIME = 0.4  # s
-NEW = 0.05  # of the image's longer side, from each view that was kept, rms
+NEW = 0.05  # of the image's longer side, from each captured view, rms
 MAX_VIEWS = 60
 
 

@@ -29,7 +29,7 @@ LONGEST, LARGEST_TURN = 1.0, 0.2  # px and rad, in one round
 FARTHEST = 1.0  # px from the start
 CONVERGED = 0.01  # px
 RIDGE = 1e-9  # of a normal matrix scaled to ones
-CONTRAST = 2.0  # times the rms of the residuals: there is a corner
+CONTRAST = 2.0  # times the rms of the residuals, of a corner
 _AT = np.linspace(-6.0, 6.0, 2401)
 _ERF = np.array([erf(at / sqrt(2)) for at in _AT])
 

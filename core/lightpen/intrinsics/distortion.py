@@ -412,7 +412,7 @@ def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> Float
 
 
 def rough_poses(near: Camera, views: Views) -> BoardPoses:
-    """Return the poses of the views, also by a camera that folds them."""
+    """Return the poses of the views, also for a lens model that folds them."""
     try:
         return start_board_poses(near, views)
     except CalibrationError:

@@ -16,8 +16,8 @@ from lightpen.intrinsics.sightings import count_corners, find_points, for_search
 from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message, printable
 
-MEMORY_A_PIXEL = 5  # bytes: 16 bits, its 8, and what is made of them
-EXAMINED = 3  # images in which a board is looked for that is another
+MEMORY_A_PIXEL = 5  # bytes: 16 bits, 8 bits, and copies
+EXAMINED = 3  # images that are searched for another board
 # Seen in a mirror they are others; a larger chessboard holds a smaller one either way.
 TELLS_SIDES = (
     BoardKind.CHARUCO,

@@ -355,7 +355,7 @@ def _lag(
 ) -> PairLag | None:
     """Return the time lag of the second camera from the motion of the board.
 
-    What it sees elsewhere than the first has it goes with how the board moves there.
+    Its offset from the first camera is proportional to the velocity of the board.
     """
     state = fitted.state
     first = start_board_poses(state.cameras[0], views)

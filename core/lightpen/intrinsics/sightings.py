@@ -36,7 +36,7 @@ from lightpen.intrinsics.squares import (
 
 PARTS = (5, 4), (3, 3)  # of a chessboard, that grow
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
-SEARCHED_SMALL = 640  # px; there noise is gone, in which some searches get lost
+SEARCHED_SMALL = 640  # px; without the noise that misleads some searches
 SEARCHED_WHOLE = 2_600_000  # px; in larger images a board is found smaller, or not
 MARKED_WHOLE = 12_000_000  # px; in larger images markers are searched smaller
 ENLARGED = 1_300_000  # px; in smaller images markers may be too small to be read
@@ -45,7 +45,7 @@ MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
 LEAST_FITTED = 3  # px: smaller corners have too few pixels for their edges
 RIDGE = 1e-9
 REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 60, 1e-4)
-FEWEST = 6  # points by which a pose is known, and that it is no other thing
+FEWEST = 6  # points that determine a pose and identify a board
 UNEVEN = 0.5  # of a step, by which the next may differ; tilt and lens make up to 0.2
 SPREAD = 0.3  # of a square: least standard deviation across
 SPOT_SPREAD = 0.25  # of the distance of neighbours, standard deviation of a circle
@@ -56,7 +56,8 @@ QUICK = (
     | cv2.CALIB_CB_FAST_CHECK
 )
 THOROUGH = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
-WAYS = (THOROUGH, THOROUGH | cv2.CALIB_CB_ACCURACY, 0)  # each finds some of its own
+# Each finds some boards that the others miss.
+WAYS = (THOROUGH, THOROUGH | cv2.CALIB_CB_ACCURACY, 0)
 _THOROUGHLY = Lock()  # one at a time, as each takes some 200 MB
 EVENED = 0.1  # of the longer side: what is darker over more than that is uneven light
 

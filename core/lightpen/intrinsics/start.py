@@ -1,8 +1,8 @@
 """Initial values of an adjustment: focal length and poses, from homographies.
 
 A homography ``H = K [r1 r2 t]`` of a plane makes ``h1^T w h2 = 0`` and ``h1^T w h1 =
-h2^T w h2`` with ``w = diag(1, 1, f^2) / f^2`` about the middle of the image, which all
-views together tell linearly in ``1 / f^2`` [1]_.
+h2^T w h2`` with ``w = diag(1, 1, f^2) / f^2`` about the middle of the image: linear
+equations in ``1 / f^2`` from all views [1]_.
 
 References
 ----------
@@ -25,7 +25,7 @@ FISHEYE_FOCALS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)  # of the longe
 STRAIGHTER = 0.5  # times the bend of rows by a pinhole
 FARTHEST = np.tan(np.radians(75.0))  # in the normalised plane, for a first pose
 MIN_POINTS = 6
-SOME = 8  # views that tell a fisheye
+SOME = 8  # views that show a fisheye
 SHORTEST, LONGEST = 0.2, 50.0  # of the longer side
 
 

@@ -45,9 +45,9 @@ LEAST = 1e-3  # of the noise: a component of no effect
 LEAST_SPREAD = 0.3  # of the noise: an amplitude that may yet be
 MAX_ROUNDS = 20
 CONVERGED = 0.1  # of twice the logarithm of the likelihood
-FIRST = 0.2  # of the noise: a component to begin with
+FIRST = 0.2  # of the noise: start value of a component
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
-LOOSENED = 1e-6  # of the information that was assumed of intrinsics
+LOOSENED = 1e-6  # of the assumed information on intrinsics
 LARGE = 4.0  # times the noise: a field beside which the fit is far off
 SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
 

@@ -6,7 +6,7 @@ from enum import StrEnum
 class Origin(StrEnum):
     """Origin of images.
 
-    A simulated tip is never in force for a pen; one of recorded images may be, as
+    A simulated tip is never current for a pen; one of recorded images may be, as
     whoever accepts it knows when and of what they were taken.
     """
 

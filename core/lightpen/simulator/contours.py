@@ -67,7 +67,7 @@ def disc_contours(
     """Return the imaged contours of discs, moving or not.
 
     Centres, mm, and unit normals (S, N, 3) of N discs are in the camera frame at S
-    times, the radius in mm; sigma is the Gaussian blur they are to be seen with, px.
+    times, the radius in mm; sigma is their Gaussian blur, px.
     """
     n_times = len(centers_cam)
     longest = 2 * np.pi * camera.fx * radius / centers_cam[..., 2].min()

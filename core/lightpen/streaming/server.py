@@ -79,7 +79,7 @@ class _Client:
     connection: socket.socket
     rest: bytes = b""
     newest: bytes = b""
-    points: tuple[NamedPoint, ...] = ()  # that it was sent last
+    points: tuple[NamedPoint, ...] = ()  # sent last
     active_s: float = field(default_factory=time.monotonic)  # it took or sent data
     waiting_s: float = field(default_factory=time.monotonic)  # since when data waits
     misses: deque[bool] = field(default_factory=lambda: deque(maxlen=RECENT))

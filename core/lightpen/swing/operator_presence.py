@@ -23,7 +23,7 @@ class OperatorPresence:
 
     @property
     def is_due(self) -> bool:
-        """Whether a swing is to begin with the next image."""
+        """Whether a swing begins with the next image."""
         is_wanted = self.is_here and self.refusal is None
         return (
             is_wanted and self.choices is not None and not self.choices.missing_inputs()

@@ -119,7 +119,7 @@ class Preparation:
 
     @property
     def pen(self) -> Pen | None:
-        """The pen, with the nominal tip that is in force."""
+        """The pen, with the nominal tip in use."""
         if self.pen_file is None:
             return None
         if self.nominal_tip is None:

@@ -101,7 +101,7 @@ class SwingWorkflow:
         self._recorder: SwingRecorder | None = None
         self._record: Record | None = None  # as it was when it was entered
         self._first: tuple[SwingStatus, Record] | None = None  # during a press test
-        self._wanted: Mapping[int, str] = {}  # images that are to be taken out
+        self._wanted: Mapping[int, str] = {}  # images to exclude
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._task = BackgroundTask(start, self.cancel, listener.on_progress)
         self._stopped_at: SwingStatus | None = None  # by a bug

@@ -36,7 +36,7 @@ class SourcePanel(Translated, QGroupBox):
     search_requested = Signal()  # search for cameras of the selected source
     samples_requested = Signal()  # use the files of the simulated pen
     retry_requested = Signal()  # open the same source once more
-    # FilesBeside: the files beside the recorded images are to be used
+    # FilesBeside: files beside the recorded images to use
     files_requested = Signal(object)
 
     def __init__(self, *, is_second: bool = False) -> None:

@@ -21,7 +21,7 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
-NOTICE = "history"  # cause of what is to be read
+NOTICE = "history"  # cause of its notifications
 
 
 class ArchiveControl(QObject):

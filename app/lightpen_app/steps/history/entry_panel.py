@@ -35,7 +35,7 @@ SHORT = 12  # characters of a hash
 
 
 class EntryPanel(Translated, QWidget):
-    """Shows an entry with the notes on it; takes a note, or puts its tip in force."""
+    """Shows an entry with its comments; adds a comment, or reinstates its tip."""
 
     note_given = Signal(object, str)  # Written, str: a note on an entry
     # Written, str, Signature or None: entry whose tip to reinstate, and reason.

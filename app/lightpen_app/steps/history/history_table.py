@@ -142,7 +142,7 @@ class HistoryModel(TitledModel):
 class HistoryTable(Translated, RowTable):
     """Shows the entries; the current one is reported once read."""
 
-    # Number of the first line of a block that is to be shown.
+    # Number of the first line of a block to show.
     block_wanted = Signal(int)
     # Other lines are current or selected, or were read by now.
     selection_changed = Signal()

@@ -76,7 +76,7 @@ _SAID_OF_STATION: dict[str, str] = {  # of its limits, keys, cameras, verificati
 _LIMITS = {limit.key: limit for limit in LIMITS}
 _RETIRED = QT_TRANSLATE_NOOP("history", "retired")
 _CHANGED = QT_TRANSLATE_NOOP("history", "Modified after entry")
-_KEPT = QT_TRANSLATE_NOOP("history", "saved")  # and in force for no pen
+_KEPT = QT_TRANSLATE_NOOP("history", "saved")  # and current for no pen
 
 
 def kind_text(kind: Kind, grade: str = "") -> str:

@@ -146,7 +146,7 @@ class ImagesPanel(Translated, QWidget):
             self._load_wanted()
 
     def set_locked(self, why: str) -> None:
-        """Keep images from being taken out or put back, for a reason, or let them."""
+        """Lock the exclusion of images, with the reason, or unlock it."""
         self._why_locked = why
         self._undo.set_locked(why)
         self._misfits.set_limit_movable(not why)

@@ -32,7 +32,7 @@ class PlotCard(Translated, QFrame):
     ``file_stem`` is offered as the name of a saved file.
     """
 
-    # The plot shall fill the place of its neighbours, too, or no longer.
+    # Enlarge the plot over its neighbours, or reduce it again.
     enlarge_toggled = Signal(bool)
     saved = Signal(str)  # text for the user: where
     failed = Signal(str)  # text for the user

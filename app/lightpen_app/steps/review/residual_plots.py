@@ -100,7 +100,7 @@ class MisfitPlot(Plot):
         self._on_limit_moved()
 
     def set_limit_movable(self, movable: bool) -> None:
-        """Let images be taken out by the line, or not."""
+        """Let images be excluded by the line, or not."""
         self._limit.setMovable(movable)
         self._limit.setVisible(movable and bool(self._in_use))
 

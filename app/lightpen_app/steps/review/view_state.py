@@ -44,7 +44,7 @@ class ReviewPageState:
     main: MainAction
     is_accepted: bool
     takes_reason: bool  # whether the tip can be accepted with a reason only
-    # Why images cannot be taken out or put back; what follows says likewise why a
+    # Why images cannot be excluded or included; what follows says likewise why a
     # button cannot be pressed.
     why_locked: str
     why_not_more: str
@@ -291,7 +291,7 @@ def unsaved_text(status: SwingStatus) -> str:
         return ""
     taken = status.revoked
     if taken is not None and taken.record == status.record_folder:
-        # Its swing is over, however little is in force.
+        # Its swing is over, though its tip is not current.
         return translate(
             "ReviewPage",
             "Acceptance revoked. The swing is saved; open it with the file "

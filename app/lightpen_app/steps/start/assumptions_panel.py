@@ -56,7 +56,7 @@ KINDS = (
 class AssumptionsDialog(FittedWindow, Translated, QDialog):
     """Default uncertainties for what camera and LED files do not state."""
 
-    value_changed = Signal()  # the user chose others; they are in force at once
+    value_changed = Signal()  # changed by the user; applies at once
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

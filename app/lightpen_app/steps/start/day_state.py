@@ -55,7 +55,7 @@ class ReadinessItem:
 
     @property
     def is_amber(self) -> bool:
-        """Whether something is to be done about it."""
+        """Whether it needs an action."""
         return self.message.tone is Tone.WARN
 
 

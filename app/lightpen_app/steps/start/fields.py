@@ -224,7 +224,7 @@ class PointField(Translated, QWidget):
 
     def _on_toggled(self, from_file: bool) -> None:
         self._coordinates.setVisible(not from_file)
-        if not from_file:  # the user begins with what was in force
+        if not from_file:  # the user begins with the previous values
             blocked = self.blockSignals(True)
             self._show(np.zeros(3) if self._of_file is None else self._of_file)
             self.blockSignals(blocked)

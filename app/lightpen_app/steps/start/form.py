@@ -54,7 +54,7 @@ class NamesForm(Translated, QWidget):
     nominal_tip_changed = Signal()
     # ItemKind, str: a pen, tip or cone was chosen from its list
     item_chosen = Signal(object, str)
-    library_requested = Signal(object)  # ItemKind: the tip library shall be shown
+    library_requested = Signal(object)  # ItemKind: show the tip library
 
     def __init__(self) -> None:
         super().__init__()
@@ -220,7 +220,7 @@ class LimitsForm(Translated, QGroupBox):
     """Limits that end a swing."""
 
     value_changed = Signal()  # the user chose other limits
-    all_requested = Signal()  # all limits of the station shall be shown
+    all_requested = Signal()  # show all limits of the station
 
     def __init__(self) -> None:
         super().__init__()

@@ -35,7 +35,7 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
-NOTICE = "start"  # cause of what is to be read
+NOTICE = "start"  # cause of its notifications
 
 
 class InterruptedControl(QObject):

@@ -37,7 +37,7 @@ from lightpen_app.work.workbench import Workbench
 class LibraryControl(QObject):
     """Keeps the lists and the dialog of the library, and answers barcodes.
 
-    The question asks whether an unknown barcode is to be added.
+    The question asks whether to add an unknown barcode.
     """
 
     # ItemKind, str: an item was chosen, in a list, in the dialog or by its barcode

@@ -24,7 +24,7 @@ from lightpen_app.work.workbench import Workbench
 class SetupView(Translated, QWidget):
     """Setup of a station."""
 
-    done = Signal()  # the day page shall be shown
+    done = Signal()  # show the day page
 
     def __init__(self, workbench: Workbench, sounds: Sounds, *, is_known: bool) -> None:
         super().__init__()

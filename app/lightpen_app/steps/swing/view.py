@@ -92,7 +92,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         layout.addWidget(self._verdict, 3, 0)
         layout.addWidget(self._scroll, 4, 0)
         # The last in the order of the Tab key: Enter must press a button of these only
-        # if somebody has chosen it.
+        # if it is selected.
         head = ((self._instruction, 1), self.side, self.start_over)
         horizontal_layout(layout, *head, at=(0, 0))
         horizontal_layout(layout, (self._hint, 1), self.swapped, at=(1, 0))

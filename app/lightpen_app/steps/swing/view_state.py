@@ -81,7 +81,7 @@ class SwingViewState:
     # Progress of the solution, 0 to 1; None if it does not run.
     solving: float | None = None
     verdict: Verdict | None = None
-    is_accepted: bool = False  # whether the tip is in force
+    is_accepted: bool = False  # whether the tip is current
     # Elapsed fraction of the confirmation hold, after the verdict.
     stillness: float = 0.0
     origin: Origin | None = None  # origin of the images

@@ -49,7 +49,7 @@ from lightpen.record.library.signing.station import station_name
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
-# Of an entry that is to be read.
+# Of an entry to read.
 READ: tuple[Column[Any], ...] = (
     *(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.text, ENTRIES.c.signature),
 )

@@ -57,7 +57,7 @@ class Kind(StrEnum):
 
 
 BESIDE_SWINGS = (Kind.VERIFICATION, Kind.CAMERA, Kind.LIMITS)
-IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
+IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that make a tip current
 
 
 class FileHash(Struct, frozen=True):
@@ -85,7 +85,7 @@ class Event(Struct, frozen=True):
     change: TipChange | None = None
     swing: str = ""  # folder of its swing, as `FileHash.place`; may be empty
     settings: Mapping[str, Plain] = {}  # also a task, new limits or entries
-    result: FileHash | None = None  # put a tip in force, revoked it, or states this
+    result: FileHash | None = None  # makes a tip current, revokes it, or states this
     files: tuple[FileHash, ...] = ()  # swing's record, touches' journals, picture
     record_sha256: Digest | None = None  # of ``result`` as a text, or a calibration
     concerns: Digest | None = None  # the entry that it restores, revokes or is on

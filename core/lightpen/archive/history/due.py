@@ -24,7 +24,7 @@ SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
 
 @dataclass(frozen=True)
 class DueTip:
-    """A tip in force."""
+    """A current tip."""
 
     entry: StoredEntry  # of the acceptance
     calibrated: datetime  # also if the result was reinstated later
@@ -46,7 +46,7 @@ class DueTip:
 def due_tips(
     database: Database, chain: str, rule: DueRule, library: Library = EMPTY
 ) -> tuple[DueTip, ...]:
-    """Return the tips of real pens in force at a station, the due ones first.
+    """Return the current tips of real pens at a station, the due ones first.
 
     The chain is that of the data folder in which the tips are current. The station's
     rule is for tips without their own in the library; retired tips are omitted.

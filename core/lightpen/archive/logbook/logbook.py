@@ -1,13 +1,12 @@
 """The logbook of a station: enters the events of a data folder in its chain.
 
-One rule joins it to the files. A result file puts a tip in force, or revokes it, the
+One rule joins it to the files. A result file makes a tip current, or revokes it, the
 journal of a swing says that it was abandoned, and changes of the tip library, limits,
 verifications and calibrated cameras have files of their own: these files are the truth,
-written whole before anything else, and each is owed one entry. What is owed is entered
-as soon
-as it is written; where that failed, or the program was killed, or had no archive yet,
-with whatever is entered next, and at every start. So nothing is in force or set aside
-that the archive does not contain from the next start on, and no entry is of nothing.
+written whole before anything else, and each gets one entry, as soon as it is written;
+where that failed, or the program was killed, or had no archive yet, with whatever is
+entered next, and at every start. So nothing is current or revoked that the archive does
+not contain from the next start on, and no entry is of nothing.
 """
 
 import logging
@@ -167,10 +166,10 @@ class Logbook:
         reason: str,
         signature: Signature | None = None,
     ) -> Result:
-        """Put the tip of an entry in force again, and enter that.
+        """Reinstate the tip of an entry, and enter that.
 
         ``by`` names the operator who reinstates it, and the station. Raises
-        `ArchiveError` if the entry put no tip in force, is not of this station, its
+        `ArchiveError` if the entry made no tip current, is not of this station, its
         files are not as they were entered, or it cannot be entered; it stays owed then.
         Raises `AcceptanceError` if the tip is retired, there is no reason, or there is
         a password and no supervisor signs.

@@ -65,7 +65,7 @@ def restored_result(
     reason: str,
     now: datetime,
 ) -> Result:
-    """Return the result that puts the tip of an entry in force again.
+    """Return the result that reinstates the tip of an entry.
 
     The record of the entry is the file of its result; ``by`` names the operator who
     reinstates it, and the station. Raises `ArchiveError` if the entry put no tip in

@@ -4,7 +4,7 @@ The archive of the station itself is what waits to be delivered: it has every en
 before the server does, and keeps it. So nothing is lost while the server is away, and
 as entries are copied in their order and known ones passed over, none is doubled.
 
-The server is called for each delivery and then let go of: it has many stations to
+The connection to the server is closed after each delivery: it has many stations to
 serve, and a line that is kept may be dead without either end knowing. At the first
 call the whole chain is compared, at each other its end. With each call, and every five
 minutes, the library is shared.

@@ -61,7 +61,7 @@ def _url(address: str) -> URL:
         if url.get_backend_name() != "postgresql":
             raise ArgumentError("no PostgreSQL")
         if "@" in (url.host or ""):
-            raise ArgumentError("a password with a sign that is to be written as %40")
+            raise ArgumentError("a password with a sign that must be written as %40")
     except (ArgumentError, ValueError) as error:
         raise ArchiveError("archive.no-address") from error
     query = {"sslmode": TLS, **url.query}

@@ -12,7 +12,7 @@ from lightpen.model.pen import MIN_LEDS, Pen
 from lightpen.model.rigid import fit_rigid
 
 MIN_CERTAIN_LEDS = 6  # leave 6 equations over to check the 6 unknowns of a pose
-FEWEST_LEDS = 5  # that are believed where nothing else explains them
+FEWEST_LEDS = 5  # of a labelling if nothing else explains the spots
 MIN_HEIGHT = 0.05  # of a triangle over its longest side; flatter ones fix no pose
 LOOKALIKE = 0.025  # of the pen's size, within which an LED stands in for another
 MAX_TRIANGLES = 120  # whose copies are sought in the pen

@@ -25,8 +25,8 @@ MIN_THRESHOLD = 0.3  # px, of a residual
 MAX_THRESHOLD = 1.0  # px
 OUTLIER_SIGMAS = 5.0
 UNSUSPICIOUS_RMS = 0.1  # px, at which no stray spot is looked for
-FLOOR_RMS = 0.03  # px, below which better fits count for nothing
-MAX_CHANCE = 1e-3  # that a pair dropped as stray was none
+FLOOR_RMS = 0.03  # px; better fits are not preferred
+MAX_CHANCE = 1e-3  # that a pair dropped as stray is genuine
 
 SHAPE_TOLERANCE = 0.12  # difference of shapes over the trace of the predicted one
 MAX_COMMON_BROADENING = 0.5  # of all shapes alike, by defocus or motion

@@ -49,7 +49,7 @@ LEAST_LEAN = 0.02  # sine; below it the side of the lean is not known
 # How often chance alone supports an effect, at most. Four kinds are tried at every
 # station: of 24 without effects, one in six (Akaike) made the tip twice as far off.
 CHANCE = 0.01
-UNEVEN = 0.5  # of a step from image to image, by which the next differs: no motion
+UNEVEN = 0.5  # of the shorter step, by which successive steps of an even motion differ
 MOVING = 1.0  # px, least median step: pens at rest tell no time
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one

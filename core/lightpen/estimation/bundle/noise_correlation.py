@@ -32,7 +32,7 @@ from lightpen.model.information import inverse
 from lightpen.model.quantiles import normal_quantile
 
 TRIED = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 0.99])
-BY_CHANCE = 0.01  # that independent noise looks correlated
+BY_CHANCE = 0.01  # probability that independent noise looks correlated
 NEGLIGIBLE = 1e-3  # weight of a coefficient that is left out
 FAR = 30.0  # cost beyond the least at which the search ends
 NOISE_PASSES = 2  # over variance and components

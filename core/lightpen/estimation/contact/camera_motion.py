@@ -30,7 +30,7 @@ from lightpen.model.quantiles import chi_square_quantile
 from lightpen.model.rigid import rotation_from_vector
 
 MIN_IMAGES = 10
-LEAST = 1e-6  # px, of noise and ways; keeps exact lamps from dividing by zero
+LEAST = 1e-6  # px, of noise and motion; exact lamps would divide by zero
 RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variance of a step to that of a lamp
 HALF = 0.5  # of the lamp shift, by which the pen shifts at least if the camera moved
 WITH_LAMPS = 1.5  # times the lamp shift, largest shift of a pen beside them
@@ -86,7 +86,7 @@ def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> Stead
 def _way_of(observations: Observations) -> CameraPath | None:
     """Return the motion of the camera by the images that show the pen.
 
-    A swing that is captured keeps no others.
+    A captured swing contains no others.
     """
     shown = np.flatnonzero([reason.shows_pen for reason in observations.reasons])
     path = follow_lamps(observations.lamps[shown])

@@ -9,7 +9,7 @@ in the frame of the camera, or of the rig where several cameras look at once. So
 contact of tip and cone is built in and an image costs three unknowns, not six. The
 reprojection errors of the ellipse centres are minimised by Gauss-Newton. The rotations
 are eliminated image by image (Schur complement [1]_), which leaves a system of six
-equations and, from each image, what it says of tip and cone.
+equations and the information of each image on tip and cone.
 
 LEDs are weighed by a Cauchy loss until the iteration settles; it ends as least squares
 on the LEDs below the outlier threshold, which loses nothing on normal noise.
@@ -48,7 +48,7 @@ NEARLY = 1e-3  # mm, of a running fit; the step leaves less than a thousandth of
 MAX_STEPS = 50
 MAX_SELECTIONS = 5
 TURN_RIDGE = 1e-6  # px^2/rad^2 beside some 1e6; an image may lose all its LEDs
-ONE_LED_RIDGE = 1e-10  # of the trace; or all but one, about which it turns freely
+ONE_LED_RIDGE = 1e-10  # of the trace; an image with one LED rotates about it
 
 
 @dataclass(frozen=True, eq=False)

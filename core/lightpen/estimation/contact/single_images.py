@@ -39,7 +39,7 @@ class PosedImages:
 
     @property
     def chosen(self) -> IntArray:
-        """Images that are of use, (K,)."""
+        """Usable images, (K,)."""
         return np.asarray(self.posed[self.kept])
 
 
@@ -129,7 +129,7 @@ def require_images(
     Parameters
     ----------
     chosen : (M,) array of int
-        Those that are of use.
+        The usable ones.
     reasons : (N,) array of Reason
         Why others are left out.
     advice : Message or None

@@ -26,16 +26,16 @@ from lightpen.model.quantiles import chi_quantile
 LEAST_SHARE = 0.1  # of the poses; fewer are outliers
 FIRST_SHARE = 0.4  # that agrees best is of one group, even where both are equal
 SECOND_SHARE = 0.6  # of the rest, beside poses that agree with nothing
-APART = 4.0  # standard deviations from the first group, where the second is looked for
+APART = 4.0  # standard deviations from the first; the second is beyond
 WITHIN = 8.0  # standard deviations; poses beyond are of neither group
 UNDECIDED = 3.0  # log likelihood ratio: 20 to 1
-MAX_UNDECIDED = 0.1  # of the poses; more, and the groups are two sides of one
+MAX_UNDECIDED = 0.1  # of the poses; with more the groups are parts of one
 SIGNIFICANT = (
     60.0  # chi-square, 6 degrees of freedom: the split was chosen by residuals
 )
 MAX_ROUNDS = 30
 SINGULAR = 1e-12  # of the trace; sides of too similar poses give any finite answer
-MAX_LOOKED_AT = 500  # poses, to begin with
+MAX_LOOKED_AT = 500  # poses examined at first
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def _split_by_agreement(
 
 
 def _split_by_time(equations: _Equations, used: BoolArray) -> IntArray | None:
-    """Return the group of each used pose, parted where that leaves the least."""
+    """Return the group of each used pose, split where residuals are least."""
     order = np.flatnonzero(used)
     least = int(np.ceil(max(MIN_POSES, LEAST_SHARE * len(order))))
     if len(order) < 2 * least:

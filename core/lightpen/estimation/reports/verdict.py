@@ -29,7 +29,7 @@ from lightpen.swing_messages import (
 )
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
-FAR_MOVED = 3.0  # times the limit of U: cone against camera, though it is taken out
+FAR_MOVED = 3.0  # times the limit of U: corrected motion of cone or camera
 MANY_DROPPED = 0.2  # of the images that show the pen
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
 FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2

@@ -66,7 +66,7 @@ def find_initial_extrinsics(
         lags[c] = measure_lag(seen, found)
         apart[found.apart, c] = True
         rotations[c] = found.rotation
-        # By the cone, which all images of a camera tell, and not by single poses.
+        # By the cone, which all images of a camera determine, not by single poses.
         translations[c] = parts[c].pivot.pivot_cam - found.rotation @ cone
         seen = seen.completed(turns[c], found.rotation)
     placed = replace(

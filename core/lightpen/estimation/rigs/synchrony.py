@@ -19,13 +19,13 @@ MIN_PAIRS = 6  # moments that two cameras see
 NEAR = 4.0  # times the median turn: pairs by which the cameras are judged
 ROUNDS = 3
 APART = 8.0  # times the median turn: images of other moments
-MANY = 0.25  # of the moments; a pairing that is wrong and no single image
+MANY = 0.25  # of the moments; more show a wrong pairing
 MAX_SHIFT = 10  # images by which the order of one camera may be off
 EXPLAINED = 0.3  # of the scatter of a wrong order, that the right one leaves
 UNEXPLAINED = 5.0  # times what the poses are uncertain by
-UNSTEADY = 0.02  # rad; no file of a camera scatters poses by that
+UNSTEADY = 0.02  # rad; scatter of poses that no camera file causes
 SLOW = 0.3  # rad from one image to the next, up to which a motion counts as even
-MIN_SLOW = 20  # images of such motion that tell a lag
+MIN_SLOW = 20  # images of such motion that determine a lag
 SIGNIFICANT = 5.0  # standard deviations
 NOTICEABLE = 2e-4  # rad: 0.04 mm at the far end of a pen
 

@@ -63,8 +63,8 @@ from lightpen.model.quantiles import chi_square_quantile
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
-BY_CHANCE = 0.01  # that independent noise scatters blocks as much
-POSTURES = 30  # with independent errors of the centres
+BY_CHANCE = 0.01  # probability that independent noise scatters blocks as much
+POSTURES = 30  # number with independent errors of the centres
 # A seat mode of one wave is hardly observable beside the tip. Along the cone it is
 # budgeted with this share of the other modes' deviation, as a ball or cone that is not
 # round moves the tip sideways, and little up and down. `./run bench files` shows both.

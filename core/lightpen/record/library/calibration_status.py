@@ -22,7 +22,7 @@ class TipStatus(StrEnum):
 
 @dataclass(frozen=True)
 class CurrentResult:
-    """A tip in force: since when, until when by its age, largest U (k = 2), mm."""
+    """A current tip: since when, until when by its age, largest U (k = 2), mm."""
 
     calibrated: datetime
     due: datetime
@@ -80,7 +80,7 @@ class StationStatus:
         return TipStatus.OVERDUE if is_over else TipStatus.VALID
 
     def pens_of(self, tip: str) -> tuple[str, ...]:
-        """Return the pens for which a tip is in force."""
+        """Return the pens with a current tip."""
         return tuple(pen for pen, each in self.in_force if each == tip)
 
     def due(self, pen: str, tip: str) -> date | None:

@@ -162,7 +162,7 @@ def require_supervisor(
 def approval_of_change(
     supervision: Supervision, signature: Signature | None, reason: str
 ) -> SigningKey | None:
-    """Return the key of the supervisor who approves another tip to be in force.
+    """Return the key of the supervisor who approves another current tip.
 
     None where there is no password; else a signature and a reason are needed
     (`AcceptanceError`).

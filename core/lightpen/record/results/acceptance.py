@@ -1,8 +1,8 @@
-"""Putting the tip of a swing in force: one transaction of archive and record.
+"""Acceptance of the tip of a swing: one transaction of archive and record.
 
 The result is stored first, whole or not at all, and then the swing is concluded. What
 is stored says which images of which swing it is of, so that a program killed between
-the two leaves nothing undecided: the tip is in force, and whoever finds the swing
+the two leaves nothing undecided: the tip is current, and whoever finds the swing
 without its verdict next concludes it.
 
 The grade decides how: a tip that passes is accepted as it is, one that is to be checked
@@ -57,15 +57,15 @@ def accept(
     reason: str = "",
     signature: Signature | None = None,
 ) -> Result:
-    """Put the tip of a recorded swing in force, and conclude the swing.
+    """Accept the tip of a recorded swing, and conclude the swing.
 
-    Killed at any moment, it leaves either the result before in force and the swing to
-    be gone on with, or the new result. Accepting the same images of a swing again gives
+    Killed at any moment, it leaves either the previous result current and the swing to
+    be resumed, or the new result. Accepting the same images of a swing again gives
     the result that is stored. A tip to be checked needs a reason, and a supervisor
     where the station has one (`AcceptanceError`).
 
     Raises `FileError` if another program writes to the record, it has changed since it
-    was solved, or the result cannot be stored; what was in force before stays so.
+    was solved, or the result cannot be stored; the previous one stays current.
     """
     record = open_record(solution.source.folder)
     if is_press_test(record):

@@ -48,11 +48,11 @@ _logger = logging.getLogger(__name__)
 
 
 class FolderArchive:
-    """Keeps every result that was accepted; the newest of a pen and tip is in force.
+    """Keeps every result that was accepted; the newest of a pen and tip is current.
 
     Results are added and never changed or removed: one that is revoked is kept, and
-    the one before is in force again. Those of a simulated pen are kept apart, and
-    none of them is in force for a real one. All methods may take as long as a disk
+    the one before is current again. Those of a simulated pen are kept apart, and
+    none of them is current for a real one. All methods may take as long as a disk
     or a network does, and may be called from any thread. Of a result of another
     pen, tip or swing only the first entries are read, so that thousands of them
     cost little. ``confirm`` raises an `AcceptanceError` where the limits are not
@@ -73,14 +73,14 @@ class FolderArchive:
         return self._data / RESULTS
 
     def store(self, result: Result, supervisor: SigningKey | None = None) -> None:
-        """Put a result in force, signed by the supervisor whom it names.
+        """Make a result current, signed by the supervisor whom it names.
 
         When this returns, the result is kept whatever happens next; when it raises, or
         is killed, it is kept whole or not at all.
         """
         root, record = self._root(result.is_simulated), self.place_of(result.record)
         sign = self._signing(read_supervision(self._data), supervisor)
-        # What cannot be read again is never in force.
+        # An unreadable result is never current.
         parse_result(result_bytes(result, record), root, Path)
         add_numbered(root, lambda file: result_bytes(result, record, sign(file)))
 
@@ -92,12 +92,11 @@ class FolderArchive:
         reason: str = "",
         signature: Signature | None = None,
     ) -> None:
-        """Let the result before a result in force be in force again.
+        """Make the result before the current one current again.
 
-        It is one step, as `store`. Where there is a supervisor password, it takes a
-        supervisor and a reason of the operator (`AcceptanceError`), as what comes into
-        force again was not judged by the present limits. Raises `FileError` if it is
-        not in force any more.
+        It is one step, as `store`. With a supervisor password it needs a supervisor and
+        a reason of the operator (`AcceptanceError`), as that result was not judged by
+        the present limits. Raises `FileError` if the result is not current any more.
         """
         names, supervision = result.names, self.supervision()
         key = approval_of_change(supervision, signature, reason)
@@ -127,7 +126,7 @@ class FolderArchive:
     ) -> Result | None:
         """Return the last accepted result of a pen and a tip, or None.
 
-        Raises `FileError` if a result that may be the one in force cannot be read: an
+        Raises `FileError` if a result that may be the current one cannot be read: an
         older one must not come into force again in silence.
         """
         file = self.file_in_force(pen, tip, is_simulated=is_simulated)
@@ -143,7 +142,7 @@ class FolderArchive:
         return None
 
     def tips(self, pen: str, *, is_simulated: bool = False) -> tuple[str, ...]:
-        """Return the tips of a pen that have a result in force, the newest first.
+        """Return the tips of a pen with a current result, the newest first.
 
         Results that cannot be read are passed over.
         """

@@ -91,7 +91,7 @@ class TipChange(Struct, frozen=True):
     accepted: ZonedTime  # when the tip as found was
     difference_mm: Vector  # now minus then, pen frame
     expanded_uncertainty_mm: Vector  # U (k = 2) of the difference
-    as_found_mm: Vector  # the tip in force until then, pen frame
+    as_found_mm: Vector  # current tip until then, pen frame
     as_found_expanded_uncertainty_mm: Vector  # U (k = 2) of it
     limit_mm: float | None = None  # limit of the tip; None if it has none
 
@@ -167,7 +167,7 @@ class Result:
     reason: str = ""  # why it was accepted though it does not pass, by who did
     why: StoredMessage | None = None
     doubts: tuple[StoredMessage, ...] = ()
-    change: TipChange | None = None  # since the result in force before, if any
+    change: TipChange | None = None  # since the previous result, if any
     supervisor: str = ""  # who approved it; empty if not needed
     restores: str | None = None  # hash of the entry whose tip it reinstates
 

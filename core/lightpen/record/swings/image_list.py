@@ -18,7 +18,7 @@ class ImageRow:
     misfit: float  # rms residual with the tip in the cone, px; NaN without the pen
     n_leds: int  # LEDs that were seen, by all cameras together
     reason: Reason  # for not using it; `Reason.NONE` for a used one
-    is_taken_out: bool  # and may be put back; else the computation left it out
+    is_taken_out: bool  # by the user, who may include it again
 
     @property
     def is_used(self) -> bool:
@@ -29,7 +29,7 @@ class ImageRow:
 def worst_first(solution: Solution) -> tuple[ImageRow, ...]:
     """Return all images of a solved swing by residual; images without a pen first.
 
-    An image keeps its place when it is taken out or put back, but for what that changes
+    An image keeps its place when excluded or included, but for what that changes
     of the fit.
     """
     misfits = solution.misfits

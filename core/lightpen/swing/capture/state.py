@@ -36,7 +36,7 @@ from lightpen.swing.capture.kept_images import (
 from lightpen.swing.capture.seat import Seat
 from lightpen.swing_messages import SHOW_PEN, Code
 
-N_TRACED = 12  # estimates of a swing that is gone on with
+N_TRACED = 12  # estimates of a resumed swing
 
 
 class Phase(StrEnum):

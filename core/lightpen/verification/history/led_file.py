@@ -42,8 +42,8 @@ FoundT = TypeVar("FoundT", FoundPen, FoundCamera)
 MIN_POOLED = 3  # swings, beside the one held out
 MIN_JOINT = 2  # the same, of an adjustment that needs to gain nothing
 CONTRADICTING = 4.0  # standard deviations of a swing held out
-CONFIRMED = 0.01  # chance that such a gain is none
-FINEST = 1e-4  # mm, to which no LED file is known beforehand
+CONFIRMED = 0.01  # probability of such a gain by chance
+FINEST = 1e-4  # mm; no LED file is that accurate
 
 
 @dataclass(frozen=True, eq=False)

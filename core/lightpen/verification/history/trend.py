@@ -27,8 +27,8 @@ from lightpen.verification.tasks.repeatability import (
 
 LONGEST = 1000  # calibrations, the newest
 LATEST = 100  # verifications, among which a fixed point is looked for
-VERIFIED = "verified"  # among the settings of an entry: what was
-LIMIT = "max_uncertainty_mm"  # among the settings of an entry
+VERIFIED = "verified"  # key in the settings of an entry
+LIMIT = "max_uncertainty_mm"  # the same
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ class CurrentTip:
         return replace(first, others=tuple(others))
 
     def is_like(self, other: "CurrentTip") -> bool:
-        """Return whether touches with the other tip are touches with this one."""
+        """Return whether points probed with the other tip are valid for this one."""
         return (
             self.names == other.names
             and self.origin is other.origin

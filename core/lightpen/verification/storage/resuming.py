@@ -83,7 +83,7 @@ def resume_verification(
     """Return an interrupted verification with its results and touches.
 
     The preparation has the names and files of the session. Raises `LightpenError` if
-    another tip is in force by now, other files are chosen, or a record of touches
+    another tip is current by now, other files are chosen, or a record of touches
     cannot be read.
     """
     tip = read_tip_in_force(archive, preparation)

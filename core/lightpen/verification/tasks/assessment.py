@@ -17,7 +17,7 @@ BETTER_POSTURES = message("verification.better-postures")
 MORE_POINTS = message("verification.more-points")
 
 
-BY_CHANCE = 0.01  # that an error of none looks significant: beyond 1.3 U
+BY_CHANCE = 0.01  # probability that no error looks significant: beyond 1.3 U
 RELEVANT = 0.25  # of a limit: a smaller difference does not matter, however certain
 
 WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last

@@ -56,7 +56,7 @@ from lightpen.verification.tasks.task import (
 
 MIN_VISITS = 2
 VISIT_POINTS = 3
-BY_CHANCE = 0.005  # that a reference seems to move that stands still
+BY_CHANCE = 0.005  # probability that a fixed reference seems to move
 ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
 TOUCH_LONGER = message("drift.touch-longer")
 USE_TOUCHES = message("drift.use-touches")

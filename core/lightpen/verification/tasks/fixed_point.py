@@ -65,11 +65,11 @@ MIN_TOUCHES, MAX_TOUCHES = 3, 50
 NEW_POSTURE = float(np.radians(8.0))
 ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
 TILTS = 0.5, 0.25  # rad, of the simulated operator
-MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less proves nothing
+MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less verifies nothing
 ASTRAY = 8.0  # times the median distance from the middle
 LIFTED = 0.2  # mm; nearer points scatter, farther ones may be of a lifted pen
-OUTLYING = 1e-6  # chance that the noise of a point puts it that far away
-UNUSUAL = 0.001  # chance that a coordinate scatters that much more than expected
+OUTLYING = 1e-6  # probability of such a distance by noise
+UNUSUAL = 0.001  # probability of such a scatter by chance
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.model.rigid import nearest_rotation, skew
 
-KNOWN_FREEDOM = 30  # degrees, that the noise of the calibration counts for
+KNOWN_FREEDOM = 30  # degrees of freedom of the noise of the calibration
 SEATING = 0.002  # mm, standard uncertainty of where a tip comes to rest in a good cone
 POSE_UNKNOWNS = 6
 NO_DRIFT = np.zeros(3)  # mm

@@ -44,10 +44,10 @@ from lightpen.verification.tasks.assessment import (
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
 
-BY_CHANCE = 0.015  # that a correct tip looks like another one
-MISSED = 0.05  # chance that an error as large as is stated goes unseen
+BY_CHANCE = 0.015  # probability that a correct tip looks wrong
+MISSED = 0.05  # probability that an error of the stated size is missed
 TIP_SIGMA = 3.0  # mm, by which another tip may differ
-LARGEST = 1.0  # mm: what shows no smaller error shows none
+LARGEST = 1.0  # mm; points that show no smaller error show none
 
 
 @dataclass(frozen=True, eq=False)
