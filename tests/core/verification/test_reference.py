@@ -3,7 +3,7 @@
 That it is right is shown by the other tests; that nothing changes unnoticed, here.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,9 @@ from tests.reference import assert_as_before, text_figures
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.measuring.plan import Plan
 from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.reports.charts import write_chart
 from lightpen.verification.reports.records import (
@@ -27,6 +29,8 @@ from lightpen.verification.tasks.circle import CircleOptions
 from lightpen.verification.tasks.drift import DriftOptions
 from lightpen.verification.tasks.fixed_point import FixedPointOptions
 from lightpen.verification.tasks.length import LengthOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.plane import PlaneOptions
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.registry import AnyTask, task_of
@@ -54,6 +58,7 @@ Named = tuple[tuple[str, tuple[ProbedPoint, ...]], ...]
 
 ENDS = PAPER_CONE + np.array([[-75.0, 0.0, 0.0], [75.0, 4.0, 20.0]])
 LIMITS = VerificationLimits(form=0.12)
+HOLES = Plan("Holes", plate_plan().features[:4])
 DENTS = 0.003 * (-1.0) ** np.arange(25)
 DRIFT = np.array([0.004, 0.001, 0.006])
 
@@ -61,6 +66,19 @@ DRIFT = np.array([0.004, 0.001, 0.006])
 def spread(points: FloatArray, seed: int, by: float = 0.01) -> FloatArray:
     """Return points that are off by as much, mm."""
     return points + by * np.random.default_rng(seed).standard_normal(points.shape)
+
+
+def plate_runs(touching: Touching) -> Iterator[tuple[str, tuple[ProbedPoint, ...]]]:
+    """Return the points of a face and two holes of the simulated plate."""
+    options = PartOptions(HOLES)
+    for run, planned in enumerate(HOLES.features):
+        places = []
+        for step in range(planned.n_touches):
+            goal = PART.hand(options, run, step)
+            assert goal.point is not None
+            assert goal.outwards is not None
+            places.append(PAPER_CONE + goal.point + 5.0 * goal.outwards)
+        yield planned.name, touching(spread(np.array(places), run), seed=run)
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +149,7 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
             PlaneOptions(0.004, 9),
             (("", touching(spread(PAPER_CONE + tilted, 4), n_frames=2)),),
         ),
+        "part": (PartOptions(HOLES), tuple(plate_runs(touching))),
         "articulation": (
             ArticulationOptions(),
             tuple(zip("abcde", again, strict=True)),
@@ -229,18 +248,20 @@ def step_of(
     ]
     step = {"done": task.done(options, progress)}
     if not progress.points:
-        return step | {"said": [{"code": each.code} for each in said]}
+        return step | {
+            "said": [{"code": each.code, "with": each.values} for each in said]
+        }
     screened = task.screen(options, conditions, progress)
     if screened.fault is not None:
         said.append(screened.fault)
     return step | {
-        "said": [{"code": each.code} for each in said],
+        "said": [{"code": each.code, "with": each.values} for each in said],
         "kept": list(screened.kept),
         "figures": shown(task.figures_so_far(options, progress, conditions)),
     }
 
 
-@pytest.mark.parametrize("case", COURSES)
+@pytest.mark.parametrize("case", [*COURSES, "part"])
 def test_how_a_task_goes_on_is_as_before(
     case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
 ) -> None:
