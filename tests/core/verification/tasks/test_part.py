@@ -408,6 +408,16 @@ def test_datum_points_nearly_on_a_line_are_none(
         with_move(PartOptions(plan), runs, setup.conditions)
 
 
+def test_the_ball_is_known_by_its_diameter(instrument: Instrument) -> None:
+    name, points = probed_plate(instrument, plate_plan())[0]
+    conditions = Conditions(instrument, ball_diameter=10.0)
+    options = PartOptions(ball_uncertainty=0.004)
+
+    touches = touches_of_part([(name, each) for each in points], conditions, options)
+
+    assert (touches.ball_radius, touches.ball_uncertainty) == (5.0, 0.002)
+
+
 def test_a_camera_that_moved_counts_in_each_point(instrument: Instrument) -> None:
     name, points = probed_plate(instrument, plate_plan())[0]
     found, drift = [(name, each) for each in points], np.array([0.005, 0.002, 0.001])
