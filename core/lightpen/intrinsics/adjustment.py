@@ -83,6 +83,8 @@ def adjust_board(
 ) -> BoardFit:
     """Fit everything to the points of all views.
 
+    Raises `CalibrationError` if the points do not settle, or leave the camera open.
+
     Parameters
     ----------
     start : BoardState
@@ -91,11 +93,6 @@ def adjust_board(
         Information of the intrinsics of each camera beside the views; none where None.
     converged : float
         Share of the sum of squares that the last step may gain.
-
-    Raises
-    ------
-    CalibrationError
-        The points do not settle, or leave the camera open.
     """
     prior = _prior(start, tolerances, stated)
     origin, state = start, start
@@ -126,18 +123,7 @@ def adjust_board(
 
 
 def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
-    """Return the residuals of views of which only the poses are fitted.
-
-    Parameters
-    ----------
-    state : BoardState
-        All but the poses holds.
-
-    Returns
-    -------
-    (V, C, N, 2) array
-        px.
-    """
+    """Return the residuals (V, C, N, 2), px, of views whose poses alone are fitted."""
     n = sum(len(camera.intrinsics) for camera in state.cameras)
     held = np.diag(np.full(n + N_POSE * (len(state.cameras) - 1) + N_SHAPE, 1e20))
     _, system = _settled(views, state, state, held, 1.0, CONVERGED)
@@ -147,17 +133,9 @@ def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
 def view_information(
     board: Board, state: BoardState, image_size: tuple[int, int]
 ) -> FloatArray:
-    """Return the information of views by one camera, poses eliminated.
+    """Return the information of views by one camera, poses eliminated, (V, p, p).
 
-    Parameters
-    ----------
-    image_size : tuple of int
-        Outside of which no point is seen.
-
-    Returns
-    -------
-    (V, p, p) array
-        For points of 1 px noise.
+    Points have 1 px noise; outside the image none is seen.
     """
     _, points = _points_cam(board, state)
     pixels = np.array(state.cameras[0].project(points))
@@ -359,13 +337,7 @@ def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
 def linearise(
     views: Views, state: BoardState, residuals: FloatArray
 ) -> Iterator[LinearSight]:
-    """Yield the derivatives of the points of each camera.
-
-    Parameters
-    ----------
-    residuals : (V, C, N, 2) array
-        px.
-    """
+    """Yield the derivatives of each camera's ``residuals`` (V, C, N, 2), px."""
     turned, points = _points_cam(views.board, state)
     deformations = deformations_of(views.board)
     seen = views.seen
@@ -415,13 +387,7 @@ def stated_information(covariance: FloatArray) -> FloatArray:
 
 
 def _inverse(information: FloatArray) -> FloatArray:
-    """Return a covariance.
-
-    Raises
-    ------
-    CalibrationError
-        Something is left open.
-    """
+    """Return a covariance; raises `CalibrationError` if something is left open."""
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     if values[0] < VAGUE:

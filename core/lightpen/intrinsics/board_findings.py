@@ -34,10 +34,8 @@ def messages_on_board(
 ) -> tuple[Message, ...]:
     """Return messages on a board that contradicts its tolerances.
 
-    Parameters
-    ----------
-    suspected : (5,) array of bool
-        Which errors contradicted them before lenses and single views were considered.
+    ``suspected`` (5,) are the errors that contradicted them before lenses and single
+    views were considered.
     """
     denied = suspected & board_contradictions(fitted, tolerances)
     values = fitted.state.shape
@@ -64,13 +62,7 @@ def messages_on_board(
 
 
 def require_plausible_bend(fitted: BoardFit) -> None:
-    """Refuse a bend that no board has: then something else is wrong.
-
-    Raises
-    ------
-    CalibrationError
-        The bend is such.
-    """
+    """Raise `CalibrationError` at a bend no board has: something else is wrong."""
     bend = float(np.abs(fitted.state.shape[2:]).max())
     longer = 2 * float(np.abs(fitted.board.points[:, :2]).max())
     if bend > MOST_BENT * longer:

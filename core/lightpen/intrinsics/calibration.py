@@ -130,15 +130,9 @@ def calibrate_camera(
 ) -> CameraCalibration:
     """Calibrate a camera by views of a board.
 
-    Parameters
-    ----------
-    has_k3 : bool
-        Whether the lens model may be one that the form of Kalibr does not hold.
-
-    Raises
-    ------
-    CalibrationError
-        The views do not determine the camera; the text says what is missing.
+    Without ``has_k3`` the lens model is one that the form of Kalibr holds. Raises
+    `CalibrationError` if the views do not determine the camera; the text says what is
+    missing.
     """
     require_views(views)
     start = start_camera(views, FEW)
@@ -314,13 +308,7 @@ def _before(views: Views, camera: Camera) -> Views:
 
 
 def require_views(views: Views) -> None:
-    """Refuse views of which there are too few.
-
-    Raises
-    ------
-    CalibrationError
-        There are.
-    """
+    """Raise `CalibrationError` if there are too few views."""
     if views.n_views < MIN_VIEWS:
         raise CalibrationError(
             "intrinsics.few-views",
@@ -333,10 +321,7 @@ def require_views(views: Views) -> None:
 def without_outliers(views: Views, fitted: BoardFit) -> Views:
     """Return the views without points, and without views, that fit no others.
 
-    Raises
-    ------
-    CalibrationError
-        They are so many that it is the board which is another.
+    Raises `CalibrationError` if they are so many that it is the board which is another.
     """
     rms = fitted.view_rms
     kept = rms <= OFF_VIEW * np.maximum(np.nanmedian(rms, axis=0), FINEST)
@@ -385,17 +370,9 @@ def _require_no_fold(camera: Camera) -> None:
 
 
 def _message_on_projection(fitted: BoardFit, apart: float = 0.0) -> Message | None:
-    """Return the message on a lens that the views leave open.
+    """Return the message on a lens that the views leave open; ``apart`` as in `Choice`.
 
-    Parameters
-    ----------
-    apart : float
-        See `Choice`.
-
-    Raises
-    ------
-    CalibrationError
-        They do so over most of the image.
+    Raises `CalibrationError` if they do so over most of the image.
     """
     camera, at = fitted.state.cameras[0], fitted.of_intrinsics(0)
     px = map_uncertainty(camera, fitted.covariance[at, at]).typical

@@ -28,13 +28,7 @@ class CameraChange:
 
 
 def find_change(mixed: MixedFit, names: tuple[str, ...]) -> CameraChange | None:
-    """Return the most significant change of the camera in time, if one is.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the views.
-    """
+    """Return the most significant change of the camera between named views, or None."""
     n_views = len(mixed.scores.scores)
     splits = range(FEWEST, n_views - FEWEST + 1)
     if not splits:
@@ -61,11 +55,7 @@ def find_apart(mixed: MixedFit, taken: BoolArray) -> BoolArray | None:
 
     View by view goes to the other group as long as that increases the difference of fx
     fy cx cy; the chance that it must not have is that of all ways of parting the views.
-
-    Parameters
-    ----------
-    taken : (W,) array of bool
-        Which views took part in the fit; the others stay with the first.
+    Those that were not ``taken`` (W,) for the fit stay with the first.
     """
     at = mixed.adjustment.of_intrinsics(0)
     few = slice(at.start, at.start + 4)
@@ -112,10 +102,7 @@ def _most_significant(
 ) -> tuple[int, FloatArray, float] | None:
     """Return number, difference and px in the image of the most significant change.
 
-    Parameters
-    ----------
-    shares : list of (V,) array
-        That the views have in each change.
+    Each array of ``shares`` (V,) is what the views have in one change.
     """
     camera = mixed.adjustment.state.cameras[0]
     at = mixed.adjustment.of_intrinsics(0)
@@ -175,13 +162,7 @@ def _zoom(camera: Camera) -> FloatArray:
 def _fitted_change(
     score: FloatArray, information: FloatArray, way: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Return the change that fits best of some kind, and its size by its covariance.
-
-    Parameters
-    ----------
-    way : (n, k) array
-        Its directions.
-    """
+    """Return the best change in directions (n, k), and its size by its covariance."""
     known = way.T @ information @ way
     if np.diag(known).min() <= 0:  # less than rounding
         return np.zeros(len(score)), 0.0

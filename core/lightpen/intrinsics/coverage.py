@@ -65,13 +65,7 @@ class BoardCoverage:
 
 
 def cover(views: Views, poses: BoardPoses) -> BoardCoverage:
-    """Return the coverage by the views of a single camera.
-
-    Parameters
-    ----------
-    poses : BoardPoses
-        Poses of cam_from_board.
-    """
+    """Return the coverage by the views of a single camera at poses cam_from_board."""
     normals = poses.rotations[..., 2]
     tilts = np.arccos(np.clip(np.abs(normals[:, 2]), 0, 1))
     # The board's z points away from the camera: it faces against it.

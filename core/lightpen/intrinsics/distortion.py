@@ -165,12 +165,8 @@ def choose_distortion(
 ) -> tuple[Choice, BoardFit, FloatArray]:
     """Return the lens model, its fit, and the cross-validation errors.
 
-    A model other than that of 5 coefficients must be better.
-
-    Parameters
-    ----------
-    has_k3 : bool
-        Without, lens models are a fisheye and that of 4 coefficients, k3 being 0.
+    A model other than that of 5 coefficients must be better. Without ``has_k3``, lens
+    models are a fisheye and that of 4 coefficients, k3 being 0.
     """
     first = _Drawn(fitted, None)
     others: list[Callable[[], _Drawn | None]]

@@ -30,13 +30,7 @@ def without_duplicates(views: Views) -> tuple[Views, tuple[str, ...]]:
 
 
 def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
-    """Return the message on views that do not count.
-
-    Parameters
-    ----------
-    n_views : int
-        Number of those that do.
-    """
+    """Return the message on the named views that do not count; ``n_views`` do."""
     return message(
         "intrinsics.duplicates",
         n_duplicates=len(names),

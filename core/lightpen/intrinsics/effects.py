@@ -172,13 +172,7 @@ class Design:
 
 
 def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
-    """Return the normal equations at a fit, with lens fields of a correlation length.
-
-    Parameters
-    ----------
-    length : float
-        px.
-    """
+    """Return the normal equations at a fit; lens fields correlate over a length, px."""
     state, n_views = fitted.state, views.n_views
     n_shared, n_points = len(fitted.prior), views.board.n_points
     fields = tuple(LensField.of(*size, 1.0, length) for size in views.image_sizes)

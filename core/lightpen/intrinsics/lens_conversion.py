@@ -16,12 +16,8 @@ WIDEST = np.tan(np.radians(75.0))  # of a polynomial in the normalised plane
 def convert_lens(camera: Camera, n_coefficients: int) -> Camera | None:
     """Return the camera with another number of distortion coefficients.
 
-    Gauss-Newton steps on the pixels of directions over the image.
-
-    Returns
-    -------
-    Camera or None
-        None where no such camera images these directions.
+    Gauss-Newton steps on the pixels of directions over the image; None where no such
+    camera images them.
     """
     blank = replace(
         camera,

@@ -69,13 +69,7 @@ def observe_board_of_rig(
     board: Board,
     report: Callable[[float], None],
 ) -> ObservedBoard:
-    """Detect a board in simultaneous images of several cameras.
-
-    Raises
-    ------
-    FileError, CalibrationError
-        As `observe_board`.
-    """
+    """Detect a board in simultaneous images of several cameras, as `observe_board`."""
     n_images = sum(len(source.names) for source in sources)
     looks: list[list[_Look]] = []
     n_done = 0
@@ -110,10 +104,7 @@ def observe_board_of_rig(
 def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Message | None:
     """Return why the board is not found in images; None if unknown.
 
-    Parameters
-    ----------
-    images : callable
-        Gives them again, one at a time: they may be large.
+    ``images`` gives them again, one at a time: they may be large.
     """
     mirrored = (image[:, ::-1].copy() for image in images())
     if board.kind in TELLS_SIDES and _is_found(mirrored, board):

@@ -42,15 +42,8 @@ class _Drawing:
 def board_page(board: Board, paper: str | None = None) -> bytes:
     """Return a page with the board at true scale, as PDF.
 
-    Parameters
-    ----------
-    paper : str, optional
-        One of `PAPERS`; the smallest that holds the board unless given.
-
-    Raises
-    ------
-    UsageError
-        The board is larger than the paper.
+    ``paper`` is one of `PAPERS`, by default the smallest that holds the board. Raises
+    `UsageError` if the board is larger.
     """
     drawing = _draw(board)
     width, height = _page_size(board, drawing, paper)

@@ -135,17 +135,15 @@ def calibrate_pair(
 ) -> PairCalibration:
     """Calibrate the extrinsics of the second of two cameras.
 
+    Raises `CalibrationError` if too few views are of both, or they contradict each
+    other.
+
     Parameters
     ----------
     cameras : tuple of Camera, optional
         Cameras as in their files; by default they are estimated from the views as well.
     interval_ms : float, optional
         Time between two views, if they are a sequence.
-
-    Raises
-    ------
-    CalibrationError
-        Too few views are of both cameras, or they contradict each other.
     """
     alone: tuple[CameraCalibration, ...] = ()
     if not cameras:
@@ -226,13 +224,7 @@ def calibrate_pair(
 
 
 def _require_fit(views: Views, camera: Camera, name: str) -> None:
-    """Refuse a camera file that does not fit the views of its own camera.
-
-    Raises
-    ------
-    CalibrationError
-        The residuals are too large at any poses of the board.
-    """
+    """Raise `CalibrationError` if views do not fit their camera's file at any poses."""
     poses, shape = start_board_poses(camera, views), np.zeros(N_SHAPE)
     state = BoardState((camera,), np.eye(3)[None], np.zeros((1, 3)), poses, shape)
     rms = float(np.sqrt(np.nanmean(np.square(fit_board_poses(views, state)))))
@@ -287,10 +279,7 @@ def _ordered(
 ) -> tuple[Views, BoardPoses]:
     """Return the views with equal numbering, and the relative pose.
 
-    Raises
-    ------
-    CalibrationError
-        The views do not agree on that.
+    Raises `CalibrationError` if the views do not agree on that.
     """
     first = start_board_poses(cameras[0], views)
     turned = []
@@ -392,10 +381,7 @@ def _means(pixels: FloatArray) -> FloatArray:
 def _message_on_moved(views: Views, fitted: BoardFit, usual: float) -> Message | None:
     """Return the message on views of which the cameras disagree.
 
-    Parameters
-    ----------
-    usual : float
-        Residuals of a camera alone, px rms.
+    ``usual`` are the residuals of a camera alone, px rms.
     """
     both = np.all(views.found, axis=1)
     rms = np.nanmax(fitted.view_rms[both], axis=1)

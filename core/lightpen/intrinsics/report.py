@@ -120,13 +120,7 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
 def intrinsics_record(
     calibration: CameraCalibration, unseen: Sequence[str], tolerances: BoardTolerances
 ) -> dict[str, Any]:
-    """Return the calibration of a camera as a record.
-
-    Parameters
-    ----------
-    unseen : sequence of str
-        Names of images without the board.
-    """
+    """Return the calibration as a record; ``unseen`` names images without the board."""
     camera, fitted, views = (
         calibration.camera,
         calibration.adjustment,

@@ -18,11 +18,8 @@ FARTHEST = 0.1  # of the stated length: more is another unit or a slip, no print
 class ScaleCheck:
     """A length that was measured.
 
-    Raises
-    ------
-    UsageError
-        The lengths are not above 0, U is more than a twentieth of the length, or a
-        print is far from what was stated.
+    Raises `UsageError` if the lengths are not above 0, U is more than a twentieth of
+    the length, or a print is far from what was stated.
     """
 
     stated: float  # as the description of the board has it: mm, or pixels of a screen
@@ -59,10 +56,7 @@ class ScaleCheck:
     def parse(cls, text: str) -> "ScaleCheck":
         """Return the check of a text: stated, measured, U; or pixel pitch, U.
 
-        Raises
-        ------
-        UsageError
-            It is neither.
+        Raises `UsageError` if it is neither.
         """
         try:
             values = [float(word) for word in text.replace(";", " ").split()]

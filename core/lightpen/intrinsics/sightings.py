@@ -65,19 +65,11 @@ EVENED = 0.1  # of the longer side: what is darker over more than that is uneven
 def find_points(
     image: Image, board: Board, *, quick: bool = False
 ) -> FloatArray | None:
-    """Find the points of a board.
+    """Return the points of a board, (N, 2), px; None if the board is not found.
 
-    Parameters
-    ----------
-    image : (H, W) array
-    quick : bool
-        Leave out what takes long, where a next image comes at once.
-
-    Returns
-    -------
-    (N, 2) array or None
-        px, in the order of `Board.points`, NaN where one is not seen; of circles the
-        centres of their ellipses. None if the board is not found.
+    They are in the order of `Board.points`, NaN where one is not seen; of circles the
+    centres of their ellipses. ``quick`` leaves out what takes long, where a next image
+    comes at once.
     """
     grey = _to_8_bit(image)
     if board.kind.is_circles:

@@ -48,12 +48,8 @@ class CornerCount:
 def is_chequered(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
     """Return whether the squares between corners are black and white in turn.
 
-    Where light blinds the camera, or none falls, squares tell nothing.
-
-    Parameters
-    ----------
-    grid : (R, C, 2) array
-        Corners that may be some, px.
+    The corners ``grid`` (R, C, 2), px, are candidates. Where light blinds the camera,
+    or none falls, squares tell nothing.
     """
     seen = np.stack([_samples(grey, *rows) for rows in pairwise(grid)])
     if not np.isfinite(seen).all():
@@ -90,13 +86,7 @@ def is_first_dark(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
 
 
 def goes_on(grey: npt.NDArray[np.uint8], grid: FloatArray) -> bool:
-    """Return whether a chessboard extends beyond the corners found.
-
-    Parameters
-    ----------
-    grid : (R, C, 2) array
-        Corners that were found, px.
-    """
+    """Return whether a chessboard extends beyond the corners ``grid`` (R, C, 2), px."""
     return any(_beyond(grey, side) is _Beyond.SQUARES for side in _sides(grid))
 
 

@@ -117,14 +117,9 @@ def _start_pinhole(views: Views, n_coefficients: int) -> Camera:
 
 
 def start_board_poses(camera: Camera, views: Views, which: int = 0) -> BoardPoses:
-    """Return the poses of the board before one of the cameras.
+    """Return the poses of the board before one of the cameras, NaN where unseen.
 
     Of the two that a far plane may have, each is the one that fits better [1]_.
-
-    Returns
-    -------
-    BoardPoses
-        NaN where the camera did not see the board.
 
     References
     ----------

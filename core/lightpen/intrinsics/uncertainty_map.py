@@ -82,10 +82,7 @@ def moved_in_image(camera: Camera, difference: FloatArray) -> float:
 def apart_in_image(one: Camera, other: Camera, seen: FloatArray) -> float:
     """Return how far two cameras image a direction apart over the image, px rms.
 
-    Parameters
-    ----------
-    seen : (K, 2) array
-        Pixels at which they see the same, but for a turn.
+    At the pixels ``seen`` (K, 2) they see the same, but for a turn.
     """
     grid = _pixels(one).reshape(-1, 2)
     at = np.concatenate([seen, grid])

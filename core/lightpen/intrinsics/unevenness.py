@@ -13,14 +13,10 @@ RIDGE, HELD = 1e-8, 1e4  # of the information of a point: of nothing, of what is
 def fit_unevenness(
     groups: tuple[Views, ...], fits: list[BoardFit]
 ) -> tuple[FloatArray, float]:
-    """Return by how much points are off in their plane beyond an affine board.
+    """Return how far points are off an affine board in its plane, (N, 3), mm.
 
-    A step of Gauss and Newton of all unknowns together.
-
-    Returns
-    -------
-    (N, 3) array, float
-        mm; the residuals that it leaves, px rms.
+    And the residuals that it leaves, px rms. A step of Gauss and Newton of all unknowns
+    together.
     """
     board = groups[0].board
     n_points, n_own = board.n_points, len(fits[0].prior)

@@ -101,13 +101,7 @@ _Found = dict[float, list[tuple[Design, _Solution]]]  # by length
 
 
 def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
-    """Return a board's fit with the effects of board, lens and single views.
-
-    Parameters
-    ----------
-    fitted : BoardFit
-        By noise alone.
-    """
+    """Return a fit (by noise alone) with effects of board, lens and single views."""
     longer = max(max(size) for size in views.image_sizes)
     n_cameras = len(fitted.state.cameras)
     noise = max(fitted.sigma, 1e-6)
@@ -280,12 +274,8 @@ def _solve(
 def _inverse(normal: FloatArray) -> tuple[FloatArray, float]:
     """Return the inverse of normal equations, and the logarithm of the determinant.
 
-    By Cholesky's decomposition, in a third of the time of `numpy.linalg`.
-
-    Raises
-    ------
-    CalibrationError
-        Something is left open.
+    By Cholesky's decomposition, in a third of the time of `numpy.linalg`. Raises
+    `CalibrationError` if something is left open.
     """
     from scipy.linalg.lapack import dpotrf, dpotri
 

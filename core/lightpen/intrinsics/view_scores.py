@@ -17,17 +17,7 @@ class ViewScores:
     covariance: FloatArray
 
     def change(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return score and information of a change that views have a share in.
-
-        Parameters
-        ----------
-        weights : (V,) array
-            The share.
-
-        Returns
-        -------
-        (s,) and (s, s) array
-        """
+        """Return score (s,) and information (s, s) of a change by shares (V,)."""
         score = weights @ self.scores
         first = np.einsum("v,vqs->qs", weights, self.information)
         own = np.einsum("v,vqs->qs", weights**2, self.information)
