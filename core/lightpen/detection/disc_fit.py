@@ -233,10 +233,7 @@ def _cost(
 def _correlated(pulls: FloatArray) -> float:
     """Return by what variances grow as pixels beside each other err alike, as by JPEG.
 
-    Parameters
-    ----------
-    pulls : (N, S, S) array
-        Of the pixels at a coordinate of the centre.
+    ``pulls`` (N, S, S) are those of the pixels at a coordinate of the centre.
     """
     pairs = np.vdot(pulls[:, 1:], pulls[:, :-1])
     pairs += np.vdot(pulls[:, :, 1:], pulls[:, :, :-1])

@@ -205,7 +205,7 @@ class Disc(NamedTuple):
 def measure_disc(
     image: Image, box: PixelBox, level: float, noise: float, floor: float = 0.0
 ) -> Disc | None:
-    """Measure the region inside a box as a disc.
+    """Return the disc in a box; None if nothing there is large and bright enough.
 
     Parameters
     ----------
@@ -221,11 +221,6 @@ def measure_disc(
     floor : float
         The intensity above which the region is apart from its neighbours, digital
         numbers; zero for a region that stands alone.
-
-    Returns
-    -------
-    Disc or None
-        None if nothing in the box is large and bright enough to be a disc.
     """
     margin = MARGIN + box.size // 10
     disc = _measure_window(image, box, margin, level, noise, floor)
@@ -299,10 +294,7 @@ def with_rims(
 ) -> list[Disc]:
     """Return discs with those measured by their rims that need it and have one.
 
-    Parameters
-    ----------
-    before : sequence of EdgeStart
-        Discs of the image before, where the fits begin.
+    Fits begin at the discs of the image ``before``.
     """
     found = list(discs)
     unclear = [i for i, disc in enumerate(discs) if disc.rim or disc.filled]

@@ -137,19 +137,11 @@ def fit_edge(image: Image, center: FloatArray, shape: FloatArray) -> EdgeFit | N
 
 
 def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
-    """Fit ellipses to the edges of discs, all at once.
+    """Fit ellipses to the edges of discs in a whole image (H, W), all at once.
 
-    Parameters
-    ----------
-    image : (H, W) array
-        The whole image.
-
-    Returns
-    -------
-    list of EdgeFit or None
-        None without a sharp enough edge. The area is that within the edge, not reduced
-        by blur. A disc that is not found from its fit in the previous image is searched
-        without it.
+    None without a sharp enough edge. The area is that within the edge, not reduced by
+    blur. A disc that is not found from its fit in the previous image is searched
+    without it.
     """
     found: list[EdgeFit | None] = [None] * len(starts)
     known = [i for i, start in enumerate(starts) if start.sigma is not None]

@@ -26,13 +26,7 @@ class Advice(StrEnum):
 def advise(
     exposure: Exposure, settings: CameraSettings, caps: CameraCapabilities | None
 ) -> Advice:
-    """Return the advice for the brightness of the LEDs.
-
-    Parameters
-    ----------
-    caps : CameraCapabilities or None
-        Capabilities of the camera; None if nothing can be set.
-    """
+    """Return the advice for the brightness of the LEDs; no caps: nothing can be set."""
     if not exposure.peaks:
         return Advice.SHOW_PEN
     if exposure.n_saturated and exposure.n_dark:

@@ -30,21 +30,10 @@ MARGIN = 8  # px about a masked circle
 def masked_lights(
     image: Image, mask: FloatArray | None, full_scale: int | None = None
 ) -> FloatArray:
-    """Return the centroids of light in masked circles, (M, 2), px.
+    """Return the centre of the brightest clean spot in each masked circle, (M, 2), px.
 
-    Parameters
-    ----------
-    image : (H, W) array
-        Grey image, 8 or 16 bit.
-    mask : (M, 3) array or None
-        Circles of stray light: centre x, y and radius, px.
-    full_scale : int, optional
-        See `lightpen.detection.spots.detect_spots`.
-
-    Returns
-    -------
-    (M, 2) array
-        Centre of the brightest clean spot in each circle; NaN without one.
+    NaN in a circle without one. ``mask`` and ``full_scale`` are those of
+    `lightpen.detection.spots.detect_spots`.
     """
     circles = np.zeros((0, 3)) if mask is None else np.asarray(mask)
     found = np.full((len(circles), 2), np.nan)
@@ -65,30 +54,18 @@ def masked_lights(
 
 
 def fixed_lamps(masked: FloatArray, detections: Sequence[PenDetection]) -> FloatArray:
-    """Return the fixed lamps in images, (N, K, 2), px.
+    """Return the fixed lamps that nearly all images show, (N, K, 2), px; else NaN.
 
-    Parameters
-    ----------
-    masked : (N, M, 2) array
-        Lights in masked circles, px; NaN where an image shows none.
-    detections : sequence of PenDetection
-        Detections in the N images; their unlabelled spots may be lamps.
-
-    Returns
-    -------
-    (N, K, 2) array
-        Of lamps that nearly all images show; NaN where one does not.
+    They are lights in masked circles ``masked`` (N, M, 2), px, NaN where an image shows
+    none, and unlabelled spots of the N detections.
     """
     return lamps_among(masked, list(map(other_lights, detections)))
 
 
 def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
-    """Return the fixed lamps in images among lights that are no LEDs.
+    """Return the fixed lamps in images among lights that are no LEDs, as `fixed_lamps`.
 
-    Parameters
-    ----------
-    lights : sequence of (S, 2) array
-        In each of the N images, px; all else as of `fixed_lamps`.
+    ``lights`` (S, 2), px, are those in each of the N images.
     """
     paths = [
         _path(path[:, None], np.nanmedian(path, axis=0))

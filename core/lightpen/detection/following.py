@@ -47,17 +47,14 @@ def follow_spots(
 ) -> Followed | None:
     """Return labels and pose of an image by those of the image before.
 
+    None where anything but small motion is seen.
+
     Parameters
     ----------
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen of the image before, mm.
     areas : (L,) array
         Of the spots there, px^2; NaN where an LED was not seen.
-
-    Returns
-    -------
-    Followed or None
-        None where anything but small motion is seen.
     """
     if not len(spots) or np.isfinite(spots.tiny_width):
         return None

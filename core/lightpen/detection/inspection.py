@@ -96,35 +96,20 @@ def inspect(spots: Spots, labels: Labels | None = None) -> Inspection:
 
 
 def stray_light(spots: Spots) -> FloatArray:
-    """Return circles that cover the spots of an image of the covered pen.
+    """Return circles that cover the spots of an image of the covered pen, (M, 3), px.
 
-    Parameters
-    ----------
-    spots : Spots
-        All that is bright while no LED can be seen.
-
-    Returns
-    -------
-    (M, 3) array
-        Centre x, y and radius, px; the ``mask`` of
-        `lightpen.detection.spots.detect_spots`.
+    They are centre x, y and radius: the ``mask`` of
+    `lightpen.detection.spots.detect_spots`.
     """
     radii = 2 * np.sqrt(np.linalg.eigvalsh(spots.shapes)[:, -1])
     return np.column_stack([spots.centers, STRAY_MARGIN * radii + spots.edge_widths])
 
 
 def lasting_light(images: Sequence[Spots]) -> FloatArray:
-    """Return circles that cover spots seen in at least half of the images.
+    """Return circles (M, 3) that cover spots seen in at least half of the images.
 
-    Parameters
-    ----------
-    images : sequence of Spots
-        All that is bright in each while no LED can be seen.
-
-    Returns
-    -------
-    (M, 3) array
-        As `stray_light`; each circle covers its spot in all of the images.
+    The images show no LED. Circles are as of `stray_light`; each covers its spot in all
+    of the images.
     """
     circles = np.concatenate([np.zeros((0, 3)), *map(stray_light, images)])
     of_image = np.repeat(np.arange(len(images)), [len(spots) for spots in images])

@@ -148,10 +148,7 @@ def observe_images(
 def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     """Take LED centres that were found and labelled elsewhere.
 
-    Raises
-    ------
-    FileError
-        Most centres are outside the image of the camera file.
+    Raises `FileError` if most are outside the image of the camera file.
     """
     pixels = centers.pixels
     _require_inside(pixels, camera)

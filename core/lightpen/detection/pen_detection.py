@@ -187,10 +187,10 @@ def detect_pen(
 def detections_of(
     spots: Sequence[Spots], labels: Sequence[Labels], camera: Camera
 ) -> list[PenDetection]:
-    """Return the detections of images by their spots and labels.
+    """Return the detections of images by their spots and labels, with the rough poses.
 
-    An image is usable if its LEDs are labelled, four of them or more are whole, and
-    few are too small. If not, the reason is the first that holds:
+    An image is usable if its LEDs are labelled, four of them or more are whole, and few
+    are too small. If not, the reason is the first that holds:
 
     * too small, where most spots are tiny;
     * blurred, where most spots are or where there is light but no spot, since stillness
@@ -198,18 +198,6 @@ def detections_of(
     * empty, without any spot;
     * too few LEDs, where there are not spots enough, or not enough whole LEDs;
     * ambiguous, or not the pen.
-
-    Parameters
-    ----------
-    spots : sequence of Spots
-        One per image.
-    labels : sequence of Labels
-        Likewise.
-
-    Returns
-    -------
-    list of PenDetection
-        One per image, with the rough pose of its labels.
     """
     n_leds = len(labels[0].spot)
     seen = np.full((len(labels), n_leds, 2), np.nan)

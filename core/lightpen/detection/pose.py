@@ -141,12 +141,9 @@ def fit_poses(
 
 
 def relative_sigmas(sigmas: FloatArray) -> FloatArray | None:
-    """Return standard deviations over the least of all, 1 or more; None if all alike.
+    """Return standard deviations (N, L) over the least of all, 1 or more.
 
-    Parameters
-    ----------
-    sigmas : (N, L) array
-        px; NaN where an LED was not seen, whose ratio is 1.
+    That is 1 where an LED was not seen, NaN. None if all are alike.
     """
     seen = sigmas[np.isfinite(sigmas)]
     if not len(seen) or seen.max() == seen.min():
@@ -226,19 +223,11 @@ def fit_paper_poses(
 def start_poses(
     camera: Camera, pen: Pen, pixels: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return rough poses of labelled LEDs, to start an iteration from.
+    """Return rough poses of labelled LEDs, to start an iteration from [1]_.
 
-    Parameters
-    ----------
-    pixels : (N, L, 2) array
-        Image points of the LEDs, px; NaN where an LED was not seen. Every image
-        needs four LEDs.
-
-    Returns
-    -------
-    rotations : (N, 3, 3) array
-    translations : (N, 3) array
-        cam_from_pen, mm; NaN where no pose puts the LEDs before the camera.
+    They are cam_from_pen, (N, 3, 3) and (N, 3), mm; NaN where no pose puts the LEDs
+    before the camera. ``pixels`` (N, L, 2) are image points, px, NaN where an LED was
+    not seen; every image needs four.
 
     References
     ----------
@@ -323,19 +312,10 @@ def disc_residuals(
 
 
 def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
-    """Return the standard deviation of one image coordinate from median residuals.
+    """Return the standard deviation of one image coordinate from median residuals, px.
 
-    Parameters
-    ----------
-    residuals : (N, L, 2) array
-        px; NaN where an LED was not seen.
-    n_unknowns_per_image : float
-        Fitted unknowns, which make residuals smaller than errors.
-
-    Returns
-    -------
-    float
-        px.
+    Fitted unknowns make ``residuals`` (N, L, 2), px, smaller than errors; they are NaN
+    where an LED was not seen.
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     lengths = np.sort(lengths[np.isfinite(lengths)])
@@ -347,19 +327,9 @@ def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
 
 
 def cauchy_weights(residuals: FloatArray, sigma: float | FloatArray) -> FloatArray:
-    """Return the Cauchy weights of residuals.
+    """Return the Cauchy weights (N, L) of residuals (N, L, 2), px; 0 where not seen.
 
-    Parameters
-    ----------
-    residuals : (N, L, 2) array
-        px; NaN where an LED was not seen.
-    sigma : float or (N,) array
-        Standard deviation of one image coordinate, of all images or of each, px.
-
-    Returns
-    -------
-    (N, L) array
-        0 to 1; 0 where not seen.
+    ``sigma`` is that of one image coordinate, of all images or of each (N,), px.
     """
     squares = np.einsum("...i,...i->...", residuals, residuals)
     width = CAUCHY_WIDTH * np.reshape(sigma, (-1, 1))

@@ -30,24 +30,10 @@ def observe_rig_images(
     report: Report = lambda fraction: None,
     masks: Sequence[FloatArray | None] | None = None,
 ) -> tuple[Observations, ...]:
-    """Find and label the LEDs in the images of a rig; see `observe_images`.
+    """Find and label the LEDs in simultaneous images of a rig; see `observe_images`.
 
-    Parameters
-    ----------
-    pairing : Pairing
-        Simultaneous images of the sources.
-    masks : sequence of (M, 3) array or None, optional
-        Circles of stray light before each camera: centre x, y and radius, px.
-
-    Returns
-    -------
-    tuple of Observations
-        Of each camera, all of the same moments.
-
-    Raises
-    ------
-    FileError, CalibrationError
-        As for one camera, which is named.
+    Observations are of each camera, all of the same moments, with a mask of stray light
+    each. A camera whose images are refused is named.
     """
     seen = []
     for c, source in enumerate(sources):
@@ -71,10 +57,7 @@ def observe_rig_centers(
 ) -> tuple[Observations, ...]:
     """Take LED centres that were found elsewhere; see `observe_centers`.
 
-    Raises
-    ------
-    FileError
-        As for one camera, which is named.
+    A camera whose centres are refused is named.
     """
     seen = []
     for c, each in enumerate(centers):

@@ -45,10 +45,7 @@ class RigReprojection:
 def derivatives_in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
     """Convert derivatives (..., 6) by the camera pose into those by the rig pose.
 
-    Parameters
-    ----------
-    turn : (3, 3) array
-        Of cam_from_rig.
+    ``turn`` (3, 3) is that of cam_from_rig.
     """
     return np.concatenate([J[..., :3] @ turn, J[..., 3:] @ turn], axis=-1)
 
@@ -62,6 +59,8 @@ def fit_rig_poses(
 ) -> Poses:
     """Fit poses rig_from_pen, each to the LEDs in all cameras.
 
+    Residuals and weights are those of the first camera, of the second, and so on.
+
     Parameters
     ----------
     pixels : (N, C, L, 2) array
@@ -69,11 +68,6 @@ def fit_rig_poses(
         moment needs four.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Start, rig_from_pen, mm.
-
-    Returns
-    -------
-    Poses
-        Residuals and weights are those of the first camera, of the second, and so on.
     """
     cameras = tuple(
         CameraReprojection(camera, pen.leds, pen.normals, pen.diameter / 2, seen)
@@ -84,20 +78,10 @@ def fit_rig_poses(
 
 
 def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
-    """Return the detections of a moment with one pose by all cameras of a rig.
+    """Return the detection of a moment with one pose rig_from_pen by all cameras.
 
     A camera without a pose, or with a blurred image, is ignored; if none is left, the
     detection is returned as it is.
-
-    Parameters
-    ----------
-    detection : PenDetection
-        Detection of the first camera, with those of the others.
-
-    Returns
-    -------
-    PenDetection
-        Its pose is rig_from_pen, with its cofactors and its noise.
     """
     views = (detection, *detection.others)
     if len(views) == 1:

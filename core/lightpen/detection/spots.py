@@ -143,12 +143,8 @@ class Spots:
     def rims(self, corner: FloatArray) -> list[EdgeStart]:
         """Return the search regions of these spots in the next image.
 
-        Merged spots, and those that the border cuts, are left out.
-
-        Parameters
-        ----------
-        corner : (2,) array
-            Pixel of this image where the next one, a part of the sensor, begins, px.
+        Merged spots, and those that the border cuts, are left out. ``corner`` (2,) is
+        the pixel of this image where the next one, a part of the sensor, begins, px.
         """
         return [
             EdgeStart(center - corner, shape, width / GAUSSIAN_RISE, offset)
@@ -200,17 +196,17 @@ def detect_spots(
     window: PixelBox | None = None,
     before: Spots | None = None,
 ) -> Spots:
-    """Find the bright discs of an image.
+    """Return the bright discs of an image, the brightest first, at most `MAX_SPOTS`.
 
     The centre is the centroid of the soft-thresholded disc, for LEDs of 6 px and more.
     It estimates the centroid of the imaged disc, which differs from the centre of its
-    rim by the curvature of the distortion only (0.001 px for a disc of 43 px).
-    Foreign lamps that look like LEDs are kept.
+    rim by the curvature of the distortion only (0.001 px for a disc of 43 px). Foreign
+    lamps that look like LEDs are kept.
 
     Parameters
     ----------
     image : (H, W) array
-        Grey image, 8 or 16 bit.
+        Grey image, 8 or 16 bit; any other raises `ValueError`.
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
     full_scale : int, optional
@@ -220,16 +216,6 @@ def detect_spots(
         All of the image that is read; what reaches out of it is cut.
     before : Spots, optional
         Of the image before, whose rims are about these.
-
-    Returns
-    -------
-    Spots
-        At most `MAX_SPOTS`, brightest first.
-
-    Raises
-    ------
-    ValueError
-        If the image is not grey, or neither 8 nor 16 bit.
     """
     if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise ValueError(

@@ -170,10 +170,7 @@ class Live:
     def stop(self) -> None:
         """Close the cameras and end all threads.
 
-        Raises
-        ------
-        DeviceLost
-            A call of the camera did not return.
+        Raises `DeviceLost` if a call of the camera did not return.
         """
         self._stopping.set()
         self._ready.set()

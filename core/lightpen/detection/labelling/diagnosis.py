@@ -23,17 +23,7 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message | None
     """Name the likely cause why LEDs are not found where the pen file has them.
 
     Pens and cameras with one thing changed are tried on a few images; the first that
-    explains clearly more spots shows.
-
-    Parameters
-    ----------
-    spots : sequence of Spots
-        One per image.
-
-    Returns
-    -------
-    Message or None
-        What was found and what to do; None if most spots are LEDs of the pen.
+    explains clearly more spots shows. None if most spots are LEDs of the pen.
     """
     needed = certain_leds(pen)
     counts = np.array([len(s) for s in spots])
@@ -59,11 +49,6 @@ def diagnose_mirror(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message
 
     A pen that is symmetric but for a few LEDs lets most LEDs of its mirror image be
     labelled, so this is worth a look where some LEDs are missing in all images.
-
-    Parameters
-    ----------
-    spots : sequence of Spots
-        One per image.
     """
     sample = _Sample.of(spots, camera, pen)
     return None if sample.is_explained else _mirror(camera, pen, sample.fits)

@@ -73,15 +73,10 @@ def poses_from_triples(
 def lookalike_poses(
     sight: SpotArrays, pen: Constellation, best: Candidates
 ) -> Candidates:
-    """Return the poses that might look alike: flipped, or by a symmetry of the pen.
+    """Return the poses that might look like the ``best``: flipped, or by symmetry.
 
     A flat pen looks nearly the same when its tilt is reversed, a mirroring at the view
     direction and at its own plane.
-
-    Parameters
-    ----------
-    best : Candidates
-        The settled poses whose lookalikes are sought.
     """
     paired = (best.spot >= 0)[..., None]
     n = np.maximum(paired.sum(axis=1), 1)

@@ -121,19 +121,10 @@ def label_images(
 ) -> list[Labels]:
     """Label the LEDs in images that have nothing to do with each other.
 
-    Parameters
-    ----------
-    spots : sequence of Spots
-        One per image.
-    efforts : sequence of SearchEffort
-        How hard to search, one after the other, until an image is labelled.
-
-    Returns
-    -------
-    list of Labels
-        One per image. A labelling is right or refused; `Labels.reason` shows. An LED
-        that in most images has a spot beside its place, rather than at it, is taken to
-        be displaced in the pen file and gets these spots; the poses do without it.
+    The efforts are made one after the other until an image is labelled. A labelling is
+    right or refused; `Labels.reason` shows. An LED that in most images has a spot
+    beside its place, rather than at it, is taken to be displaced in the pen file and
+    gets these spots; the poses do without it.
     """
     constellation = constellation_of(pen)
     labels = _label_whole(spots, camera, constellation, efforts)
@@ -175,18 +166,10 @@ def label_spots(spots: Spots, camera: Camera, pen: Pen) -> Labels:
 def track_spots(
     spots: Spots, camera: Camera, pen: Pen, R: FloatArray, t: FloatArray
 ) -> Labels:
-    """Label the LEDs of an image with a predicted pose.
+    """Label the LEDs of an image by a predicted cam_from_pen, (3, 3) and (3,), mm.
 
-    Parameters
-    ----------
-    R : (3, 3) array
-    t : (3,) array
-        Predicted cam_from_pen: LEDs within some 30 px, rotation within some degrees.
-
-    Returns
-    -------
-    Labels
-        Refused where the prediction does not lead to a believable labelling.
+    LEDs must be within some 30 px, the rotation within some degrees. Refused where the
+    prediction does not lead to a believable labelling.
     """
     constellation = constellation_of(pen, FEWEST_LEDS)
     n_whole = int(np.count_nonzero(spots.flaws & UNWHOLE == 0))

@@ -36,17 +36,14 @@ class PosesOfThree(NamedTuple):
 def solve_p3p(rays: FloatArray, points: FloatArray) -> PosesOfThree:
     """Return the poses that put three points onto three rays each.
 
+    Each problem has none to four, with all points in front of the camera.
+
     Parameters
     ----------
     rays : (H, 3, 3) array
         Unit vectors from the camera, one per row.
     points : (H, 3, 3) array
         The points in their own frame, one per row, mm; not on one line.
-
-    Returns
-    -------
-    PosesOfThree
-        None to four poses of each problem, all points in front of the camera.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         source, ranges = _ranges(rays, points)
