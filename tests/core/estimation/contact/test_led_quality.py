@@ -84,7 +84,21 @@ def test_a_displacement_is_reported_only_where_the_led_was_often_seen(
     assert np.isfinite(found.displacement[3]).all() == (n_seen == 40)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("scatter", "is_named"), [(1.0, True), (2.0, False)])
+def test_a_displacement_is_named_if_it_is_far_beyond_its_uncertainty(
+    scatter: float, is_named: bool
+) -> None:
+    rng = np.random.default_rng(1)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    # By 7 of its standard deviations, and by 4.
+    pixels[:, 3] += 2.0 + scatter * rng.standard_normal((80, 2))
+
+    assert quality_of(PEN, pixels).displaced == ((4,) if is_named else ())
+
+
+@pytest.mark.parametrize("seed", range(2))
 def test_an_led_that_is_badly_seen_is_not_called_displaced(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pixels = simulate_centers(
