@@ -213,24 +213,20 @@ def calibrate_rig(
 ) -> Calibration:
     """Calibrate the tip of a pen that one camera or several see swing in a cone.
 
+    Raises `CalibrationError` if the images do not determine the tip; the text says what
+    is missing.
+
     Parameters
     ----------
-    rig : Rig
-        Rig as in its files.
-    pen : Pen
-        Pen as in its file.
+    rig, pen : Rig and Pen
+        As in their files.
     observations : sequence of Observations
-        Observations of each camera at the same N instants.
+        Of each camera at the same N instants.
     assumptions : Assumptions
         Default uncertainties where the files state none.
     second : SecondSwing or None
-        Swing of the same pen in a second cone, with the same single camera, not moved
-        in between.
-
-    Raises
-    ------
-    CalibrationError
-        The images do not determine the tip; the text says what is missing.
+        Of the same pen in a second cone, with the same single camera, not moved in
+        between.
     """
     before = _before_images(rig, pen, observations)
     growth = thermal_growth(before.pen, assumptions)

@@ -183,17 +183,8 @@ def run_monte_carlo(
 ) -> MonteCarlo:
     """Run trials of a calibration in worker processes.
 
-    Parameters
-    ----------
-    in_workers : Map
-        See `lightpen.estimation.statistics.workers`.
-    report : callable
-        Called with the fraction done, 0 to 1; what it raises ends the trials.
-
-    Raises
-    ------
-    CalibrationError
-        Most of the trials give no tip.
+    ``report`` is called with the fraction done, 0 to 1; what it raises ends the trials.
+    Raises `CalibrationError` if most of the trials give no tip.
     """
     if n_trials < MIN_TRIALS:
         raise ValueError(f"`n_trials` must be {MIN_TRIALS} or more, got {n_trials}.")

@@ -67,13 +67,9 @@ def calibrate_pivot(
 ) -> PivotCalibration:
     """Find the tip from poses in the order of capture.
 
-    Its parameters are those of `lightpen.estimation.pivot.pivot.fit_pivot`.
-
-    Raises
-    ------
-    CalibrationError
-        The poses do not fix a tip, are in another convention or unit, have no tip in
-        common, or have two without a clear majority.
+    Its parameters are those of `lightpen.estimation.pivot.pivot.fit_pivot`. Raises
+    `CalibrationError` if the poses do not fix a tip, are in another convention or unit,
+    have no tip in common, or have two without a clear majority.
     """
     require_poses(rotations)
     require_usual_reading(rotations, translations)

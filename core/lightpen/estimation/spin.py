@@ -46,18 +46,15 @@ class SpinFit:
 def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinFit:
     """Fit the axis of a stylus to poses that spin about it.
 
+    Raises `CalibrationError` if there are too few poses, they turn too little, or the
+    axis was not held still enough to be determined.
+
     Parameters
     ----------
     rotations : (N, 3, 3) array
         Of cam_from_pen, in the order of capture.
     upwards : (3,) array
         Roughly from the ball into the pen, pen frame.
-
-    Raises
-    ------
-    CalibrationError
-        There are too few poses, they turn too little, or the axis was not held still
-        enough to be determined.
     """
     n = len(rotations)
     if n < MIN_POSES:
@@ -92,13 +89,9 @@ def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinF
 def _axis_deviation(turns: FloatArray, tilts: FloatArray) -> float:
     """Return the standard deviation of the axis along its worst direction, rad.
 
-    Parameters
-    ----------
-    turns : (N, 2, 2) array
-        Derivatives of the tilts by the axis in the pen; by that in the camera they are
-        those of minus the identity.
-    tilts : (N, 2) array
-        Of the axis in the camera, rad.
+    ``turns`` (N, 2, 2) are derivatives of the tilts (N, 2), rad, of the axis in the
+    camera by the axis in the pen; by that in the camera they are those of minus the
+    identity.
     """
     n = len(tilts)
     design = np.concatenate(

@@ -99,6 +99,8 @@ def adjust(
 ) -> Adjustment:
     """Run the adjustment; release priors that the images contradict.
 
+    Raises `CalibrationError` if the iteration does not settle.
+
     Parameters
     ----------
     state : BundleState
@@ -112,11 +114,6 @@ def adjust(
         Shifts of fixed lamps in view, px, along which the cone may drift.
     sigmas : (N, C, L) array, optional
         Standard deviation of each centre by its detector, px.
-
-    Raises
-    ------
-    CalibrationError
-        The iteration does not settle.
     """
     modes = seat_modes_of(state.rotations, shifts)
     fit = partial(fit_bundle, pixels, state, modes=modes, places=places)

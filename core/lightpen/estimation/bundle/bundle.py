@@ -184,6 +184,8 @@ def fit_bundle(
 ) -> Bundle:
     """Fit tip, cone and the parameters of the files to the LED centres.
 
+    Raises `CalibrationError` if the iteration does not settle.
+
     Parameters
     ----------
     pixels : (N, C, L, 2) array
@@ -198,11 +200,6 @@ def fit_bundle(
         To be fitted.
     noise : (C, L) or (N, C, L) array, optional
         Noise of the LEDs' centres, by that of a usual one.
-
-    Raises
-    ------
-    CalibrationError
-        The iteration does not settle.
     """
     unknowns = Unknowns.of(start, priors, modes, effects, noise)
     now = _started(unknowns, start, pixels, places)
@@ -378,11 +375,8 @@ def jitter_matrices(
 ) -> tuple[FloatArray, FloatArray]:
     """Return ``jitter_information`` and ``insignificant_jitter`` of a `Bundle`.
 
-    Parameters
-    ----------
-    rows : (N, 3, p) array
-        Derivative of the seat of each image by the unknowns, where jitter is fitted;
-        else the rows of its cone in the normal equations.
+    ``rows`` (N, 3, p) are the derivative of the seat of each image by the unknowns,
+    where jitter is fitted; else the rows of its cone in the normal equations.
     """
     nothing = np.zeros((rows.shape[-1],) * 2)
     if jitter.covariance is None:

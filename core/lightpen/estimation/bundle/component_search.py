@@ -84,13 +84,7 @@ def _found_seat(
 
     An oval, equation (7), is a combination of modes, and either can explain the other.
     The likelier is fitted; the other is expected by its likelihood ratio to that.
-
-    Parameters
-    ----------
-    information : (21, 21) array
-        Of all modes, without any prior.
-    right : (21,) array
-        Right side that belongs to it.
+    ``information`` (21, 21) and ``right`` (21,) are of all modes, without any prior.
     """
     find = partial(find_beside, information, right)
     truest = unknowns.seat_variances(NO_COMPONENTS)

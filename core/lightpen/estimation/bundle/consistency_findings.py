@@ -114,7 +114,7 @@ def find_contradicted_inputs(
     """Find the numbers of the files of cameras and rig that the images contradict.
 
     Files are added one at a time, the most contradicted first, as it may be what moves
-    the others.
+    the others. It is ``before`` if no other is contradicted.
 
     Parameters
     ----------
@@ -122,11 +122,6 @@ def find_contradicted_inputs(
         Fitted with the priors of ``before``.
     excess : (p, p) array or None
         See `lightpen.estimation.bundle.noise_correlation.Correlation`.
-
-    Returns
-    -------
-    ContradictedInputs
-        With the same numbers as before, if no other is contradicted.
     """
     fits = _fits(rig, bundle, priors, excess)
     numbers = {f: fits[f].contradicted for f in before.numbers if fits[f].contradicted}
@@ -174,18 +169,9 @@ def contradictions_of(
 def find_pen_contradictions(
     pen: Pen, bundle: Bundle, priors: Priors, excess: FloatArray | None = None
 ) -> tuple[tuple[Contradiction, ...], Priors]:
-    """Find contradictions of disc diameter and scale in the LED file.
+    """Return contradictions of disc diameter and scale in the LED file ``pen``.
 
-    Parameters
-    ----------
-    pen : Pen
-        Pen as in its file.
-
-    Returns
-    -------
-    contradictions : tuple of Contradiction
-    priors : Priors
-        With the contradicted numbers released.
+    And the priors, without the contradicted numbers.
     """
     at, one = bundle.layout, np.ones(1)
 

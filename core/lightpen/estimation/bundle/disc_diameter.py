@@ -55,7 +55,7 @@ def modelled_areas(state: BundleState, c: int) -> FloatArray:
 def read_diameter(
     state: BundleState, areas: FloatArray, edge_widths: FloatArray
 ) -> DiameterReading | None:
-    """Return the diameter of the discs by the areas of their images.
+    """Return the diameter of the discs by their images; None with too few areas.
 
     Parameters
     ----------
@@ -65,11 +65,6 @@ def read_diameter(
         Areas of the imaged discs, px^2; NaN where not known.
     edge_widths : (N, C) array
         Mean edge width of the LEDs in each image, px; NaN where not known.
-
-    Returns
-    -------
-    DiameterReading or None
-        None where too few areas are known.
     """
     rig, pen = state.rig, state.pen
     modelled = np.stack([modelled_areas(state, c) for c in range(rig.n_cameras)], 1)

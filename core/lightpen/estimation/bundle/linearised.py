@@ -42,12 +42,9 @@ class BundleState:
         return cones
 
     def leds_in(self, c: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the LEDs in the frame of a camera, mm, and their normals.
+        """Return LEDs from the tip, from a camera, and normals, in its frame, mm.
 
-        Returns
-        -------
-        levers, points, normals : (N, L, 3) array
-            From the tip, from the camera.
+        Each is (N, L, 3).
         """
         R_c, t_c = self.rig.rotations[c], self.rig.translations[c]
         transposed = np.swapaxes(R_c @ self.rotations, 1, 2)

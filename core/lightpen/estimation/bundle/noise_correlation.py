@@ -71,10 +71,7 @@ def lag1(residuals: FloatArray, used: BoolArray) -> float:
 def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     """Estimate the correlation of the noise, and the covariance that it makes.
 
-    Parameters
-    ----------
-    pixels : (N, C, L, 2) array
-        As fitted, in the order of capture, px.
+    ``pixels`` (N, C, L, 2), px, are as fitted, in the order of capture.
     """
     used = bundle.used
     independent = bundle.independent_noise

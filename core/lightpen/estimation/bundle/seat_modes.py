@@ -30,10 +30,7 @@ class SeatModes(NamedTuple):
 def seat_modes_of(rotations: FloatArray, shifts: FloatArray | None = None) -> SeatModes:
     """Return the modes of images with rotations rig_from_pen (N, 3, 3).
 
-    Parameters
-    ----------
-    shifts : (N, k) array, optional
-        Shifts of fixed lamps, see `drift_modes`.
+    ``shifts`` are those of `drift_modes`.
     """
     lean, oval = tilt_modes(rotations), oval_seat(rotations)
     return SeatModes(lean, oval, drift_modes(len(rotations), shifts))
@@ -42,12 +39,7 @@ def seat_modes_of(rotations: FloatArray, shifts: FloatArray | None = None) -> Se
 def drift_modes(n_images: int, shifts: FloatArray | None = None) -> FloatArray:
     """Return the drift modes of a cone, (N, D), each with a range of 1.
 
-    Linear in time, and along the shifts of fixed lamps in view.
-
-    Parameters
-    ----------
-    shifts : (N, k) array, optional
-        Of the lamps, px.
+    Linear in time, and along the shifts (N, k) of fixed lamps in view, px.
     """
     time = np.linspace(-0.5, 0.5, n_images)[:, None]
     if shifts is None or n_images == 0:
@@ -60,12 +52,7 @@ def tilt_modes(rotations: FloatArray) -> FloatArray:
     """Return the seat modes as functions of the tilt of the pen, (N, 7).
 
     Cosine and sine of one to three waves round the cone, and the tilt, less their
-    means, each of mean square 1 (or 0).
-
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        Of rig_from_pen.
+    means, each of mean square 1 (or 0). Rotations (N, 3, 3) are rig_from_pen.
     """
     forms, sizes = _lean(rotations)
     return np.asarray(forms / np.where(sizes > 0, sizes, 1.0))
@@ -76,12 +63,8 @@ def oval_seat(rotations: FloatArray) -> FloatArray:
 
     A ball or cone with two lobes, 1 mm off the circle, moves the tip away from the axis
     by equation (7) with a = 1 mm: one wave and three waves round the cone. The two
-    columns are the cosine and sine of twice the phase p.
-
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        Of rig_from_pen.
+    columns are the cosine and sine of twice the phase p. Rotations (N, 3, 3) are
+    rig_from_pen.
     """
     _, sizes = _lean(rotations)
     cos1, sin1, _, _, cos3, sin3, _ = np.eye(len(sizes)) * sizes
@@ -95,13 +78,8 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
     """Return the axes of the cone in the rig, one a row: two across, one along, (3, 3).
 
     Before a camera that looks at it from its side they are right, away, and up. Where
-    the mean direction of the pen is more than 15 degrees off, the camera looks down or
-    lies on its side, and the cone opens along the mean direction.
-
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        Of rig_from_pen.
+    the mean direction of the pen by rig_from_pen is more than 15 degrees off, the
+    camera looks down or lies on its side, and the cone opens along the mean direction.
     """
     along = rotations[:, :, 1].mean(axis=0)
     along /= np.linalg.norm(along)

@@ -52,7 +52,7 @@ def check_prediction(
     noise: FloatArray,
     correlation_factor: float = 1.0,
 ) -> SelfCheck | None:
-    """Predict LEDs by others.
+    """Predict LEDs by others; None with too few LEDs or images.
 
     Parameters
     ----------
@@ -64,11 +64,6 @@ def check_prediction(
         Noise of the LEDs' centres, by that of a usual one.
     correlation_factor : float
         Factor on the variance of a mean by noise that is correlated between images.
-
-    Returns
-    -------
-    SelfCheck or None
-        None with too few LEDs or images.
     """
     views = views_at(state, residuals)  # whose derivatives alone are needed
     J = np.stack(

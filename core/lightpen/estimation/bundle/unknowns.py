@@ -247,17 +247,9 @@ class Unknowns:
     def measured(
         self, state: BundleState, values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return information M and right side of areas and of the cones' distance.
+        """Return information (p, p) and right side (p,) of areas and cones' distance.
 
-        Parameters
-        ----------
-        values : (p,) array
-            Those at the state.
-
-        Returns
-        -------
-        information : (p, p) array
-        right : (p,) array
+        ``values`` (p,) are those at the state.
         """
         at, priors = self.layout, self.priors
         information = np.zeros((self.number, self.number))

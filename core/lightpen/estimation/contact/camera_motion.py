@@ -66,10 +66,7 @@ class SteadyImages:
 def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> SteadyImages:
     """Fit the pose of each image, with the motion of the camera removed.
 
-    Raises
-    ------
-    CalibrationError
-        The images do not determine the tip; the text says what is missing.
+    Raises `CalibrationError` if the images do not determine the tip.
     """
     path = _way_of(observations)
     if path is None or path.moved == 0:
@@ -142,17 +139,9 @@ def _turns(camera: Camera, path: CameraPath) -> FloatArray:
 
 
 def follow_lamps(lamps: FloatArray) -> CameraPath | None:
-    """Estimate the motion of a camera by its lamps.
+    """Estimate the motion of a camera by its lamps (N, K, 2), px; NaN where not shown.
 
-    Parameters
-    ----------
-    lamps : (N, K, 2) array
-        px; NaN where an image does not show one.
-
-    Returns
-    -------
-    CameraPath or None
-        None without lamps, or with too few images.
+    None without lamps, or with too few images.
     """
     n_images, n_lamps, _ = lamps.shape
     if n_lamps == 0 or n_images < MIN_IMAGES:

@@ -112,6 +112,8 @@ def fit_joint(
 ) -> JointFit:
     """Fit tip and cone to the LED centres of all images.
 
+    Raises `CalibrationError` if the iteration does not settle.
+
     Parameters
     ----------
     pixels : (N, L, 2) array
@@ -123,11 +125,6 @@ def fit_joint(
     is_near : bool
         Whether it starts from a fit to most of these images, so that LEDs that are far
         off are known at once.
-
-    Raises
-    ------
-    CalibrationError
-        The iteration does not settle.
     """
     model = ContactModel.of(camera, pen, pixels)
     return fit_contact(model, rotations, tip_pen, cone_cam, is_near=is_near)

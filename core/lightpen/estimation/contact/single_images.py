@@ -46,10 +46,7 @@ class PosedImages:
 def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedImages:
     """Fit the pose of each image and exclude those of another tip.
 
-    Raises
-    ------
-    CalibrationError
-        The images do not determine the tip; the text says what is missing.
+    Raises `CalibrationError` if the images do not determine the tip.
     """
     reasons = np.array(observations.reasons, dtype=object)
     posed = np.flatnonzero(reasons == Reason.NONE)
@@ -93,12 +90,9 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
 
 
 def require_fit(sigma: float) -> None:
-    """Refuse LEDs that lie farther off the model than any that was measured, px.
+    """Raise `CalibrationError` if LEDs lie farther off the model than any measured, px.
 
-    Raises
-    ------
-    CalibrationError
-        Names the files that may be of others.
+    It names the files that may be of others.
     """
     if sigma > MAX_SIGMA:
         raise CalibrationError(
@@ -124,7 +118,7 @@ def _fitting(poses: Poses) -> BoolArray:
 def require_images(
     chosen: IntArray, reasons: npt.NDArray[np.object_], advice: Message | None
 ) -> None:
-    """Refuse too few images.
+    """Raise `CalibrationError`, with number and reason, if too few images are usable.
 
     Parameters
     ----------
@@ -134,11 +128,6 @@ def require_images(
         Why others are left out.
     advice : Message or None
         Likely problem of the whole set.
-
-    Raises
-    ------
-    CalibrationError
-        Says how many there are, and why.
     """
     if len(chosen) >= MIN_IMAGES:
         return

@@ -67,6 +67,9 @@ def fit_pivot(
     [1]_. A robust fit starts from the best of many small samples [2]_, then keeps the
     poses within the outlier threshold until their set no longer changes.
 
+    Raises `CalibrationError` if there are too few poses, they turn too little to fix
+    the tip, or the tip moved by far more than the covariances allow.
+
     Parameters
     ----------
     rotations, translations : (N, 3, 3) and (N, 3) array
@@ -77,12 +80,6 @@ def fit_pivot(
         Leave out poses that do not agree with the pivot of the others.
     candidates : (N,) array of bool, optional
         Poses that may be used; all unless given.
-
-    Raises
-    ------
-    CalibrationError
-        There are too few poses, they turn too little to fix the tip, or the tip moved
-        by far more than the covariances allow.
 
     References
     ----------
@@ -275,12 +272,8 @@ def agreeing_solution(
 ) -> FloatArray:
     """Return tip and pivot (6,), mm, on which a share of the poses agrees best.
 
-    All poses weigh the same: least trimmed squares by concentration [1]_.
-
-    Parameters
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Poses cam_from_pen, mm.
+    All poses cam_from_pen, mm, weigh the same: least trimmed squares by concentration
+    [1]_.
 
     References
     ----------
@@ -319,13 +312,7 @@ def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
 
 
 def require_poses(rotations: FloatArray) -> None:
-    """Refuse rotations (N, 3, 3) that are too few or turn too little to fix the tip.
-
-    Raises
-    ------
-    CalibrationError
-        Says what is missing.
-    """
+    """Raise `CalibrationError` if rotations (N, 3, 3) are too few or too small."""
     n_poses = len(rotations)
     if n_poses < MIN_POSES:
         raise CalibrationError("pivot.too-few-poses", n_poses=n_poses, needed=MIN_POSES)

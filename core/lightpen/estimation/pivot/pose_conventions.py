@@ -45,17 +45,9 @@ class _PoseMistake:
 
 
 def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> None:
-    """Refuse poses in another convention or unit, and poses that have no tip.
+    """Raise `CalibrationError` if poses are not cam_from_pen, mm, or have no tip.
 
-    Parameters
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Poses as they were read, cam_from_pen, mm.
-
-    Raises
-    ------
-    CalibrationError
-        Says what they look like, and what is needed.
+    It says what they look like, and what is needed.
     """
     typical = float(np.median(np.linalg.norm(translations, axis=1)))
     if typical < SHORT:

@@ -49,17 +49,10 @@ class TwoStageFit:
 
 
 def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFit:
-    """Find tip and cone from poses as the paper does.
+    """Find tip and cone from poses cam_from_pen, mm, as the paper does.
 
-    Parameters
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        Poses cam_from_pen, mm.
-
-    Raises
-    ------
-    CalibrationError
-        There are fewer than six poses, or they turn too little to fix the tip.
+    Raises `CalibrationError` if there are fewer than six poses, or they turn too little
+    to fix the tip.
     """
     n_poses = len(rotations)
     if n_poses < N_START:
@@ -114,14 +107,9 @@ def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
 def propagated_covariance(
     rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
 ) -> FloatArray:
-    """Return the covariance of the two-stage solution from that of the poses.
+    """Return the covariance of (tip_pen, cone_cam) by that of poses, (6, 6), mm^2.
 
     Its arguments are those of `lightpen.estimation.pivot.pivot.tip_covariances`.
-
-    Returns
-    -------
-    (6, 6) array
-        Of (tip_pen, cone_cam), mm^2.
     """
     M = contact_matrix(rotations)
     inverse = np.linalg.inv(np.einsum("nki,nkj->ij", M, M))

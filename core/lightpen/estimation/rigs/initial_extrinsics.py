@@ -40,18 +40,10 @@ class InitialExtrinsics:
 def find_initial_extrinsics(
     rig: Rig, parts: Sequence[PosedImages]
 ) -> InitialExtrinsics:
-    """Find the extrinsics by the images.
+    """Find the extrinsics by the images of each camera at the same N instants.
 
-    Parameters
-    ----------
-    parts : sequence of PosedImages
-        Images of each camera at the same N instants.
-
-    Raises
-    ------
-    CalibrationError
-        Too few moments are seen by two cameras, or the images are not of the same
-        moments.
+    Raises `CalibrationError` if too few moments are seen by two cameras, or the images
+    are not of the same moments.
     """
     turns = [PenRotations.of(part) for part in parts]
     seen, cone = turns[0], parts[0].pivot.pivot_cam

@@ -68,17 +68,10 @@ def require_usual_rig(
     pixels: FloatArray,
     parts: Sequence[PosedImages],
 ) -> None:
-    """Refuse the file of a rig that has the cameras quite elsewhere than the images.
+    """Raise `CalibrationError` if cameras are quite elsewhere than in the rig's file.
 
-    Parameters
-    ----------
-    pixels : (N, C, L, 2) array
-        What the cameras saw, px.
-
-    Raises
-    ------
-    CalibrationError
-        Says what the file looks like, and what is needed.
+    It says what the file looks like, and what is needed. ``pixels`` (N, C, L, 2) is
+    what the cameras saw, px.
     """
     stated = _Places(rig.rotations, rig.translations)
     found = _Places(placed.rig.rotations, placed.rig.translations)

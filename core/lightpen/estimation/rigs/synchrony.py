@@ -132,10 +132,7 @@ def require_same_moments(
 ) -> RelativeRotation:
     """Return the relative rotation of the other camera, if the images are simultaneous.
 
-    Raises
-    ------
-    CalibrationError
-        They are not, or too few moments are seen by both.
+    Raises `CalibrationError` if not, or if too few moments are seen by both.
     """
     n_pairs = int(np.sum(one.known & other.known))
     if n_pairs < MIN_PAIRS:

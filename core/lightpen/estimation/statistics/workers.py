@@ -26,11 +26,8 @@ class Map(Protocol):
     ) -> list[T]:
         """Return the results of the function for all items, in order.
 
-        Parameters
-        ----------
-        report : callable
-            Called with the fraction done; what it raises ends the computation, and what
-            was not begun is not done any more.
+        ``report`` is called with the fraction done; what it raises ends the
+        computation, and what was not begun is not done any more.
         """
 
 
@@ -55,10 +52,7 @@ def local_workers(n_workers: int | None = None) -> Iterator[Map]:
 def cluster_workers(address: str) -> Iterator[Map]:
     """Open the workers of a Dask cluster by the address of its scheduler.
 
-    Raises
-    ------
-    UsageError
-        Dask is not installed, or no scheduler answers there.
+    Raises `UsageError` if Dask is not installed, or no scheduler answers there.
     """
     try:
         distributed: Any = import_module("distributed")

@@ -40,13 +40,7 @@ class NormalEffect(NamedTuple):
 
 
 def effect_of_normals(bundle: Bundle) -> NormalEffect:
-    """Return the first-order effect of a rotation of all normals.
-
-    Parameters
-    ----------
-    bundle : Bundle
-        Of one camera.
-    """
+    """Return the first-order effect of a rotation of all normals, by one camera."""
     state, unknowns = bundle.state, bundle.unknowns
     there = np.zeros_like(bundle.residuals)
     view = views_at(state, there, unknowns.effect_columns)[0]
@@ -97,13 +91,7 @@ def with_normal(view: CameraView, state: BundleState) -> CameraView:
 
 
 def turned_normals(normals: FloatArray, turn: FloatArray) -> FloatArray:
-    """Return normals (L, 3) turned about two axes at right angles to their mean.
-
-    Parameters
-    ----------
-    turn : (2,) array
-        rad.
-    """
+    """Return normals (L, 3) turned about two axes across their mean, by (2,), rad."""
     axes = across_normals(normals)
     return np.asarray(normals @ rotation_from_vector((turn @ axes)[None])[0].T)
 

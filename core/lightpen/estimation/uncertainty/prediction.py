@@ -288,13 +288,7 @@ def _linear_bundle(
 
 
 def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
-    """Return equations with a seat that varies between images.
-
-    Parameters
-    ----------
-    jitter : (3, 3) array
-        Covariance of the seat from image to image, mm^2.
-    """
+    """Return equations with a seat of covariance (3, 3), mm^2, between images."""
     gain = np.linalg.inv(each.cone_rows[..., :N_CONE] + np.linalg.inv(jitter))
     rows, right = each.cone_rows, each.cone_right
     left = np.eye(N_CONE) - rows[..., :N_CONE] @ gain

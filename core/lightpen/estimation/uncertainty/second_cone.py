@@ -67,10 +67,7 @@ class SecondImages:
 def second_images(camera: Camera, pen: Pen, swing: SecondSwing) -> SecondImages:
     """Return the images of a second swing that agree on a tip.
 
-    Raises
-    ------
-    CalibrationError
-        They do not; the text says what is missing.
+    Raises `CalibrationError` if they do not; the text says what is missing.
     """
     seen = without_field(camera, without_copies(swing.observations))
     steady = pose_steadily(camera, pen, seen)
