@@ -42,7 +42,7 @@ class Margins:
 
     title: str  # of the report
     subject: str
-    number: str  # number of the report
+    number: str  # of the report
     badges: tuple[str, ...]  # prominent labels in capitals, such as SIMULATED
     foot: str
 

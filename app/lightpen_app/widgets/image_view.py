@@ -46,7 +46,7 @@ class Marker:
     tone: Tone = Tone.GOOD  # its colour; `WARN` and `BAD` are also drawn dashed
     # Where beside it: clockwise from the right as one sees it, rad.
     label_angle: float = -math.pi / 4
-    crossed: bool = False  # whether it is crossed out
+    crossed: bool = False
 
 
 class ImageView(Translated, QWidget):

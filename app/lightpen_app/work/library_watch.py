@@ -35,7 +35,7 @@ class LibraryWatch(QObject):
     """
 
     changed = Signal()  # `statuses` are different
-    change_kept = Signal(object)  # the requested change
+    change_kept = Signal(object)  # the change
     # What was requested, and the sentence why it was not kept.
     change_failed = Signal(object, str)
 

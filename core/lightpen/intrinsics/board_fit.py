@@ -21,7 +21,7 @@ class BoardState:
     # `rotations` and `translations`: (C, 3, 3) and (C, 3), of cam_from_rig, mm
     rotations: FloatArray
     translations: FloatArray
-    poses: BoardPoses  # poses of rig_from_board
+    poses: BoardPoses  # rig_from_board
     shape: FloatArray  # (5,), stretch, shear, and three bends, mm
     # (3,) or (N, 3), of the points from the shape, mm.
     offsets: FloatArray = field(default_factory=lambda: np.zeros(3))

@@ -53,7 +53,7 @@ class RuleCheck:
 class FrameCheck:
     """Result of checking a pen against the pen frame."""
 
-    checks: tuple[RuleCheck, ...]  # checks in the order of `Rule`
+    checks: tuple[RuleCheck, ...]  # in the order of `Rule`
     error: Message | None = None  # why the pen cannot be used, with LED and amount
     remark: Message | None = None  # why it is not of the paper's layout, nor in error
     can_be_moved: bool = False  # whether its coordinates can be put into the pen frame

@@ -43,8 +43,8 @@ class ComputedCamera:
 class BoardCalibration(QObject):
     """Computes intrinsics, saves them, and reports the outcome."""
 
-    found_changed = Signal()  # `found` is different
-    remark_changed = Signal()  # `remark` is different
+    found_changed = Signal()
+    remark_changed = Signal()
     saved = Signal(str)  # a camera file was written
     concluded = Signal(object)  # CameraTrial: outcome of an attempt
 

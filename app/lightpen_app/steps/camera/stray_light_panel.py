@@ -18,7 +18,7 @@ from lightpen_app.widgets.translated import Translated
 class StrayLightPanel(Translated, QGroupBox):
     """Searches the live images, and asks for a mask."""
 
-    found_changed = Signal()  # `found` is different
+    found_changed = Signal()
     # array: circles (M, 3) to leave out besides those that are: x, y and radius, px
     mask_requested = Signal(object)
     clear_requested = Signal()  # leave nothing out any more

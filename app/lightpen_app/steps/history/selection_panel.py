@@ -41,7 +41,7 @@ class SelectionPanel(Translated, QWidget):
 
     # Improved LED and camera files from the selected swings are requested.
     adjust_requested = Signal()
-    report_requested = Signal()  # the report of the repeatability is requested
+    report_requested = Signal()  # show the repeatability report
 
     def __init__(self) -> None:
         super().__init__()

@@ -32,7 +32,7 @@ class LedTablePanel(Translated, QGroupBox):
     """Shows a draft and lets it be edited."""
 
     value_changed = Signal(object)  # PenDraft: the user changed it
-    discard_requested = Signal()  # discard the changes
+    discard_requested = Signal()
     led_chosen = Signal(int)  # number of the current LED, 0 for none
 
     def __init__(self, undo: QWidget) -> None:

@@ -36,7 +36,7 @@ class ReviewedResult:
     """A solved swing with the result that was current before."""
 
     solution: Solution
-    names: Names  # names of the swing
+    names: Names  # of the swing
     assessment: SwingAssessment
 
     @property

@@ -47,7 +47,7 @@ class LastResult:
     result: Result | None = None  # None before the first
     is_named: bool = True  # whether pen and tip are named at all
     fault: str = ""  # why it is unknown; else empty
-    is_simulated: bool = False  # whether the pen is simulated
+    is_simulated: bool = False
 
 
 class LastResultPanel(Translated, QGroupBox):

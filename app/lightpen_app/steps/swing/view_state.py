@@ -84,11 +84,11 @@ class SwingViewState:
     is_accepted: bool = False  # whether the tip is current
     # Elapsed fraction of the confirmation hold, after the verdict.
     stillness: float = 0.0
-    origin: Origin | None = None  # origin of the images
+    origin: Origin | None = None  # of the images
     # Whether the pen is led by the mouse, so that it leans as the camera sees it.
     is_simulated: bool = False
     is_away: bool = False  # whether another step is shown
-    to_go: RemainingImages | None = None  # remaining images
+    to_go: RemainingImages | None = None
 
     @cached_property
     def dial(self) -> DialValue:

@@ -34,7 +34,7 @@ class VerifyView:
     # The drift of fixed lamps, unless it is the verdict.
     lamps: StatusMessage = field(default_factory=StatusMessage)
     titles: tuple[StatusMessage, ...] = ()  # titles of the tasks with their progress
-    task: AnyTask | None = None  # current task
+    task: AnyTask | None = None  # the current one
     # Loaded fraction of recorded images; None if there are none.
     reading: float | None = None
     pause: str = ""

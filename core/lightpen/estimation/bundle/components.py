@@ -19,7 +19,7 @@ class Components(NamedTuple):
     oval: Component  # of the two coefficients of an oval seat, see `oval_seat`, mm
     drift: Component  # of the cone over the whole range of each drift mode, mm
     jitter: RandomEffect  # seating from image to image
-    effects: tuple[EffectComponent, ...] = ()  # of the effects that are fitted
+    effects: tuple[EffectComponent, ...] = ()  # fitted ones
 
     @property
     def sigmas(self) -> list[float]:

@@ -99,7 +99,7 @@ class SwingSetup:
     # and nobody is asked to lean the pen.
     is_recording: bool = False
     beside: Rig | None = None  # the rig of this camera, if there is one
-    other_masks: tuple[FloatArray, ...] = ()  # of the other cameras
+    other_masks: tuple[FloatArray, ...] = ()
     is_press_test: bool = False  # with firm pressure, compared with another swing
 
     @property

@@ -76,7 +76,7 @@ class SurfaceOption:
     labels: tuple[Message, ...]  # in the order of `Surface`
     argument: str
     words: dict[str, Surface]  # the default first; need the ball diameter
-    ball_help: str  # of the option for that
+    ball_help: str  # help text of the ball diameter
     is_of_artefact: bool = True
 
 
@@ -224,7 +224,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     first: Message  # what to do, in few words
     another: Message  # likewise, for another point than the first
     known: Message  # said of a point that was touched before
-    limits: tuple[str, ...]  # fields of `VerificationLimits`
+    limits: tuple[str, ...]  # in `VerificationLimits`
     # Raises `CalibrationError` where the points do not suffice.
     measure: Callable[[Runs, Conditions, OptionsT], FoundT]
     entries: Callable[[FoundT, Instrument], dict[str, Any]]  # of the record
