@@ -238,7 +238,7 @@ def _labelled(
     try:
         detections = detections_of(spots, label_images(spots, camera, pen), camera)
     except UNFORESEEN as error:
-        if len(searched) > 1:  # which one it was is seen one by one
+        if len(searched) > 1:  # search one by one, to find which failed
             return [
                 pair for image in searched for pair in _labelled([image], camera, pen)
             ]

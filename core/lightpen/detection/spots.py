@@ -553,7 +553,7 @@ def _with_small(
     rough_radii = np.sqrt(spots.areas / np.pi)
     fits = rough_radii < LARGEST_RADIUS
     raised &= fits
-    # Foreign light at a quarter of the LEDs is, less of it, at the others too.
+    # Foreign light at a quarter of the LEDs also affects the others, though less.
     are_lit = raised.sum() > LIT * fits.sum()
     clipped = fits & ((spots.flaws & SpotFlaw.SATURATED) > 0)
     chosen = spots.are_small | raised | clipped

@@ -98,7 +98,7 @@ def _axis_deviation(turns: FloatArray, tilts: FloatArray) -> float:
         [turns, np.broadcast_to(-np.eye(2), turns.shape)], axis=2
     ).reshape(-1, 4)
     variance = float(np.sum(tilts**2)) / (2 * n - 4)
-    # A hand tilts slowly: poses next to each other tell less than n of them.
+    # A hand tilts slowly: successive poses count less than independent ones.
     shifted = float(np.sum(tilts[1:] * tilts[:-1])) / max(float(np.sum(tilts**2)), TINY)
     correlation = min(max(shifted, 0.0), MOST_ALIKE)
     covariance = variance * np.linalg.pinv(design.T @ design)[:2, :2]

@@ -120,7 +120,7 @@ def explain(
         if not groups or (by_scores and groups.rms > LESSENED * by_scores.rms):
             groups = by_scores
     elif groups and groups.rms > HALVED * nothing:
-        groups = None  # what differs less is rather what the lens does
+        groups = None  # smaller differences are rather of the lens
     if groups is not None and _differ(groups):
         error = error_of(groups)
         consider(groups.rms, cost_of_camera + cost_of_groups, error)

@@ -98,7 +98,7 @@ class CameraCalibration:
     n_points_left_out: int  # excluded points in the accepted views
     choice: Choice
     held_out: FloatArray  # (V,), cross-validated residual of each view, px rms
-    # In time, or of every second view; too small to refuse the set, but in U.
+    # In time, or between alternate views; too small to refuse the set, but in U.
     change: CameraChange | None
     halves: ViewHalves | None  # None where there are too few views
     remarks: tuple[Message, ...]  # warnings

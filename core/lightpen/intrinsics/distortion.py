@@ -191,7 +191,7 @@ def choose_distortion(
     tried = {best.n_coefficients: best.camera}
     report(0.5)
     for other in others:
-        with suppress(CalibrationError):  # a part of the views does not show so many
+        with suppress(CalibrationError):  # part of the views does not determine so many
             trial = other()
             if trial is None:
                 continue
@@ -200,7 +200,7 @@ def choose_distortion(
             held_out[trial.n_coefficients] = rms
             tried[trial.n_coefficients] = trial.camera
             before = held_out[best.n_coefficients]
-            if trial.n_coefficients == FEW:  # the plain lens, if nothing denies it
+            if trial.n_coefficients == FEW:  # the plain lens, unless contradicted
                 is_better = not is_significantly_less(before, rms, errors, trial_errors)
             else:
                 is_better = is_significantly_less(rms, before, trial_errors, errors)
@@ -366,7 +366,7 @@ def _unfolded(
     for pull in pulls:
         try:
             drawn = _Drawn(fit_camera(views, tolerances, near, pull), pull)
-        except CalibrationError:  # so weakly it does not settle
+        except CalibrationError:  # no convergence with so weak a prior
             continue
         if not folds(drawn.camera):
             return drawn

@@ -238,7 +238,7 @@ def with_effects(bundle: Bundle, effects: tuple[Effect, ...]) -> Bundle:
     """
     unknowns = replace(bundle.unknowns, effects=effects)
     information, right = bundle.information + bundle.measured_information, bundle.right
-    # Anew, as other components may have taken the effects up.
+    # Again, as other components may have absorbed the effects.
     components = NO_COMPONENTS._replace(jitter=bundle.components.jitter)
     components = components.with_no_effects(effects)
     components = find_components(unknowns, information, right, components)

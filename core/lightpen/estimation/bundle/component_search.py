@@ -37,7 +37,7 @@ def find_components(
     now = before
     for _ in range(ROUNDS):
         known, now = now, _found_once(unknowns, information, right, now)
-        if now.sigmas == known.sigmas:  # as they would be once more
+        if now.sigmas == known.sigmas:  # converged
             break
     return now
 

@@ -196,7 +196,7 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
         if effect.name in TIMING:  # well seen, so the values are known as well
             moments = zip(spectra, weights, strict=True)
             expected = np.sum([x.second_moment(sigmas, w) for x, w in moments], axis=0)
-        else:  # what one effect is given that the others are 0 would be too little
+        else:  # given that other effects are 0, the size would be too small
             variances = weights @ sigmas**2
             expected = np.einsum("s,sij->ij", variances, np.array(effect.shapes))
     sigma = float(sigmas[i])

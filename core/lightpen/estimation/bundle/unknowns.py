@@ -216,7 +216,7 @@ class Unknowns:
             else np.diag(1 / variances)
         )
         of_leds = priors.led_covariance
-        if of_leds is not None and components.leds is NONE:  # the images do not deny it
+        if of_leds is not None and components.leds is NONE:  # the images agree with it
             known = self.basis.T @ of_leds @ self.basis
             prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior

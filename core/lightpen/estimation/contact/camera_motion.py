@@ -155,7 +155,7 @@ def follow_lamps(lamps: FloatArray) -> CameraPath | None:
     way = np.stack([np.interp(index, index[seen], each) for each in together.T], axis=1)
     coefficients = dct(way, axis=0, norm="ortho")[1:]
     waves = np.arange(1, n_images)
-    # Variances of a walk whose steps are 1, and of one whose steps go such a walk.
+    # Variances of a random walk with steps of 1, and of the sum of such a walk.
     by_steps = 1 / (2 - 2 * np.cos(np.pi * waves / n_images))[:, None]
     walks = by_steps ** np.array([[[1]], [[2]]])
     ratios = np.concatenate([[0.0], RATIOS])

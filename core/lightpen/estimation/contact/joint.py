@@ -257,7 +257,7 @@ class _Reduced:
     def step(self) -> FloatArray:
         try:
             step = np.linalg.solve(self.S.sum(axis=0), self.b.sum(axis=0))
-        except np.linalg.LinAlgError as error:  # as good as endlessly far
+        except np.linalg.LinAlgError as error:  # the solution is at infinity
             raise CalibrationError("joint.not-settled", n_steps=MAX_STEPS) from error
         return np.asarray(step)
 

@@ -146,7 +146,7 @@ class _Equations:
         """Return the solution (6,) over the used poses."""
         solution = self.solve(used[None])[0]
         if self.covariances is not None:
-            for _ in range(2):  # the weights depend on the tip, and hardly at that
+            for _ in range(2):  # the weights hardly depend on the tip
                 solution = self.solve(used[None], solution[:3])[0]
         return np.asarray(solution)
 

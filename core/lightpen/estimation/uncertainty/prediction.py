@@ -102,7 +102,7 @@ class UncertaintyPrediction:
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
         now = contributions_of(bundle, priors, n_images, noise, shift, self.effects)
-        share = min(n_images / POSTURES, 1.0)  # of what no longer averages out then
+        share = min(n_images / POSTURES, 1.0)  # of what does not average out
         centers = [
             replace(each, covariance=share * each.covariance)
             for each in now
@@ -241,13 +241,13 @@ def _linear_bundle(
     unknowns: Unknowns, equations: NormalEquations, joint: JointFit, sigma: float
 ) -> Bundle:
     """Return the bundle adjustment after a single step."""
-    # LEDs that count by now may not have done so when they were counted.
+    # LEDs may have been accepted since they were linearised.
     seen = np.trace(equations.cone_rows[..., :N_CONE], axis1=1, axis2=2) > 0
     spread = unknowns.sensitivity(equations.cone_rows)
     alone = information, right = unknowns.system(equations)
     components = NO_COMPONENTS.with_no_effects(unknowns.effects)
     for _ in range(SEAT_ROUNDS):
-        # The jitter first: without it, what other errors there are take it up.
+        # The jitter first: without it, other errors would absorb it.
         covariance = inverse(information + unknowns.prior_information(components))
         change = covariance @ (right + unknowns.prior_right(components))
         jitter = jitter_of(unknowns, equations, spread, seen, change, covariance)

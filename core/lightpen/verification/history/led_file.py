@@ -219,7 +219,7 @@ def _pooled(
         right += own_right
     at_scale = int(np.flatnonzero(common == at.scale.start)[0])
     if scale is not None:
-        # What the length added to what was known of the scale before it.
+        # Information on the scale that the length added.
         before, after = scale.uncertainty_before, scale.uncertainty
         added = COVERAGE_FACTOR**2 * (1 / after**2 - 1 / before**2)
         information[at_scale, at_scale] += added

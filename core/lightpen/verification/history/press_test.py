@@ -104,7 +104,7 @@ def _difference(
     """Return the change of (tip, cone), its covariance, and that by compliance."""
     fits = [fit_held(each, instrument.rig, instrument.pen) for each in (usual, firm)]
     before, after = (np.r_[fit.tip_pen, fit.cone_cam] for fit in fits)
-    # What a move of the cone does to tip and cone, where the fit knows of none.
+    # Effect of an unmodelled move of the cone on tip and cone.
     rotations = fits[1].rotations
     moves = cone_moves(rotations, axes_of_cone(rotations)).compliance[..., 1]
     pulls = np.einsum("nij,nj->i", fits[1].information[..., CONE], moves)

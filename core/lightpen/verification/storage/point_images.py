@@ -80,7 +80,7 @@ class PointImages:
         self._open: CountingRun | None = None
         self._folder: Path | None = None
         self._numbers: dict[str, int] = {}  # of images that count, by name
-        self._touch = 1  # that the next image is of
+        self._touch = 1  # of the next image
         self._runs: tuple[CountingRun, ...] = ()
         self._records: dict[str, PointRecord] = {}
 

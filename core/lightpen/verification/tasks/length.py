@@ -125,7 +125,7 @@ class Length(Found):
     """A certified length measured at one or several places."""
 
     runs: tuple[LengthRun, ...]
-    # (N,), U (k = 2) with that of heat and ball, mm.
+    # (N,), U (k = 2) with that of temperature and ball, mm.
     certified_uncertainties: FloatArray
     scale: Scale
     tip: TipEvidence
