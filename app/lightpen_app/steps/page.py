@@ -17,8 +17,7 @@ class MainAction:
     text: str  # label, a verb first
     # Why it cannot be pressed now; empty when it can. The reason is shown.
     why_not: str = ""
-    # Whether it takes someone at the screen: a presenter's remote and the operator view
-    # do not press it.
+    # Whether only someone at the screen can press it, not a remote.
     at_screen: bool = False
     # Whether the step is not complete yet; the button then stands back.
     is_early: bool = False

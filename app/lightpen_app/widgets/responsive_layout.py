@@ -37,8 +37,7 @@ class ResponsiveLayout(WidgetMixin):
     # px; with less width or height it is short of room.
     narrow_below = 0
     low_below = 0
-    # Sizes from which the layout is large or very large; None if that makes no
-    # difference.
+    # Sizes from which the layout is large or very large; None: never.
     large_from: QSize | None = None
     vast_from: QSize | None = None
     _room = SizeClass()

@@ -84,8 +84,7 @@ class EdgeStart(NamedTuple):
 
     center: FloatArray  # (2,), of the region, px
     shape: FloatArray  # (2, 2), covariance of its area, px^2
-    # Blur of this disc in the previous image, px, which has this shape; None for a new
-    # disc.
+    # Blur of this disc in the previous image, which has this shape, px; None: new.
     sigma: float | None = None
     # (2,), from the disc's centre to the region's in the previous image, px.
     offset: FloatArray = np.zeros(2)
@@ -112,8 +111,7 @@ class _Ellipses(NamedTuple):
 class _Rays(NamedTuple):
     """Intersections of rays with ellipses, and their derivatives by the parameters."""
 
-    # `feet` and `normals`: (D, N, 2), crossings, px, and the unit normals there,
-    # outwards.
+    # `feet` and `normals`: (D, N, 2), crossings, px, and unit normals, outwards.
     feet: FloatArray
     normals: FloatArray
     # (D, N, 5), movement along the normal, px, by the centre, px, and by relative

@@ -43,8 +43,7 @@ class Observations:
     names: tuple[str, ...]  # file or frame, one an image
     # (N, L, 2), ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
     pixels: FloatArray
-    # (N, L, 2), centres of all labelled LEDs, also of merged and cut ones, px; NaN
-    # elsewhere.
+    # (N, L, 2), centres of all labelled LEDs, also merged and cut ones, px; else NaN.
     seen_pixels: FloatArray
     # (N, L), areas of the LEDs that are fit for use, not saturated and larger than
     # their blur, px^2; NaN elsewhere, or where only centres are given.
@@ -52,15 +51,13 @@ class Observations:
     # (N, L), standard deviation of one coordinate of each centre by its estimator, px,
     # which shows how LEDs of one image compare; NaN where an LED is not fit for use.
     sigmas: FloatArray
-    # `rotations` and `translations`: (N, 3, 3) and (N, 3), rough cam_from_pen, mm; NaN
-    # where there is none.
+    # `rotations`, `translations`: (N, 3, 3) and (N, 3), rough cam_from_pen, mm, or NaN.
     rotations: FloatArray
     translations: FloatArray
     # (N,), mean width of the rims of the labelled LEDs from dark to bright, px; NaN
     # where none is labelled, or only centres are given.
     edge_widths: FloatArray
-    # (N, K, 2), centres of K fixed lamps in view, px; NaN where an image does not show
-    # one, or not the pen.
+    # (N, K, 2), centres of K fixed lamps, px; NaN where an image lacks them or the pen.
     lamps: FloatArray
     # Why an image cannot be used; `Reason.NONE` where it can.
     reasons: tuple[Reason, ...]

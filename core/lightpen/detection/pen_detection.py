@@ -46,12 +46,10 @@ class PenDetection:
 
     # (L, 2), ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
     pixels: FloatArray
-    # (L, 2), centres of all labelled LEDs, also of merged and cut ones, px; NaN
-    # elsewhere.
+    # (L, 2), centres of all labelled LEDs, also merged and cut ones, px; else NaN.
     seen_pixels: FloatArray
     reason: Reason  # why there is no pose; `Reason.NONE` where there is one
-    # `rotation` and `translation`: (3, 3) and (3,), cam_from_pen, mm; NaN without a
-    # pose.
+    # `rotation` and `translation`: (3, 3) and (3,), cam_from_pen, mm; NaN if no pose.
     rotation: FloatArray = field(default_factory=lambda: np.full((3, 3), np.nan))
     translation: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
     # (6, 6), covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm; NaN

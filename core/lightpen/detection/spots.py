@@ -118,8 +118,7 @@ class Spots:
     # Whether there is light, but no spot: discs moved by many times their size during
     # the exposure leave streaks, a dark image leaves nothing.
     has_smears: bool = False
-    # Usual width of spots that are too small for a centre, px, where most are; else
-    # NaN.
+    # Usual width, px, of spots too small for a centre, if most are; else NaN.
     tiny_width: float = float("nan")
 
     @classmethod

@@ -125,8 +125,7 @@ class Calibration:
     priors: Priors  # the same with contradicted numbers released
     assumptions: Assumptions  # default uncertainties where the files state none
     growth: float  # thermal expansion of the pen against its file, relative
-    # Whether the files of camera or pen were found from these images, which are not
-    # counted twice.
+    # Whether files were found from these images, which then count once.
     shares_images: bool
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit  # the paper's method on the same images, of the first camera
@@ -300,8 +299,7 @@ class _Start:
     """Step 2: the fit that the adjustment starts from, parameters of the files held."""
 
     rig: Rig  # cameras of the file, with extrinsics by the images
-    # (6 (C - 1),), these less those of the rig file, rad and mm; None for a single
-    # camera.
+    # (6 (C - 1),), these less those of the file, rad and mm; None: single camera.
     extrinsics: FloatArray | None
     lags: tuple[TimeLag | None, ...]
     reasons: npt.NDArray[np.object_]  # (N, C)

@@ -73,8 +73,7 @@ class Trials:
     # (3 m, 3 m), of the moves of the cone in these modes, mm^2.
     move_covariance: FloatArray
     jitter: FloatArray  # (3, 3), covariance of the seat from image to image, mm^2
-    # (N, L, 2, k), derivative of the LEDs' images by the unknowns of mechanics, px per
-    # mm or px.
+    # (N, L, 2, k), derivative of the LEDs' images by the mechanics, px per mm or px.
     mechanics: FloatArray
     mechanics_covariance: FloatArray  # (k, k), of these unknowns by their priors
     edge_widths: FloatArray  # (N,), of the LEDs, px; NaN where no areas are known

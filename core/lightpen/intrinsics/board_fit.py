@@ -41,8 +41,7 @@ class BoardFit:
     information: FloatArray
     scores: FloatArray
     prior: FloatArray  # (p, p), information of the priors
-    # (p, p), of the unknowns but the poses; of `adjust_board` by independent noise
-    # alone.
+    # (p, p), of all but the poses; of `adjust_board` by independent noise alone.
     covariance: FloatArray
 
     @property

@@ -66,8 +66,7 @@ class Board:
     """A flat board with known points."""
 
     kind: BoardKind
-    # `columns` and `rows`: inner corners of a chessboard, squares of a ChArUco board,
-    # markers, or circles.
+    # `columns`, `rows`: inner corners of a chessboard, else squares, markers, circles.
     columns: int
     rows: int
     # Side of a square, side of a marker of a board of markers alone, or distance of the

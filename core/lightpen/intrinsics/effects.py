@@ -48,8 +48,7 @@ class Design:
     # (V, p, s), of the normal equations of each view, by the first s unknowns.
     columns: FloatArray
     cross: FloatArray  # (V, p, o)
-    # `own_own` and `own_right`: (V, o, o) and (V, o), of the pose and the smooth errors
-    # of each view.
+    # `own_own`, `own_right`: (V, o, o), (V, o), of pose and smooth errors of each view.
     own_own: FloatArray
     own_right: FloatArray
     n_between: int  # number of these that cameras differ by; they are the last

@@ -62,8 +62,7 @@ class MixedFit:
        linear models", Biometrika 73 (1986) 13-22.
     """
 
-    # At the estimate, with the covariance by all effects; its residuals are without the
-    # fields.
+    # At the estimate, with the covariance by all effects; residuals without the fields.
     adjustment: BoardFit
     components: VarianceComponents
     # (p, p), share of the covariance by noise and by errors of single views, which

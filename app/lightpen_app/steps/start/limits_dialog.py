@@ -25,8 +25,7 @@ from lightpen_app.work.workbench import Workbench
 class LimitsDialog(FittedWindow, Translated, QDialog):
     """Shows limits; a supervisor may change them."""
 
-    # StationLimits, Signature, str: limits to be set, who signs, and a new password or
-    # none
+    # StationLimits, Signature, str: limits, who signs, and a new password or none.
     signed = Signal(object, object, str)
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -23,8 +23,7 @@ ALIKE_NORMALS = 0.9  # cosine
 class Constellation:
     """Properties of a pen for the search, computed once per pen."""
 
-    # `leds` and `normals`: (L, 3), centres, mm, and unit normals of the discs in the
-    # pen frame.
+    # `leds` and `normals`: (L, 3), centres, mm, and unit normals of the discs.
     leds: FloatArray
     normals: FloatArray
     radius: float  # radius of the discs, mm

@@ -63,8 +63,7 @@ class Bundle:
     # The same in the uncertainty budget: less than in the fit where correlated noise
     # explains a part of them.
     budget_components: Components
-    # (N, C, L, 2), observed minus modelled centres, px, the seat included; NaN where
-    # not seen.
+    # (N, C, L, 2), observed minus modelled centres, seat included, px; NaN: not seen.
     residuals: FloatArray
     used: BoolArray  # (N, C, L)
     sigma: float  # noise of one image coordinate, px
@@ -73,13 +72,11 @@ class Bundle:
     prior_information: FloatArray  # (p, p), L of equation (14)
     # (p, p), M of equation (14), of disc areas and the distance of two cones.
     measured_information: FloatArray
-    # (p, p), J of equation (15): covariance of the gradient by a significant jitter of
-    # the seat.
+    # (p, p), J of equation (15): covariance of the gradient by significant seat jitter.
     jitter_information: FloatArray
     # (p, p), the same of the expected jitter if it is not significant.
     insignificant_jitter: FloatArray
-    # Standard deviation that weights the LEDs, px; above ``sigma`` if noise is
-    # correlated.
+    # Standard deviation that weights LEDs, px; above ``sigma`` by correlated noise.
     weight_sigma: float
     covariance: FloatArray  # (p, p), P of equation (14), images taken as independent
 

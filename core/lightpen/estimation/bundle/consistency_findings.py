@@ -34,12 +34,10 @@ class Contradiction:
 
     what: Message  # name of the number
     unit: str
-    # `stated` and `stated_uncertainty`: value in the file and its U (k = 2), in
-    # ``unit``.
+    # `stated` and `stated_uncertainty`: value in the file and its U (k = 2), ``unit``.
     stated: float
     stated_uncertainty: float
-    # `estimated` and `estimated_uncertainty`: estimate of the images without it; U (k =
-    # 2), in ``unit``.
+    # `estimated` and `estimated_uncertainty`: the same by the images alone.
     estimated: float
     estimated_uncertainty: float
     deviations: float  # their difference in standard deviations

@@ -40,8 +40,7 @@ class DiameterReading:
 
     value: float  # mm
     sigma: float  # its standard uncertainty, mm
-    # Standard uncertainty of a common shift of all LEDs along their normals by uneven
-    # faces, mm
+    # Standard uncertainty of a shift of all LEDs along normals by uneven faces, mm.
     shift: float
 
 

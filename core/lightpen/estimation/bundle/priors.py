@@ -40,8 +40,7 @@ class Priors:
     """Priors of all unknowns but tip, cone and rotations."""
 
     cameras: tuple[Prior, ...]  # intrinsics of each camera
-    # Extrinsics of all cameras but the first, as in `Rig.covariance`; None for a single
-    # camera.
+    # All cameras but the first, as in `Rig.covariance`; None for a single camera.
     extrinsics: Prior | None
     scale: Prior  # relative scale of all LED coordinates, from the LED measurement
     temperature: Prior  # scale by temperature
@@ -50,8 +49,7 @@ class Priors:
     form_error: float  # standard deviation of the seat along each axis in each mode, mm
     # Standard deviation of errors of a centre that repeat with the posture, px
     center_bias: float
-    # Standard deviation of the deflection of stylus, seat or stand, mm per sine of the
-    # tilt.
+    # Standard deviation by yielding of stylus, seat or stand, mm per sine of the tilt.
     compliance: float = 0.0
     # (3 L, 3 L), of all LED coordinates, mm^2; None: only ``led_sigma`` is known.
     led_covariance: FloatArray | None = None

@@ -36,8 +36,7 @@ class ImageRows:
 
     eliminated: FloatArray  # (N, M, q), derivatives by the unknowns of each image
     nuisance_covariance: FloatArray  # (N, q, q), inverse of their normal matrix
-    # (N, M, p), J of equation (13): ``common`` with the unknowns of each image
-    # eliminated.
+    # (N, M, p), J of equation (13): ``common`` with those of each image eliminated.
     projected: FloatArray
     common: FloatArray  # (N, M, p), derivatives by the common unknowns
     residuals: FloatArray  # (N, M)

@@ -38,8 +38,7 @@ class PivotFit:
 
     tip_pen: FloatArray  # (3,), tip in the pen frame, mm
     pivot_cam: FloatArray  # (3,), point the tip rested on, in the camera frame, mm
-    # (6, 6), of (tip_pen, pivot_cam), mm^2, by noise that is independent from pose to
-    # pose.
+    # (6, 6), of (tip_pen, pivot_cam) by independent noise of the poses, mm^2.
     covariance: FloatArray
     # (N, 3), where each pose puts the tip, minus ``pivot_cam``, camera frame, mm
     residuals: FloatArray

@@ -42,8 +42,7 @@ MAX_LOOKED_AT = 500  # poses examined at first
 class PoseGroups:
     """Two groups of poses that do not share tip and pivot."""
 
-    # (N,), 1 for the larger group, or the first of two equal ones, 2 for the other, 0
-    # for poses of neither.
+    # (N,), 1 for the larger group, or the first of equal ones, 2 for the other, else 0.
     group: IntArray
     # `tips_pen` and `pivots_cam`: (2, 3), of both groups, mm
     tips_pen: FloatArray

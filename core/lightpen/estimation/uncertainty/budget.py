@@ -145,8 +145,7 @@ class Budget:
     # (6, 6), from the scatter between blocks of consecutive images, all but tip and
     # cone held, mm^2; None with too few images.
     blocks: FloatArray | None
-    # Variance between blocks relative to independent noise and jitter of the seat; 1 on
-    # average.
+    # Variance between blocks over that of independent noise and jitter; 1 on average.
     block_ratio: float
     # Of a coordinate's errors in successive images; 0 if not significant.
     autocorrelation: float
