@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightpen.messages import Message
+
 FOLDER = Path(__file__).parent / "data" / "reference"
 WORDS = {"code", "grade", "name"}  # texts that are compared; others are worded anew
 MANY = 36  # numbers of one kind, of which only these many sums are kept
@@ -64,6 +66,8 @@ def text_figures(text: str) -> dict[str, list[float]]:
 
 def _leaves(path: str, tree: Any) -> Iterator[tuple[str, Any]]:
     """Return the numbers and texts of a tree; items of a list have one path."""
+    if isinstance(tree, Message):
+        tree = {"code": tree.code, "with": tree.values}
     if isinstance(tree, Mapping):
         for name, entry in tree.items():
             yield from _leaves(f"{path}/{name}", entry)

@@ -248,14 +248,12 @@ def step_of(
     ]
     step = {"done": task.done(options, progress)}
     if not progress.points:
-        return step | {
-            "said": [{"code": each.code, "with": each.values} for each in said]
-        }
+        return step | {"said": said}
     screened = task.screen(options, conditions, progress)
     if screened.fault is not None:
         said.append(screened.fault)
     return step | {
-        "said": [{"code": each.code, "with": each.values} for each in said],
+        "said": said,
         "kept": list(screened.kept),
         "figures": shown(task.figures_so_far(options, progress, conditions)),
     }

@@ -53,6 +53,11 @@ def test_an_error_that_may_be_chance_blames_nothing_but_its_uncertainty() -> Non
     assert unproven.grade is Grade.CHECK
     assert unproven.reason.code == "verification.unproven"
     assert found(0.018, 0.01) == check(REASON, VERIFY_AGAIN)
+    # Of two values the larger one is as far off by chance.
+    simple = VerificationLimits()
+    off, same = 0.0135, (0.01, 0.02, simple, blamed)
+    assert judged_error(off, *same) == check(REASON, VERIFY_AGAIN)
+    assert judged_error(off, *same, n_values=2) is None
     assert found(0.05, 0.01) == blamed
     assert found(0.003, 0.01) is None
 
