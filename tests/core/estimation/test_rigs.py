@@ -22,6 +22,7 @@ from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.estimation.rigs.synchrony import (
     PenRotations,
     RelativeRotation,
+    TimeLag,
     measure_lag,
     relative_turn,
 )
@@ -449,3 +450,17 @@ def test_the_covariance_agrees_with_the_scatter_over_drawn_rigs() -> None:
     rms = np.sqrt(np.mean(np.square(normalised)))
     # 36 draws fix it to 12 %; LEDs and camera are stated, not drawn.
     assert 0.2 < rms < 1.3
+
+
+@pytest.mark.parametrize(
+    ("lag", "is_noticeable"),
+    [
+        (TimeLag(-0.2, 0.01, -0.1), True),
+        (TimeLag(0.2, 0.1, 0.1), False),  # by chance
+        (TimeLag(0.2, 0.01, 1e-5), False),  # the pen hardly turns in it
+    ],
+)
+def test_a_lag_is_noticeable_beyond_chance_and_beyond_the_noise_of_a_pose(
+    lag: TimeLag, is_noticeable: bool
+) -> None:
+    assert lag.is_noticeable == is_noticeable
