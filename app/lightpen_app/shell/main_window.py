@@ -49,7 +49,7 @@ from lightpen_resources import RESOURCES
 
 LEAST_SIZE = QSize(104 * GRID, 60 * GRID)  # for the wizard; fits 1280 x 800 at 150 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
-PAINTED_MS = 50  # from the first paint, which comes in parts, to what takes time
+PAINTED_MS = 50  # after the first paint, before slow work starts
 OPTIONS = "options"  # cause of a notification
 ARROW_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
 KEYS_THAT_LEAD_ON = (*ENTER_KEYS, *PAGE_KEYS)

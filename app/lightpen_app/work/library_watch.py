@@ -20,8 +20,8 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.notifications import Notifications
 
-AGAIN_MS = 15 * 60 * 1000  # after which a tip may be overdue that was not
-LOOK_MS = 5000  # at what was taken over from other stations
+AGAIN_MS = 15 * 60 * 1000  # interval of checking for overdue tips
+LOOK_MS = 5000  # interval of looking for changes of other stations
 MOST_SHOWN = 5  # changes; the newest
 SHARED = "shared_library"  # cause of its notifications
 

@@ -37,7 +37,7 @@ from lightpen_app.work.settings_store import (
 from lightpen_app.work.stations import CameraFiles, Station
 from lightpen_resources import SOURCE_LANGUAGE, languages
 
-AGAIN_MS = 5000  # after which what could not be written is tried again
+AGAIN_MS = 5000  # delay before writing again after a failure
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ WAITING = 1 << 24  # receive buffer, bytes; less where the system limits it
 # the camera's own as late where their numbers are lower.
 RECEIVED = b"n_received_packets"
 TRIES = 3  # after which the stream does without one
-STRAYING_S = 0.03  # some times what a packet waits in a packet socket until it is read
+STRAYING_S = 0.03  # several times the delay of a packet in its socket
 
 
 class AravisFeatures:

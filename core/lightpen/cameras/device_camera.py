@@ -37,7 +37,7 @@ from lightpen.messages import Message
 SETTLING = 0.4  # s that images with the exposure before may still come
 LOST_TRIGGER = 1.0  # s beyond the exposure without an image; it is given again
 LAST_SHORT_NUMBER = 65_535  # of GigE Vision 1; 1 follows, as 0 is left out
-MOST_MISSED = 10_000  # at once; a larger gap is a camera that counts again
+MOST_MISSED = 10_000  # at once; a larger gap is a restarted frame counter
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
 SUFFIX = ".cti"
 N_BUFFERS = 16  # images in transit; each buffer is returned once copied
 POLL = 0.002  # s that a call may keep the other threads waiting
-PAUSE = 0.003  # s between two of them
+PAUSE = 0.003  # s between two calls
 
 
 class GenicamDevice:

@@ -57,7 +57,7 @@ LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 # are skipped when something else holds it up once.
 LEAST_SKIPPED = 20
 SKIPPED_SHARE = 0.05
-KEEPING_UP = 3.0  # s without a skipped image after which it is over
+KEEPING_UP = 3.0  # s without a skipped image that clear the fault
 
 _logger = logging.getLogger(__name__)
 

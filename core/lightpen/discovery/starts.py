@@ -37,7 +37,7 @@ DISTORTION = {"k1": 0.5, "p1": 1e-3, "p2": 1e-3}
 MAX_TURN = 0.3  # rad, of one step
 SETTLED = 1e-7  # relative gain of a step
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e8
-WORST = 1e12  # misfit of a state that is none
+WORST = 1e12  # misfit of an invalid state
 
 
 @dataclass(frozen=True)

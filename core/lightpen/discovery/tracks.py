@@ -24,7 +24,7 @@ from lightpen.model.assignment import assigned_columns
 REACH = 0.06  # of the image width: farthest step beside the one before
 NEAR = 0.006  # of the image width: farthest from the prediction by the others
 COASTING = 8  # images in which a spot may be missing
-USUAL = 0.75  # of the spots, that are found where they continue as they went
+USUAL = 0.75  # of the spots, found at their predicted places
 CONFUSED = 6.0  # times the usual error of a prediction, within which spots are alike
 FINEST = 0.7  # px, of that error
 STILL, MOVED = 3.0, 12.0  # px: a lamp, and what moves beside it

@@ -30,7 +30,7 @@ from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.measuring.touches import PartTouches
 from lightpen.model.quantiles import chi_square_quantile
 
-BY_CHANCE = 0.005  # that touches on known form deviate from it by more
+BY_CHANCE = 0.005  # probability of a larger deviation from a known form
 
 
 @dataclass(frozen=True, eq=False)

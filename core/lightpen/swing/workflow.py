@@ -69,7 +69,7 @@ from lightpen.swing_messages import Code
 
 T = TypeVar("T")
 PRESS_IMAGES = 60  # at least, with firm pressure
-PRESS_UNCERTAINTY = 1.0  # mm: U of that tip ends no swing
+PRESS_UNCERTAINTY = 1.0  # mm; limit of U in a press test, which ends no swing
 
 
 class SwingWorkflow:

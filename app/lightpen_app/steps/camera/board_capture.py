@@ -20,7 +20,7 @@ from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.job import Job, Report
 
-LONGEST_UNSEEN = 3.0  # s, after which it is asked what is seen instead
+LONGEST_UNSEEN = 3.0  # s, after which the cause is sought
 NANOSECONDS = 1e9
 
 

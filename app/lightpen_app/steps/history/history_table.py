@@ -29,7 +29,7 @@ from lightpen_app.widgets.translated import Translated
 
 WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
 NUMBERS = (X, Y, Z, U)
-NAMED = {  # the least and the most that is shown whole, of what anybody may have named
+NAMED = {  # shortest and longest names that are shown whole
     STATION: ("Hall 12", 12 * "n"),
     PEN: ("LP-0000", 12 * "n"),
     TIP: ("T-10-80", 12 * "n"),

@@ -7,7 +7,7 @@ from typing_extensions import override
 from lightpen_app.widgets.keys import ENTER_KEYS
 
 PACE_MS = 50  # from one key of a scanner to the next at most; a hand takes longer
-PATIENCE_MS = 60  # after which no more is to come
+PATIENCE_MS = 60  # without a key that end a scan
 SHORTEST = 3  # characters; a hand may hit two keys at once
 MODIFIERS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
 SHIFTS = (Qt.Key.Key_Shift, Qt.Key.Key_CapsLock)

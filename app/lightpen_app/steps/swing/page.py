@@ -29,7 +29,7 @@ from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
-SHOWING_MS = 50  # from a new state to what is shown; the states between make one
+SHOWING_MS = 50  # from a new state to its display; states in between are skipped
 PLOTTING_MS = 40  # from one plot to the next
 PAUSES = {SideAction.PAUSE, SideAction.RESUME}
 COMMANDS = {

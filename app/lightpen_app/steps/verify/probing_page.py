@@ -28,7 +28,7 @@ from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
 
-SHOWING_MS = 50  # from a new state to what is shown; the states between make one
+SHOWING_MS = 50  # from a new state to its display; states in between are skipped
 IMAGE_WIDTH = 56 * GRID  # px, at least
 
 SOUNDS: dict[SessionEventKind, Sound] = {

@@ -22,7 +22,7 @@ from lightpen.errors import ArchiveError
 from lightpen.messages import Message
 
 AGAIN_S = 30.0  # after a server did not answer
-LOOK_S = 300.0  # at what other stations have shared
+LOOK_S = 300.0  # interval of looking for shared changes
 
 
 class Replicator:

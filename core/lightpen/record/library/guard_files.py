@@ -40,7 +40,7 @@ from lightpen.record.library.signing.keys import (
 from lightpen.record.library.signing.signed_text import Signers, place_in
 
 LIMITS_FOLDER = "limits"
-LIMIT = 8 * MEGABYTE  # some 80,000 files are listed in that
+LIMIT = 8 * MEGABYTE  # holds some 80,000 files
 WHAT = message("file.limits")
 NOTHING_BEFORE = "0" * 64
 

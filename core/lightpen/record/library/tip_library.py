@@ -36,7 +36,7 @@ from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.supervision import Supervision, read_supervision
 
 LIBRARY = "library"
-PICTURES = "pictures"  # folder in that one
+PICTURES = "pictures"  # sub-folder
 WHAT = message("file.library")
 LONGEST_ID = 200  # characters
 LARGEST_BALL = 100.0  # mm

@@ -40,7 +40,7 @@ from lightpen.record.results.results import (
 )
 
 RECORDS, RESULTS = "records", "results"
-SIMULATED = "simulated"  # that the files of the simulated pen, and its results, are in
+SIMULATED = "simulated"  # folder of the files and results of the simulated pen
 WHAT = message("file.result")
 HEAD = 16_384  # bytes, in which the first entries of a result end, or it is read whole
 

@@ -24,7 +24,7 @@ from lightpen.swing.capture.rig_sighting import fit_moments
 from lightpen.swing.capture.seat import Seat, fit_seat, tip_distances
 
 MIN_JOINT = 8  # images of the first joint fit
-LEAVING = 0.01  # chance that an image is left out though the tip rests
+LEAVING = 0.01  # probability that an image is excluded though the tip rests
 MAX_PASSES = 3  # of looking for slipped images
 RENEWED = 0.02  # of the images; after so many more U is predicted anew
 NO_NOISE = 1e-4  # px, less than any camera has

@@ -75,14 +75,14 @@ RESEATED = 0.5  # s in the cone that end a pause
 LIFTED = 3.0  # mm from the cone; less is a slip
 LEAVING = 0.2  # s out of the cone until the pen counts as lifted
 ABOUT_TO_SLIP = 0.5  # s before a slip, in which the tip may be half out
-SLIP_TOLD = 4.0  # s for which a slip is reported, at least
+SLIP_REPORTED = 4.0  # s for which a slip is reported, at least
 ASTRAY = 2.0  # s out of the cone until the capture pauses
 FEW = 12  # images; not worth more than a new start
 BAD_SIGMA = 3.0  # times the noise of the other images
 SOME_SIGMA = 0.05  # px; less is never bad
 UPRIGHT = np.radians(8.0)
 STILL = np.radians(1.5)
-CONFIRMING = 3.0  # s upright and still, by which the operator says yes without a key
+CONFIRMING = 3.0  # s upright and still that confirm without a key
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ def has_just_slipped(state: SwingState) -> bool:
     at, times = state.slipped_at, state.kept.times
     if at is None or (len(times) and times[-1] > at):
         return False
-    return state.time - at < SLIP_TOLD
+    return state.time - at < SLIP_REPORTED
 
 
 def has_enough(setup: SwingSetup, state: SwingState) -> bool:
