@@ -124,8 +124,8 @@ def focal_length_of(shape: WeakShape) -> float:
     """Return the focal length that a shape implies, px.
 
     The distance of the centroid is that of the cone and a share by the turn of the
-    pen about it, and the inverse of the scale goes with that distance: 1 / s = Z / f.
-    The in-plane shifts tell the lever. A mirrored shape gives a negative one.
+    pen about it, and the inverse of the scale is proportional to it: 1 / s = Z / f.
+    The in-plane shifts determine the lever. A mirrored shape gives a negative one.
     """
     lever = _lever(shape)
     depths = shape.rotations[:, 2] @ lever

@@ -96,7 +96,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
 def prior_of_camera(camera: Camera, assumptions: Assumptions) -> Prior:
     """Return the prior of intrinsics that a file states, or an assumed one.
 
-    What goes with the lens field is left to the field, so that it is counted once.
+    What is correlated with the lens field is left to it, and so counted once.
     """
     field = camera.lens_field
     if field is not None and field.intrinsics_covariance is not None:

@@ -48,7 +48,7 @@ class Presence:
     def count_others(self) -> int:
         """Count the other windows that use the folder, and announce this one.
 
-        Where the folder cannot be written, nobody knows of anybody.
+        In a folder that cannot be written, windows do not count each other.
         """
         with suppress(OSError):
             self._announce()
