@@ -31,7 +31,7 @@ from lightpen.detection.pen_detection import (
 )
 from lightpen.detection.pose import fit_paper_poses, fit_poses
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.contact.joint import fit_joint
+from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot.two_stage import fit_two_stage
 from lightpen.formats.observation_files import Centers
@@ -281,7 +281,10 @@ def _fit_times() -> _FitTimes:
         fit_two_stage(paper.rotations, paper.translations)
 
     return _FitTimes(
-        joint=median_ms(lambda: fit_joint(CAMERA, PEN, pixels, R, tip, cone), REPEATS),
+        joint=median_ms(
+            lambda: fit_contact(ContactModel.of(CAMERA, PEN, pixels), R, tip, cone),
+            REPEATS,
+        ),
         calibration=median_ms(lambda: calibrate(CAMERA, PEN, seen), REPEATS),
         extend=float(extend.mean()),
         longest=float(extend.max()),

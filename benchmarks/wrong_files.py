@@ -21,7 +21,7 @@ from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
-from lightpen.estimation.contact.joint import ContactModel, fit_contact, fit_joint
+from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.estimation.uncertainty.budget import (
@@ -222,8 +222,11 @@ def _errors(trial: Flaws, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
     calibration = calibrate(camera_file, pen_file, seen)
     poses = fit_poses(camera_file, pen_file, pixels, seen.rotations, seen.translations)
     pivot = fit_pivot(poses.rotations, poses.translations, poses.covariances)
-    held = fit_joint(
-        camera_file, pen_file, pixels, poses.rotations, pivot.tip_pen, pivot.pivot_cam
+    held = fit_contact(
+        ContactModel.of(camera_file, pen_file, pixels),
+        poses.rotations,
+        pivot.tip_pen,
+        pivot.pivot_cam,
     )
     return (
         calibration.joint.tip_pen - swing.tip_pen,

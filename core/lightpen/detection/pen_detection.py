@@ -211,14 +211,10 @@ def detections_of(
 def detection_of_centers(
     pixels: FloatArray, rotation: FloatArray, translation: FloatArray
 ) -> PenDetection:
-    """Return the detection by LED centres that were labelled elsewhere.
+    """Return the detection by LED centres (L, 2), px, that were labelled elsewhere.
 
-    Parameters
-    ----------
-    pixels : (L, 2) array
-        px; NaN where an LED was not seen.
-    rotation, translation : (3, 3) and (3,) array
-        Rough cam_from_pen, mm; NaN where no pose fits.
+    NaN where an LED was not seen. The pose is a rough cam_from_pen, (3, 3) and (3,),
+    mm; NaN where none fits.
     """
     n_seen = _n_seen(pixels)
     if n_seen == 0:

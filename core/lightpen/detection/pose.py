@@ -129,14 +129,13 @@ def fit_poses(
         camera, pen.leds, pen.normals, pen.diameter / 2, pixels
     )
     scales = None if sigmas is None else relative_sigmas(sigmas)
-    if scales is None:
-        return fit_reprojection(
-            problem, rotations, translations, is_near=is_near, tolerance=tolerance
-        )
-    problem = _Scaled(problem, scales)
+    if scales is not None:
+        problem = _Scaled(problem, scales)
     poses = fit_reprojection(
         problem, rotations, translations, is_near=is_near, tolerance=tolerance
     )
+    if scales is None:
+        return poses
     return replace(poses, residuals=poses.residuals * scales[..., None])
 
 
@@ -452,13 +451,8 @@ def normal_equations(
 ) -> tuple[FloatArray, FloatArray]:
     """Return J^T W J, (N, k, k), and J^T W r, (N, k), of each image.
 
-    Parameters
-    ----------
-    J : (N, L, 2, k) array
-    residuals : (N, L, 2) array
-        NaN where an LED was not seen.
-    weights : (N, L) array
-        0 where an LED was not seen.
+    J is (N, L, 2, k). Where an LED was not seen, residuals (N, L, 2) are NaN and
+    weights (N, L) 0.
     """
     n_images, n_leds, _, n_unknowns = J.shape
     rows = J.reshape(n_images, 2 * n_leds, n_unknowns)

@@ -131,12 +131,7 @@ def measure_small(
 def widths_of_tiny(image: Image, level: float, background: float) -> list[float]:
     """Return the widths of spots too small for a centre, px.
 
-    Parameters
-    ----------
-    level : float
-        An intensity that spots exceed and the background does not, digital numbers.
-    background : float
-        Digital numbers.
+    They exceed ``level`` and the background does not, digital numbers.
     """
     bright = (image > level).view(np.uint8)
     contours, _ = cv2.findContours(bright, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)

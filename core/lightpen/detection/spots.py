@@ -226,16 +226,15 @@ def detect_spots(
     if full_scale is None:
         full_scale = 2 ** bits_of(image) - 1
     stride = 4 if min(image.shape) >= 1024 else 2 if min(image.shape) >= 512 else 1
+    corner = np.zeros(2)
     if window is not None:
-        corner = np.array([window.left, window.top])
-        seen = image[window.top : window.bottom, window.left : window.right]
+        corner += (window.left, window.top)
+        image = image[window.top : window.bottom, window.left : window.right]
         if mask is not None:
             mask = np.asarray(mask) - np.append(corner, 0)
-        starts = [] if before is None else before.rims(corner)
-        spots = _spots_of(seen, mask, stride, full_scale, starts)
-        return replace(spots, centers=spots.centers + corner)
-    starts = [] if before is None else before.rims(np.zeros(2))
-    return _spots_of(image, mask, stride, full_scale, starts)
+    starts = [] if before is None else before.rims(corner)
+    spots = _spots_of(image, mask, stride, full_scale, starts)
+    return replace(spots, centers=spots.centers + corner)
 
 
 def _spots_of(

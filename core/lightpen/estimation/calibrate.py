@@ -227,10 +227,7 @@ def calibrate_rig(
         Of the same pen in a second cone, with the same single camera, not moved in
         between.
     """
-    before = _before_images(rig, pen, observations)
-    growth = thermal_growth(before.pen, assumptions)
-    pen = grown(before.pen, growth)
-    inputs = _Inputs(before.rig, pen, growth, assumptions, before.shares_images)
+    inputs = _before_images(rig, pen, observations, assumptions)
     single = _fit_single_cameras(inputs, observations)
     start = _find_start(inputs, single)
     adjusted = _adjust_jointly(inputs, single, start, second)
@@ -238,7 +235,7 @@ def calibrate_rig(
 
 
 class _Inputs(NamedTuple):
-    """The rig of the files, and the pen at the temperature of the swing."""
+    """Prior knowledge of the rig, and of the pen at the temperature of the swing."""
 
     rig: Rig
     pen: Pen
@@ -247,15 +244,9 @@ class _Inputs(NamedTuple):
     shares_images: bool
 
 
-class _Before(NamedTuple):
-    """Prior knowledge of rig and pen."""
-
-    rig: Rig
-    pen: Pen
-    shares_images: bool
-
-
-def _before_images(rig: Rig, pen: Pen, observations: Sequence[Observations]) -> _Before:
+def _before_images(
+    rig: Rig, pen: Pen, observations: Sequence[Observations], assumptions: Assumptions
+) -> _Inputs:
     """Return rig and pen without what their files found from the same images."""
     cameras, shares = list(rig.cameras), False
     for c, seen in enumerate(observations):
@@ -263,7 +254,8 @@ def _before_images(rig: Rig, pen: Pen, observations: Sequence[Observations]) -> 
             cameras[c], shares = cameras[c].before_images(), True
         if pen.is_found_from(seen.pixels):
             pen, shares = pen.before_images(), True
-    return _Before(replace(rig, cameras=tuple(cameras)), pen, shares)
+    rig, growth = replace(rig, cameras=tuple(cameras)), thermal_growth(pen, assumptions)
+    return _Inputs(rig, grown(pen, growth), growth, assumptions, shares)
 
 
 @dataclass(frozen=True, eq=False)

@@ -100,14 +100,7 @@ def lookalike_poses(
 def shifted_poses(
     sight: SpotArrays, pen: Constellation, R: FloatArray, t: FloatArray
 ) -> Candidates:
-    """Return variants of a predicted pose, shifted so that LEDs meet spots.
-
-    Parameters
-    ----------
-    R : (3, 3) array
-    t : (3,) array
-        Predicted cam_from_pen.
-    """
+    """Return variants of a predicted cam_from_pen, shifted so that LEDs meet spots."""
     leds = pen.leds @ R.T + t
     here = leds[:, :2] * (sight.focal / leds[:, 2:])
     shifts = sight.points[0] - here[:, None]
@@ -250,13 +243,7 @@ def _shape_misfit(predicted: FloatArray, measured: FloatArray) -> FloatArray:
 
 
 def first_of_each(group: IntArray, score: FloatArray, n: int) -> IntArray:
-    """Return the indices of the n lowest scores in each group.
-
-    Parameters
-    ----------
-    group : (C,) array
-    score : (C,) array
-    """
+    """Return the indices of the n lowest scores (C,) in each group (C,)."""
     order = np.lexsort((score, group))
     ordered = group[order]
     start = np.searchsorted(ordered, ordered)

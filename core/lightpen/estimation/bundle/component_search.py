@@ -23,16 +23,9 @@ ROUNDS = 3  # of finding each component beside the others
 def find_components(
     unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
 ) -> Components:
-    """Estimate the components jointly.
+    """Estimate the components jointly, given those of the pass before.
 
-    Parameters
-    ----------
-    information : (p, p) array
-        Of images and measurements about the unknowns.
-    right : (p,) array
-        Right side that belongs to it.
-    before : Components
-        Found in the pass before.
+    ``information`` (p, p) and ``right`` (p,) are of images and measurements.
     """
     now = before
     for _ in range(ROUNDS):

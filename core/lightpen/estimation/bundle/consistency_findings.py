@@ -112,14 +112,9 @@ def find_contradicted_inputs(
     """Find the numbers of the files of cameras and rig that the images contradict.
 
     Files are added one at a time, the most contradicted first, as it may be what moves
-    the others. It is ``before`` if no other is contradicted.
-
-    Parameters
-    ----------
-    bundle : Bundle
-        Fitted with the priors of ``before``.
-    excess : (p, p) array or None
-        See `lightpen.estimation.bundle.noise_correlation.Correlation`.
+    the others. It is ``before``, with whose priors the bundle was fitted, if no other
+    is contradicted. ``excess`` (p, p) is that of
+    `lightpen.estimation.bundle.noise_correlation.Correlation`.
     """
     fits = _fits(rig, bundle, priors, excess)
     numbers = {f: fits[f].contradicted for f in before.numbers if fits[f].contradicted}
@@ -150,8 +145,8 @@ def contradictions_of(
 ) -> tuple[Contradiction, ...]:
     """Return the contradictions of the files of cameras and rig, the worst first.
 
-    Parameters as of `find_contradicted_inputs`; the bundle is fitted with the priors of
-    ``inputs``.
+    ``excess`` is that of `find_contradicted_inputs`; the bundle is fitted with the
+    priors of ``inputs``.
     """
     if not inputs.numbers:
         return ()

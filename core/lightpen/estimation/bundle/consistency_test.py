@@ -83,12 +83,8 @@ class FileFit:
     ) -> "FileFit":
         """Return prior and likelihood of the unknowns at a place of a fit.
 
-        Parameters
-        ----------
-        stated : (k, k) array
-            Prior covariance.
-        excess : (p, p) array or None
-            See `lightpen.estimation.bundle.noise_correlation.Correlation`.
+        ``stated`` (k, k) is the prior covariance, ``excess`` (p, p) that of
+        `lightpen.estimation.bundle.noise_correlation.Correlation`.
         """
         known = inverse(bundle.covariance[place, place])
         by_excess = np.zeros_like(known) if excess is None else excess[place, place]
@@ -140,7 +136,7 @@ class FileFit:
     def _is_observable(self, i: int) -> bool:
         """Return whether the images determine a number at all."""
         by, prior = self.numbers[i].by, self._prior_variance(i)
-        return float(prior - by @ self._as_stated.covariance @ by) > ROUNDING * prior
+        return float(prior - by @ self._solved(()).covariance @ by) > ROUNDING * prior
 
     def _deviations(self, i: int, released: tuple[int, ...]) -> float:
         """Return the deviation of a number in standard deviations, equation (8)."""
@@ -182,12 +178,8 @@ class FileFit:
         return tuple(i for i in released if self._is_inconsistent(i, released))
 
     @cached_property
-    def _as_stated(self) -> _Estimate:
-        return self._solved_with(self.stated)
-
-    @cached_property
     def _solutions(self) -> dict[tuple[int, ...], _Estimate]:
-        return {(): self._as_stated}
+        return {}
 
     def _solved(self, released: tuple[int, ...]) -> _Estimate:
         key = tuple(sorted(released))
@@ -195,7 +187,7 @@ class FileFit:
             covariance = self.stated
             for i in key:
                 each = self.numbers[i]
-                change = abs(float(each.by @ self._as_stated.values))
+                change = abs(float(each.by @ self._solved(()).values))
                 width = RELEASED_WIDTH * max(
                     change, float(np.sqrt(self._prior_variance(i)))
                 )

@@ -31,10 +31,7 @@ _TIMES: Mapping[EffectName, Callable[[float, float | None], Message]] = {
     ),
 }
 
-OF_ONE_CAMERA = (
-    *(EffectName.LENS, EffectName.TILT),
-    *(EffectName.DELAY, EffectName.SHUTTER),
-)
+OF_ONE_CAMERA = EffectName.LENS, EffectName.TILT, EffectName.DELAY, EffectName.SHUTTER
 
 
 @dataclass(frozen=True)

@@ -174,12 +174,8 @@ def held(effect: Effect) -> EffectComponent:
 def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent:
     """Find the size of an effect by restricted likelihood.
 
-    Parameters
-    ----------
-    S : (k, k) array
-        Information about its unknowns, all others marginalised.
-    right : (k,) array
-        Right side that belongs to it.
+    ``S`` (k, k) and ``right`` (k,) are information about its unknowns, all others
+    marginalised, and the right side.
     """
     if effect.is_exact:
         return held(effect)
@@ -218,16 +214,8 @@ def gain_of(
 ) -> float:
     """Return twice the log likelihood ratio of k unknowns with a prior to none.
 
-    Parameters
-    ----------
-    S : (k, k) array
-        Information about them, all others marginalised.
-    right : (k,) array
-        Right side that belongs to it.
-    prior : (k, k) array
-        Their covariance.
-    means : (k,) array
-        By the prior.
+    ``S`` and ``right`` are those of `size_of`; the prior has a covariance (k, k) and
+    means (k,).
     """
     left = right - S @ means
     spectrum = _Spectrum.of(S, left, _root_of(prior))
@@ -366,11 +354,7 @@ def lens_and_timing(
 ) -> tuple[Effect, ...]:
     """Return the effects of lenses, and of the times at which LEDs are imaged.
 
-    Parameters
-    ----------
-    pixels : (N, C, L, 2) array
-        LED centres, px.
-    used : (N, C, L) array of bool
+    By the LED centres ``pixels`` (N, C, L, 2), px, that are ``used`` (N, C, L).
     """
     lenses = [_lens(camera, c, pixels, used) for c, camera in enumerate(cameras)]
     return (*lenses, *_timing(pixels, used, cameras))
@@ -443,15 +427,16 @@ def _lens(camera: Camera, c: int, pixels: FloatArray, used: BoolArray) -> Effect
     nodes = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     by_values = np.linalg.pinv(_polynomials(nodes))
     places = nodes * half + middle
+
+    def shape_of(covariance: FloatArray) -> FloatArray:
+        return np.asarray(np.kron(np.eye(2), by_values @ covariance @ by_values.T))
+
     if camera.lens_field is not None:
-        stated = by_values @ camera.lens_field.covariance_at(places) @ by_values.T
-        shape: FloatArray = np.kron(np.eye(2), stated).astype(np.float64)
+        shape = shape_of(camera.lens_field.covariance_at(places))
         return Effect(EffectName.LENS, c, columns, (shape,), 1.0, is_exact=True)
-    shapes = []
-    for length in LENGTHS * camera.width:
-        of_values = by_values @ correlation(places, places, length) @ by_values.T
-        shapes.append(np.kron(np.eye(2), of_values).astype(np.float64))
-    return Effect(EffectName.LENS, c, columns, tuple(shapes))
+    lengths = LENGTHS * camera.width
+    shapes = tuple(shape_of(correlation(places, places, each)) for each in lengths)
+    return Effect(EffectName.LENS, c, columns, shapes)
 
 
 def _polynomials(points: FloatArray) -> FloatArray:

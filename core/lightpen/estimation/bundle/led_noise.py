@@ -25,13 +25,8 @@ def find_center_noise(
 ) -> FloatArray | None:
     """Return the noise of centres over that of a usual one, (N, C, L); None if equal.
 
-    Parameters
-    ----------
-    residuals : (N, C, L, 2) array
-        px.
-    used : (N, C, L) array of bool
-    sigmas : (N, C, L) array
-        Standard deviation of each centre by its detector, px; NaN where not seen.
+    ``sigmas`` (N, C, L) are standard deviations by the detector, px; NaN where not
+    seen. The residuals (N, C, L, 2) are in px.
     """
     known = used & np.isfinite(sigmas)
     if not known.any() or sigmas[known].min() == sigmas[known].max():

@@ -90,14 +90,9 @@ class CameraView:
 def views_at(
     state: BundleState, pixels: FloatArray, effects: FloatArray | None = None
 ) -> tuple[CameraView, ...]:
-    """Linearise the images of each camera about a state.
+    """Linearise the images ``pixels`` (N, C, L, 2), px, of each camera about a state.
 
-    Parameters
-    ----------
-    pixels : (N, C, L, 2) array
-        px.
-    effects : (N, C, L, 2, E) array, optional
-        Columns of effects.
+    ``effects`` (N, C, L, 2, E) are columns of effects.
     """
     if effects is None:
         effects = np.zeros((*pixels.shape, 0))

@@ -81,33 +81,28 @@ class Unknowns:
         sizes = [len(camera.intrinsics) for camera in rig.cameras]
         n_extrinsics = 6 * (rig.n_cameras - 1)
         basis = led_basis(pen.leds)
-        of_effects = [effect.number for effect in effects]
-        counts = [3, 3, *sizes, n_extrinsics, *of_effects, 1, 1, basis.shape[1]]
-        counts += [3 * n_forms for n_forms in MODE_COUNTS]
-        n_drifts = given.drift.shape[1]
-        counts += [3 * n_drifts, 0 if start.at_second is None else 3]
-        ends = np.cumsum(counts).tolist()
-        slices = [slice(end - n, end) for n, end in zip(counts, ends, strict=True)]
-        tip, cone, *others = slices
-        cameras, others = others[: len(sizes)], others[len(sizes) :]
-        extrinsics, *others = others
-        placed, others = others[: len(effects)], others[len(effects) :]
-        diameter, scale, leds, *seat, drift, between = others
+        end = 0
+
+        def following(n: int) -> slice:
+            nonlocal end
+            end += n
+            return slice(end - n, end)
+
         layout = ParameterLayout(
-            tip=tip,
-            cone=cone,
-            cameras=tuple(cameras),
-            extrinsics=extrinsics,
-            effects=tuple(placed),
-            diameter=diameter,
-            scale=scale,
-            leds=leds,
-            seat=tuple(seat),
-            drift=drift,
-            between=between,
+            tip=following(3),
+            cone=following(3),
+            cameras=tuple(map(following, sizes)),
+            extrinsics=following(n_extrinsics),
+            effects=tuple(following(effect.number) for effect in effects),
+            diameter=following(1),
+            scale=following(1),
+            leds=following(basis.shape[1]),
+            seat=tuple(following(3 * n_forms) for n_forms in MODE_COUNTS),
+            drift=following(3 * given.drift.shape[1]),
+            between=following(0 if start.at_second is None else 3),
         )
         scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
-        n_effects = sum(of_effects)
+        n_effects = sum(effect.number for effect in effects)
         K = N_CONE + sum(sizes) + n_extrinsics + n_effects + 1 + 3 * n_leds
         mixing = np.zeros((K, layout.leds.stop))
         at_leds = slice(K - 3 * n_leds, K)

@@ -32,6 +32,7 @@ from lightpen.detection.pose import (
     normal_equations,
     robust_sigma,
 )
+from lightpen.detection.rig_pose import derivatives_in_rig
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse
@@ -100,36 +101,6 @@ class JointFit:
         return self.cone_cam - self.rotations @ self.tip_pen
 
 
-def fit_joint(
-    camera: Camera,
-    pen: Pen,
-    pixels: FloatArray,
-    rotations: FloatArray,
-    tip_pen: FloatArray,
-    cone_cam: FloatArray,
-    *,
-    is_near: bool = False,
-) -> JointFit:
-    """Fit tip and cone to the LED centres of all images.
-
-    Raises `CalibrationError` if the iteration does not settle.
-
-    Parameters
-    ----------
-    pixels : (N, L, 2) array
-        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-    rotations : (N, 3, 3) array
-        Start, of cam_from_pen.
-    tip_pen, cone_cam : (3,) array
-        Start, mm.
-    is_near : bool
-        Whether it starts from a fit to most of these images, so that LEDs that are far
-        off are known at once.
-    """
-    model = ContactModel.of(camera, pen, pixels)
-    return fit_contact(model, rotations, tip_pen, cone_cam, is_near=is_near)
-
-
 def fit_contact(
     model: "ContactModel",
     rotations: FloatArray,
@@ -138,7 +109,18 @@ def fit_contact(
     *,
     is_near: bool = False,
 ) -> JointFit:
-    """Fit tip and cone to the images of all cameras of a rig; see `fit_joint`."""
+    """Fit tip and cone to the LED centres in the images of all cameras of a rig.
+
+    Raises `CalibrationError` if the iteration does not settle.
+
+    Parameters
+    ----------
+    rotations, tip_pen, cone_rig : (N, 3, 3), (3,) and (3,) array
+        Start, rig_from_pen; mm.
+    is_near : bool
+        Whether it starts from a fit to most of these images, so that LEDs that are far
+        off are known at once.
+    """
     state = model.at(rotations, tip_pen, cone_rig)
     if not is_near:
         state, _ = _descend(model, state, None, SETTLED)
@@ -160,15 +142,7 @@ def joint_at(
     cone_rig: FloatArray,
     used: BoolArray,
 ) -> JointFit:
-    """Return the joint fit at a given solution.
-
-    Parameters
-    ----------
-    rotations, tip_pen, cone_rig : (N, 3, 3), (3,) and (3,) array
-        The solution.
-    used : (N, C L) array of bool
-        LEDs that count.
-    """
+    """Return the joint fit at a given solution, with the ``used`` LEDs (N, C L)."""
     state = model.at(rotations, tip_pen, cone_rig)
     return _fit_from(state, used, reduce(state, used.astype(float)))
 
@@ -239,9 +213,7 @@ class ContactModel:
             self.pixels[:, c],
         )
         if c > 0:
-            J = np.concatenate(
-                [J[..., :3] @ rig.rotations[c], J[..., 3:] @ rig.rotations[c]], axis=3
-            )
+            J = derivatives_in_rig(J, rig.rotations[c])
         return residuals, J
 
 

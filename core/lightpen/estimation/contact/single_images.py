@@ -118,16 +118,10 @@ def _fitting(poses: Poses) -> BoolArray:
 def require_images(
     chosen: IntArray, reasons: npt.NDArray[np.object_], advice: Message | None
 ) -> None:
-    """Raise `CalibrationError`, with number and reason, if too few images are usable.
+    """Raise `CalibrationError` if too few images are usable.
 
-    Parameters
-    ----------
-    chosen : (M,) array of int
-        The usable ones.
-    reasons : (N,) array of Reason
-        Why others are left out.
-    advice : Message or None
-        Likely problem of the whole set.
+    ``chosen`` (M,) are those that are. It names the ``reasons`` (N,) of the others, and
+    the advice on the whole set.
     """
     if len(chosen) >= MIN_IMAGES:
         return

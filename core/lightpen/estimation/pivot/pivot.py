@@ -232,12 +232,7 @@ def median_distance() -> float:
 def in_deviations(residuals: FloatArray, covariances: FloatArray) -> FloatArray:
     """Return the lengths (N,) of residuals in standard deviations, 1.73 on average.
 
-    Parameters
-    ----------
-    residuals : (N, 3) array
-        mm.
-    covariances : (N, 3, 3) array or (3, 3) array
-        mm^2.
+    Residuals are (N, 3), mm, covariances (N, 3, 3) or (3, 3), mm^2.
     """
     whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
     squares: FloatArray = np.einsum("ni,ni->n", residuals, whitened)
@@ -249,14 +244,8 @@ def tip_covariances(
 ) -> FloatArray:
     """Return the covariances (N, 3, 3) of where poses put the tip, camera frame, mm^2.
 
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        Of cam_from_pen.
-    covariances : (N, 6, 6) array
-        Of each pose's (theta, dt), rad and mm.
-    tip_pen : (3,) array
-        mm.
+    Rotations (N, 3, 3) are cam_from_pen, ``covariances`` (N, 6, 6) those of each pose's
+    (theta, dt), rad and mm.
     """
     J = np.concatenate(
         [-skew(rotations @ tip_pen), np.broadcast_to(np.eye(3), rotations.shape)],

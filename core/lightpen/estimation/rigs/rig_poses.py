@@ -60,14 +60,9 @@ def poses_in_rig(
     translations: FloatArray,
     covariances: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return poses by the c-th camera as rig_from_pen.
+    """Return poses cam_from_pen, mm, of the c-th camera as rig_from_pen.
 
-    Parameters
-    ----------
-    rotations, translations : (N, 3, 3) and (N, 3) array
-        cam_from_pen, mm.
-    covariances : (N, 6, 6) array
-        Of (theta, dt), rad and mm.
+    ``covariances`` (N, 6, 6) are of (theta, dt), rad and mm.
     """
     if c == 0:
         return rotations, translations, covariances

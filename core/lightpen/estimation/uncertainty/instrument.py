@@ -20,7 +20,7 @@ from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )
-from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
@@ -100,26 +100,15 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
 
 
 def instrument_of_files(
-    rig: Rig,
-    pen: Pen,
-    tip_pen: FloatArray,
-    tip_covariance: FloatArray,
-    sigma: float,
-    assumptions: Assumptions = USUAL,
+    rig: Rig, pen: Pen, tip_pen: FloatArray, tip_covariance: FloatArray, sigma: float
 ) -> Instrument:
     """Return the instrument of files as they are, its tip independent of them.
 
-    Parameters
-    ----------
-    tip_pen : (3,) array
-        mm.
-    tip_covariance : (3, 3) array
-        mm^2.
-    sigma : float
-        Noise of one image coordinate, px.
+    ``tip_covariance`` (3, 3) is in mm^2, ``sigma`` the noise of one image coordinate,
+    px.
     """
     at = parameters_of(rig, pen)
-    priors = priors_of(rig, pen, assumptions)
+    priors = priors_of(rig, pen, USUAL)
     covariance = np.zeros((at.number, at.number))
     covariance[at.tip, at.tip] = tip_covariance
     _put_cameras(covariance, at, priors)

@@ -88,15 +88,7 @@ class UncertaintyPrediction:
     def predicted(
         self, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> PredictedUncertainty:
-        """Predict U of the tip by these images.
-
-        Parameters
-        ----------
-        joint : JointFit
-            The fit to them.
-        sigma : float
-            Noise of one image coordinate, px.
-        """
+        """Predict U of the tip by the fit to these images, of noise ``sigma``, px."""
         priors, bundle = self._adjusted(joint, sigma, assumed)
         shift = _shift_from(bundle, priors)
         n_images = int(joint.used.any(axis=1).sum())

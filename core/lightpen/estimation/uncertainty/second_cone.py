@@ -45,14 +45,9 @@ class SecondImages:
     def joined(
         self, first: BundleState, pixels: FloatArray
     ) -> tuple[BundleState, FloatArray]:
-        """Return the start values of the adjustment of both swings, and their images.
+        """Return start values and images of both swings.
 
-        Parameters
-        ----------
-        first : BundleState
-            State of the first swing.
-        pixels : (N, 1, L, 2) array
-            Its images, px.
+        ``first`` and ``pixels`` (N, 1, L, 2), px, are those of the first.
         """
         numbers = [len(pixels), len(self.pixels)]
         state = replace(

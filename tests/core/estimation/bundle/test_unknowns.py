@@ -11,7 +11,7 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.seat_modes import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.contact.joint import fit_joint
+from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.estimation.statistics.variance_components import Component
 from lightpen.estimation.uncertainty.budget import ContributionName, contributions_of
 from lightpen.formats.observation_files import Centers
@@ -131,10 +131,8 @@ def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
     for seed in range(n_runs):
         measured = perturbed(0.01, 100 + seed, stated)
         result = calibrated(measured, 0.02, seed, swing)
-        held = fit_joint(
-            CAMERA,
-            measured,
-            result.observations.pixels,
+        held = fit_contact(
+            ContactModel.of(CAMERA, measured, result.observations.pixels),
             *(swing.rotations, swing.tip_pen, swing.cone_cam),
         )
         errors.append(error_of(result, measured))
@@ -187,10 +185,8 @@ def test_the_fit_stands_with_the_camera_and_the_pen_as_they_were_adjusted() -> N
     result = calibrated(perturbed(0.02, 5), 0.01, 6)
     fitted, joint = result.bundle.state, result.joint
 
-    again = fit_joint(
-        fitted.rig.cameras[0],
-        fitted.pen,
-        result.observations.pixels,
+    again = fit_contact(
+        ContactModel.of(fitted.rig.cameras[0], fitted.pen, result.observations.pixels),
         *(joint.rotations, joint.tip_pen, joint.cone_cam),
     )
 

@@ -9,7 +9,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.joint import (
     ContactModel,
     JointFit,
-    fit_joint,
+    fit_contact,
     inliers,
     reduce,
 )
@@ -39,10 +39,8 @@ def centers(of: Swing, sigma: float, seed: int = 1) -> FloatArray:
 def fit(of: Swing, pixels: FloatArray) -> JointFit:
     """Fit from a start a degree and some tenths of a millimetre off."""
     turns = 0.01 * np.random.default_rng(9).standard_normal((len(of), 3))
-    return fit_joint(
-        CAMERA,
-        PEN,
-        pixels,
+    return fit_contact(
+        ContactModel.of(CAMERA, PEN, pixels),
         rotation_from_vector(turns) @ of.rotations,
         of.tip_pen + np.array([0.3, -0.2, 0.1]),
         of.cone_cam + np.array([0.1, 0.2, -0.4]),
@@ -196,13 +194,19 @@ def test_what_each_image_says_adds_up_to_the_covariance() -> None:
 def test_images_added_one_by_one_give_the_fit_of_all() -> None:
     truth = swing(45)
     pixels = centers(truth, 0.05)
-    growing = fit_joint(
-        CAMERA, PEN, pixels[:40], truth.rotations[:40], truth.tip_pen, truth.cone_cam
+    growing = fit_contact(
+        ContactModel.of(CAMERA, PEN, pixels[:40]),
+        truth.rotations[:40],
+        truth.tip_pen,
+        truth.cone_cam,
     )
     for n in range(41, 46):
         starts = np.concatenate([growing.rotations, truth.rotations[n - 1 : n]])
-        growing = fit_joint(
-            CAMERA, PEN, pixels[:n], starts, growing.tip_pen, growing.cone_cam
+        growing = fit_contact(
+            ContactModel.of(CAMERA, PEN, pixels[:n]),
+            starts,
+            growing.tip_pen,
+            growing.cone_cam,
         )
 
     np.testing.assert_allclose(growing.tip_pen, fit(truth, pixels).tip_pen, atol=1e-6)
@@ -241,4 +245,6 @@ def test_a_start_endlessly_far_does_not_settle() -> None:
     true, far = swing(8), np.array([0.0, 0.0, 1e120])
     pixels = centers(true, 0.0)
     with pytest.raises(CalibrationError, match="did not converge"):
-        fit_joint(CAMERA, PEN, pixels, true.rotations, true.tip_pen, far)
+        fit_contact(
+            ContactModel.of(CAMERA, PEN, pixels), true.rotations, true.tip_pen, far
+        )

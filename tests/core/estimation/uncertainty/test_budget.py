@@ -13,7 +13,7 @@ from lightpen.estimation.bundle.effects import MECHANICS
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.contact.joint import JointFit, fit_joint
+from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.uncertainty.budget import (
     SHARES_OF_EFFECTS,
     Budget,
@@ -62,10 +62,8 @@ def seen(errors: FloatArray, swing: Swing = SWING) -> FloatArray:
 
 
 def fit(errors: FloatArray, swing: Swing = SWING) -> JointFit:
-    return fit_joint(
-        CAMERA,
-        PEN,
-        seen(errors, swing),
+    return fit_contact(
+        ContactModel.of(CAMERA, PEN, seen(errors, swing)),
         *(swing.rotations, swing.tip_pen, swing.cone_cam),
     )
 
@@ -181,10 +179,8 @@ def test_halves_agree_with_two_fits_of_half_the_images() -> None:
     errors = 0.05 * noise(1)
     errors[1::2, :4] = np.nan  # so that one half knows more than the other
     odd, even = (
-        fit_joint(
-            CAMERA,
-            PEN,
-            seen(errors)[k::2],
+        fit_contact(
+            ContactModel.of(CAMERA, PEN, seen(errors)[k::2]),
             *(SWING.rotations[k::2], SWING.tip_pen, SWING.cone_cam),
         )
         for k in (0, 1)

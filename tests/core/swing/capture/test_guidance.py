@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.contact.joint import fit_joint
+from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.model.coverage import TILT_RINGS
 from lightpen.model.posture import Posture, angles_between, rotations_of
 from lightpen.model.rig import Rig, rig_of
@@ -62,8 +62,11 @@ def test_the_predicted_information_is_that_of_the_image_taken_there() -> None:
         SIGMA,
         np.random.default_rng(1),
     )
-    joint = fit_joint(
-        CAMERA, PEN, pixels, truth.rotations, truth.tip_pen, truth.cone_cam
+    joint = fit_contact(
+        ContactModel.of(CAMERA, PEN, pixels),
+        truth.rotations,
+        truth.tip_pen,
+        truth.cone_cam,
     )
     joint_outlook = replace(
         outlook(truth.rotations),
