@@ -150,8 +150,10 @@ def on_ring_of(points: FloatArray) -> BoolArray:
         axial = np.einsum("sni,si->sn", spokes, normals)
         in_plane = np.linalg.norm(np.cross(spokes, normals[:, None]), axis=2)
         distances = np.hypot(in_plane - radii[:, None], axial)
-    medians = np.nan_to_num(np.median(distances, axis=1), nan=np.inf)
-    best = distances[int(np.argmin(medians))]
+    # Least median of squares: three points are on their circle, whatever the others.
+    at = min((len(points) + 4) // 2, len(points)) - 1
+    reached = np.nan_to_num(np.sort(distances, axis=1)[:, at], nan=np.inf)
+    best = distances[int(np.argmin(reached))]
     fit = fit_circle(points[lie_near(best)])
     return lie_near(np.linalg.norm(residuals_of(fit, points), axis=1))
 
