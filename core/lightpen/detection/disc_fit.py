@@ -91,15 +91,7 @@ class _Windows(NamedTuple):
 
     def of(self, chosen: BoolArray) -> "_Windows":
         """Return those of some discs."""
-        return _Windows(
-            self.x[chosen],
-            self.y[chosen],
-            self.light[chosen],
-            self.used[chosen],
-            self.clipped[chosen],
-            self.full[chosen],
-            self.ln_sharpness[chosen],
-        )
+        return _Windows(*(getattr(self, name)[chosen] for name in self._fields))
 
 
 class _Model(NamedTuple):

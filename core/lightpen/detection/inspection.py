@@ -198,5 +198,4 @@ def clicked(mask: FloatArray, spots: Spots, point: FloatArray) -> FloatArray:
 
 
 def _distances(circles: FloatArray, point: FloatArray) -> FloatArray:
-    distances: FloatArray = np.linalg.norm(circles[:, :2] - point, axis=1)
-    return distances
+    return np.asarray(np.linalg.norm(circles[:, :2] - point, axis=1))

@@ -67,8 +67,7 @@ class Poses:
         """Root mean square length of the residuals of each image, px, (N,)."""
         squares = np.nansum(self.residuals**2, axis=(1, 2))
         n_seen = np.isfinite(self.residuals[..., 0]).sum(axis=1)
-        rms: FloatArray = np.sqrt(squares / np.maximum(n_seen, 1))
-        return rms
+        return np.asarray(np.sqrt(squares / np.maximum(n_seen, 1)))
 
     def of(self, chosen: IntArray) -> "Poses":
         """Return the poses of some images."""
@@ -361,8 +360,7 @@ def _curvature(
     share = np.minimum(2 * share, MAX_LESSENED)
     pulls = np.einsum("nlik,nli->nlk", J, errors)
     lessened = pulls * (weights * share / np.maximum(squares, TINY))[..., None]
-    curvature: FloatArray = np.swapaxes(lessened, 1, 2) @ pulls
-    return curvature
+    return np.asarray(np.swapaxes(lessened, 1, 2) @ pulls)
 
 
 def _own_sigma(residuals: FloatArray, weights: FloatArray, sigma: float) -> FloatArray:
@@ -442,8 +440,7 @@ def _inverse(H: FloatArray) -> FloatArray:
     scales = scale[:, :, None] * scale[:, None, :]
     scaled = H / scales
     scaled[:, DIAGONAL, DIAGONAL] += RIDGE
-    inverse: FloatArray = np.linalg.inv(scaled) / scales
-    return inverse
+    return np.asarray(np.linalg.inv(scaled) / scales)
 
 
 def normal_equations(

@@ -426,9 +426,9 @@ class Live:
         if camera is None or pen is None or not camera.fits(frame.image):
             try:
                 spots = detect_spots(frame.image, mask, full_scale=frame.full_scale)
-                return LiveImage(frame, spots, None, c)
             except UNFORESEEN:
-                return LiveImage(frame, Spots.none(), None, c)
+                spots = Spots.none()
+            return LiveImage(frame, spots, None, c)
         detection = detect_pen(
             frame.image,
             camera,

@@ -60,10 +60,7 @@ def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation
     if pen.n_leds < MIN_LEDS:
         raise ValueError(f"`pen` must have at least {MIN_LEDS} LEDs, got {pen.n_leds}.")
     # By what they hold: a file that is read again is the same pen.
-    leds, normals = (
-        pen.leds.astype(float).tobytes(),
-        pen.normals.astype(float).tobytes(),
-    )
+    leds, normals = (each.astype(float).tobytes() for each in (pen.leds, pen.normals))
     return _constellation(leds, normals, pen.diameter, min(certain, pen.n_leds))
 
 
@@ -115,8 +112,7 @@ def _pattern(led_bytes: bytes, normal_bytes: bytes) -> _Pattern:
 
 def _sides(corners: FloatArray) -> FloatArray:
     a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
-    sides: FloatArray = np.linalg.norm(np.stack([a - b, a - c, b - c], -2), axis=-1)
-    return sides
+    return np.asarray(np.linalg.norm(np.stack([a - b, a - c, b - c], -2), axis=-1))
 
 
 def _heights(corners: FloatArray) -> FloatArray:
@@ -125,8 +121,7 @@ def _heights(corners: FloatArray) -> FloatArray:
     doubled_area = np.linalg.norm(
         np.cross(along, corners[:, 2] - corners[:, 0]), axis=1
     )
-    heights: FloatArray = doubled_area / np.maximum(_sides(corners).max(axis=1), 1e-300)
-    return heights
+    return np.asarray(doubled_area / np.maximum(_sides(corners).max(axis=1), 1e-300))
 
 
 def _self_motions(

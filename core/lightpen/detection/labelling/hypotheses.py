@@ -265,5 +265,4 @@ def _most_explaining(candidates: Candidates, reach: float, n: int) -> Candidates
 
 
 def _mirror(normals: FloatArray) -> FloatArray:
-    mirrors: FloatArray = np.eye(3) - 2 * normals[:, :, None] * normals[:, None]
-    return mirrors
+    return np.asarray(np.eye(3) - 2 * normals[:, :, None] * normals[:, None])

@@ -356,8 +356,7 @@ def _misfit(candidates: Candidates, sigma: FloatArray) -> FloatArray:
     bounded = np.where(
         candidates.spot >= 0, np.minimum(squares, UNEXPLAINED), UNEXPLAINED
     )
-    misfit: FloatArray = bounded.sum(axis=1)
-    return misfit
+    return np.asarray(bounded.sum(axis=1))
 
 
 def _differ(some: Candidates, others: Candidates) -> BoolArray:

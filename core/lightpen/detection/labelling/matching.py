@@ -66,14 +66,7 @@ class Candidates:
 
     def of(self, which: IntArray | BoolArray) -> "Candidates":
         """Return some of the candidates."""
-        return Candidates(
-            self.image[which],
-            self.R[which],
-            self.t[which],
-            self.spot[which],
-            self.residuals[which],
-            self.area_ratio[which],
-        )
+        return Candidates(*(getattr(self, f.name)[which] for f in fields(self)))
 
 
 def join(parts: Sequence[Candidates]) -> Candidates:
@@ -182,8 +175,7 @@ def log_false_alarms(sight: SpotArrays, candidates: Candidates) -> FloatArray:
     squares = np.maximum(candidates.sum_squares, 1e-12)
     share = np.log(np.pi * squares / _covered_area(sight, candidates))
     ball = 0.5 * surplus * share - gammaln(0.5 * surplus + 1)
-    logs: FloatArray = (choices + np.minimum(ball, 0)) / np.log(10)
-    return logs
+    return np.asarray((choices + np.minimum(ball, 0)) / np.log(10))
 
 
 def _covered_area(sight: SpotArrays, candidates: Candidates) -> FloatArray:
@@ -192,30 +184,21 @@ def _covered_area(sight: SpotArrays, candidates: Candidates) -> FloatArray:
     low = np.where(paired, points, np.inf).min(axis=1)
     high = np.where(paired, points, -np.inf).max(axis=1)
     sides = np.maximum(high - low, 1.0)
-    area: FloatArray = sides[:, 0] * sides[:, 1]
-    return area
+    return np.asarray(sides[:, 0] * sides[:, 1])
 
 
 def _facing(leds: FloatArray, normals: FloatArray) -> BoolArray:
     towards = -np.einsum("...i,...i->...", normals, leds)
     distance = np.sqrt(np.einsum("...i,...i->...", leds, leds))
-    facing: BoolArray = (towards > MIN_FACING * distance) & (leds[..., 2] > 0)
-    return facing
+    return np.asarray((towards > MIN_FACING * distance) & (leds[..., 2] > 0))
 
 
 def _paired_points(sight: SpotArrays, candidates: Candidates) -> FloatArray:
-    points: FloatArray = sight.points[candidates.image[:, None], candidates.spot]
-    return points
-
-
-def _paired_shapes(sight: SpotArrays, candidates: Candidates) -> FloatArray:
-    shapes: FloatArray = sight.shapes[candidates.image[:, None], candidates.spot]
-    return shapes
+    return np.asarray(sight.points[candidates.image[:, None], candidates.spot])
 
 
 def _project(sight: SpotArrays, leds: FloatArray) -> FloatArray:
-    there: FloatArray = leds[..., :2] * (sight.focal / leds[..., 2:])
-    return there
+    return np.asarray(leds[..., :2] * (sight.focal / leds[..., 2:]))
 
 
 def _offsets(
@@ -259,14 +242,8 @@ def _step(
     step = np.asarray(np.linalg.solve(normal, gradient)[..., 0], dtype=np.float64)
     turn = np.sqrt(np.einsum("ci,ci->c", step[:, :3], step[:, :3]))
     step *= (MAX_TURN / np.maximum(turn, MAX_TURN))[:, None]
-    return Candidates(
-        candidates.image,
-        rotation_from_vector(step[:, :3]) @ candidates.R,
-        candidates.t + step[:, 3:],
-        candidates.spot,
-        candidates.residuals,
-        candidates.area_ratio,
-    )
+    R = rotation_from_vector(step[:, :3]) @ candidates.R
+    return replace(candidates, R=R, t=candidates.t + step[:, 3:])
 
 
 def _drop_misshapen(
@@ -278,7 +255,7 @@ def _drop_misshapen(
     so the spots of an image are compared after the change common to all is taken off.
     """
     paired = candidates.spot >= 0
-    measured = _paired_shapes(sight, candidates)
+    measured = sight.shapes[candidates.image[:, None], candidates.spot]
     R_t = candidates.R.transpose(0, 2, 1)
     leds = pen.leds @ R_t + candidates.t[:, None]
     predicted = conic_images(leds, pen.normals @ R_t, pen.radius).shapes

@@ -22,6 +22,8 @@ from lightpen.arrays import FloatArray, IntArray
 
 NEWTON_STEPS = 2
 DOUBLE_ROOT = 1e-9  # discriminant taken for zero, relative
+# Of the entries of a symmetric matrix that is stored as 00 01 02 11 12 22.
+PLACES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 class PosesOfThree(NamedTuple):
@@ -57,7 +59,7 @@ def _ranges(rays: FloatArray, points: FloatArray) -> tuple[IntArray, FloatArray]
     b12, b13, b23 = cosines
     a12, a13 = sides[0] / sides[2], sides[1] / sides[2]
     zero, one = np.zeros_like(b12), np.ones_like(b12)
-    # Symmetric matrices as 00 01 02 11 12 22, the pencil of [1], eq. 12, over a23.
+    # The pencil of [1], eq. 12, over a23.
     first = np.stack([one, -b12, zero, 1 - a12, a12 * b23, -a12])
     second = np.stack([one, zero, -b13, -a13, a13 * b23, 1 - a13])
     c0, c3 = _determinant(first), _determinant(second)
@@ -137,9 +139,7 @@ def _split(conic: FloatArray) -> tuple[FloatArray, FloatArray]:
     adjoint = _adjoint(conic)
     diagonal = adjoint[[0, 3, 5]]
     strongest = np.argmin(diagonal, axis=0)
-    columns = adjoint[
-        np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])[strongest].T, _each(conic)
-    ]
+    columns = adjoint[PLACES[strongest].T, _each(conic)]
     x, y, z = columns / np.sqrt(-diagonal[strongest, _each(conic)])
     s00, s01, s02, s11, s12, s22 = conic
     product = np.stack(
@@ -158,16 +158,9 @@ def _cut(planes: FloatArray, cones: FloatArray) -> FloatArray:
     i, j = (k + 1) % 3, (k + 2) % 3
     # On the plane: component i is 1, j is s, k is f + g s.
     f, g = -planes[i, each] / planes[k, each], -planes[j, each] / planes[k, each]
-    index = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
-    ii, jj, kk = (
-        cones[index[i, i], each],
-        cones[index[j, j], each],
-        cones[index[k, k], each],
-    )
-    ij, ik, jk = (
-        cones[index[i, j], each],
-        cones[index[i, k], each],
-        cones[index[j, k], each],
+    ii, jj, kk, ij, ik, jk = (
+        cones[PLACES[a, b], each]
+        for a, b in ((i, i), (j, j), (k, k), (i, j), (i, k), (j, k))
     )
     square = jj + g * (2 * jk + g * kk)
     half = ij + f * jk + g * (ik + f * kk)

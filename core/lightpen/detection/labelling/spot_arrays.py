@@ -97,5 +97,4 @@ def _ranges(x: FloatArray, shapes: FloatArray, radius: float) -> FloatArray:
     half_trace = 0.5 * (square[:, 0, 0] + square[:, 1, 1])
     difference = 0.5 * (square[:, 0, 0] - square[:, 1, 1])
     largest = half_trace + np.hypot(difference, square[:, 0, 1])
-    ranges: FloatArray = radius / (2 * np.sqrt(largest))
-    return ranges
+    return np.asarray(radius / (2 * np.sqrt(largest)))

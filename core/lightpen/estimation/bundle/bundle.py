@@ -116,13 +116,10 @@ class Bundle:
         return float(apart.max())
 
     @property
-    def effect_shifts(self) -> FloatArray | float:
-        """Fitted shift of each LED's image by effects, (N, C, L, 2), px; 0 if none."""
-        columns = self.unknowns.effect_columns
-        if columns is None:
-            return 0.0
-        at = self.layout.effects
-        return np.asarray(columns @ self.values[at[0].start : at[-1].stop])
+    def effect_shifts(self) -> FloatArray:
+        """Fitted shift of each LED's image by effects, (N, C, L, 2), px."""
+        sizes = self.values[self.layout.extrinsics.stop : self.layout.diameter.start]
+        return np.asarray(self.unknowns.effect_columns @ sizes)
 
     def lens_shifts(self, camera: int) -> FloatArray | None:
         """Return the lens field fitted at each LED, (N, L, 2), px; None if none."""

@@ -41,16 +41,12 @@ class SearchedEffect:
 
 
 def search_effects(
-    bundle: Bundle, pixels: FloatArray, residuals_at: FloatArray | None = None
+    bundle: Bundle, pixels: FloatArray, residuals_at: FloatArray
 ) -> tuple[SearchedEffect, ...]:
     """Search a fit without effects of lens and timing for them.
 
-    Parameters
-    ----------
-    pixels : (N, C, L, 2) array
-        LED centres, px.
-    residuals_at : (p,) array or None
-        Values of the unknowns to which the residuals belong; None are those of the fit.
+    ``pixels`` (N, C, L, 2) are the LED centres, px; the residuals of the fit belong to
+    the values ``residuals_at`` (p,) of the unknowns.
     """
     state, used, unknowns = bundle.state, bundle.used, bundle.unknowns
     effects = lens_and_timing(pixels, used, state.rig.cameras)
@@ -58,14 +54,13 @@ def search_effects(
     columns /= unknowns.noise[..., None, None]
     views = unknowns.views_at(state, pixels)
     own, with_others, right = _information(bundle, views, columns)
-    start = bundle.values if residuals_at is None else residuals_at
     nothing = NO_COMPONENTS.with_no_effects(unknowns.effects)
     prior = unknowns.prior_information(nothing)
     plain = inverse(bundle.information + bundle.measured_information + prior)
     models = []
     without = plain @ bundle.right
     for covariance, values in ((bundle.covariance, bundle.values), (plain, without)):
-        change = values - start
+        change = values - residuals_at
         S = own - with_others.T @ covariance @ with_others
         models.append((0.5 * (S + S.T), right - with_others.T @ change))
     found, first = [], 0

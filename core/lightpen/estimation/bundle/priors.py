@@ -74,17 +74,9 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
     return Priors(
         cameras=tuple(prior_of_camera(camera, assumptions) for camera in rig.cameras),
         extrinsics=extrinsics,
-        scale=(
-            _one(assumptions.scale, assumed=True)
-            if pen.scale_sigma is None
-            else _one(pen.scale_sigma, assumed=False)
-        ),
+        scale=_stated_or(assumptions.scale, pen.scale_sigma),
         temperature=_temperature(pen, assumptions),
-        diameter=(
-            _one(assumptions.diameter * pen.diameter, assumed=True)
-            if pen.diameter_sigma is None
-            else _one(pen.diameter_sigma, assumed=False)
-        ),
+        diameter=_stated_or(assumptions.diameter * pen.diameter, pen.diameter_sigma),
         led_sigma=pen.led_sigma,
         form_error=assumptions.form_error,
         center_bias=assumptions.center_bias,
@@ -105,15 +97,9 @@ def prior_of_camera(camera: Camera, assumptions: Assumptions) -> Prior:
         return Prior(camera.covariance, assumed=False)
     variances = np.zeros(len(camera.intrinsics))
     variances[2:4] = assumptions.principal_point**2
-    variances[4:9] = np.square(
-        [
-            assumptions.k1,
-            assumptions.k2,
-            assumptions.tangential,
-            assumptions.tangential,
-            0.0,
-        ]
-    )
+    tangential = assumptions.tangential
+    distortion = [assumptions.k1, assumptions.k2, tangential, tangential, 0.0]
+    variances[4:9] = np.square(distortion)
     covariance = np.diag(variances)
     focal = np.array([camera.fx, camera.fy])
     # fx and fy share what the focal length is off by; their ratio is known far better.
@@ -166,6 +152,10 @@ def _temperature(pen: Pen, assumptions: Assumptions) -> Prior:
         hypot(expansion * uncertainty, sigma * warmth),
         assumed=pen.expansion is None or not is_measured,
     )
+
+
+def _stated_or(assumed: float, stated: float | None) -> Prior:
+    return _one(assumed if stated is None else stated, assumed=stated is None)
 
 
 def _one(sigma: float, *, assumed: bool) -> Prior:

@@ -97,21 +97,10 @@ def _eliminate(
 ) -> tuple[FloatArray, FloatArray]:
     """Eliminate the unknowns of images by block-tridiagonal elimination.
 
-    Parameters
-    ----------
-    inner : (B, N, q, q) array
-        Normal matrices of their unknowns.
-    beside : (B, N, q, q) array
-        Of an image (columns) with the one before (rows); 0 of the first.
-    right : (B, N, q, k) array
-        With the common unknowns.
-
-    Returns
-    -------
-    left : (B, k, k) array
-        What the elimination takes off the normal matrix of the common unknowns.
-    volumes : (B,) array
-        Logarithm of the determinants of what was eliminated.
+    Their normal matrices (B, N, q, q) are ``inner``, and ``beside`` of an image
+    (columns) with the one before (rows); ``right`` (B, N, q, k) is with the common
+    unknowns. Return what is taken off the normal matrix of these, (B, k, k), and the
+    logarithm of the determinants of what was eliminated, (B,).
     """
     left = np.zeros((len(inner), right.shape[-1], right.shape[-1]))
     volumes = np.zeros(len(inner))

@@ -140,11 +140,10 @@ class Unknowns:
         return tuple(view.in_units_of(self.noise[:, c]) for c, view in enumerate(views))
 
     @property
-    def effect_columns(self) -> FloatArray | None:
-        """Columns of all effects, (N, C, L, 2, E); None without any."""
-        if not self.effects:
-            return None
-        return np.concatenate([each.columns for each in self.effects], axis=-1)
+    def effect_columns(self) -> FloatArray:
+        """Columns of all effects, (N, C, L, 2, E)."""
+        none = np.zeros((*self.noise.shape, 2, 0))
+        return np.concatenate([none, *(each.columns for each in self.effects)], axis=-1)
 
     @property
     def number(self) -> int:

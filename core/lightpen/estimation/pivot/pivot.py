@@ -167,8 +167,7 @@ class _Equations:
         H, g = self.normal_equations(used, tip_pen)
         # A sample of too similar poses is singular: any finite answer will do.
         H = H + 1e-12 * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(6)
-        solutions: FloatArray = np.linalg.solve(H, g[..., None])[..., 0]
-        return solutions
+        return np.asarray(np.linalg.solve(H, g[..., None])[..., 0])
 
     def normal_equations(
         self, used: BoolArray, tip_pen: FloatArray | None
@@ -251,8 +250,7 @@ def tip_covariances(
         [-skew(rotations @ tip_pen), np.broadcast_to(np.eye(3), rotations.shape)],
         axis=2,
     )
-    result: FloatArray = J @ covariances @ np.swapaxes(J, 1, 2)
-    return result
+    return np.asarray(J @ covariances @ np.swapaxes(J, 1, 2))
 
 
 def agreeing_solution(
