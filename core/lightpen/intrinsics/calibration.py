@@ -70,9 +70,9 @@ MIN_POINTS = 6  # of a view
 LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CLUSTERED = 2.0  # times the variance that views of one camera scatter by
-UNEVEN_LENS = 10.0  # times the noise; no lens has such a residual field
+LEAST_SKEW = 2e-3  # rad, of a residual field: a lens may have less
 LEAST_NOISE = 0.01  # px: beside less, usual fields and blur look large
-SKEW_ALONE = 0.1  # of a field's squares, that a skew of the image may leave
+SKEW_ALONE = 0.1  # of a field's squares, that an affine map may leave
 UNEVEN_VIEWS = 2.0  # times the noise; no blur makes such errors of views
 
 
@@ -164,7 +164,7 @@ def calibrate_camera(
     if found.is_suspicious or any(each is not None for each in changes):
         released = released_tolerances(tolerances) if found.denied.any() else None
         fields = found.effects.fields
-        even = views if found.has_skew else without_fields(views, fields)
+        even = views if found.skew else without_fields(views, fields)
         better = explain(
             even, tolerances, found.adjustment, change, released, apart=apart
         )
@@ -236,18 +236,22 @@ class _Found:
             or self.left_out
             or self.effects.clustering > CLUSTERED
             or components.view > UNEVEN_VIEWS * noise
-            or (components.lenses[0] > UNEVEN_LENS * noise and self.has_skew)
+            or abs(self.skew) > LEAST_SKEW
         )
 
     @cached_property
-    def has_skew(self) -> bool:
-        """Whether the lens field is nothing but a skew of the image, as no lens has."""
+    def skew(self) -> float:
+        """Skew of the image, rad, by a lens field that is nothing but an affine map.
+
+        No lens has such a field; 0 if it is another.
+        """
         even = without_fields(self.views, self.effects.fields)
         at = self.views.pixels[self.views.seen]
         moves = at - even.pixels[self.views.seen]
         moves -= moves.mean(axis=0)
-        affine = np.linalg.lstsq(at - at.mean(axis=0), moves, rcond=None)
-        return bool(affine[1].sum() < SKEW_ALONE * float(np.sum(moves**2)))
+        affine, left = np.linalg.lstsq(at - at.mean(axis=0), moves, rcond=None)[:2]
+        is_affine = left.sum() < SKEW_ALONE * float(np.sum(moves**2))
+        return float(affine[0, 1] + affine[1, 0]) if is_affine else 0.0
 
 
 def _calibrated(

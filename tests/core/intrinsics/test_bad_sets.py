@@ -367,13 +367,15 @@ def test_a_correct_set_before_a_lens_with_a_large_field_is_accepted(seed: int) -
     assert calibrated(views).change is None
 
 
+@pytest.mark.parametrize(("seed", "length"), [(1, (0.15, 0.5)), (3, (0.5, 0.5))])
 def test_a_lens_field_alone_is_no_reason_to_search_for_alternatives(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, seed: int, length: tuple[float, float]
 ) -> None:
+    monkeypatch.setattr(board_trials, "LENGTH", length)
     monkeypatch.setattr(board_trials, "NOISE", (0.01, 0.01))
     monkeypatch.setattr(board_trials, "SMOOTH", (0.0, 0.0))
     monkeypatch.setattr(calibration, "explain", lambda *_, **__: pytest.fail("slow"))
-    found = calibrated(before_a_field(1, 0.25)[0])
+    found = calibrated(before_a_field(seed, 0.25)[0])
 
     assert found.effects.components.lenses[0] > 10 * found.effects.components.noise
 
