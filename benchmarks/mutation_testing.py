@@ -329,8 +329,8 @@ class Calls:
         spent = 0.0
         for tests in (set(callers), others - set(callers)):
             for test in sorted(tests, key=self._order):
-                spent += self.seconds[test]
-                if spent <= seconds or not chosen:
+                if spent + self.seconds[test] <= seconds or not chosen:
+                    spent += self.seconds[test]
                     chosen.append(test)
         return chosen
 
