@@ -6989,8 +6989,8 @@ mm</translation>
         <translation>{kind}，{side}</translation>
     </message>
     <message>
-        <source>{n_duplicates} views repeat the board position of another view and do not count: {names}. {n_views} views remain. Move the board between views.</source>
-        <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入：{names}。剩余 {n_views} 个视图。请在视图之间移动标定板。</translation>
+        <source>{n_duplicates} views repeat the board position of another view and do not count ({names}). {n_views} views remain. Move the board between views.</source>
+        <translation>{n_duplicates} 个视图与其他视图的标定板位置重复，不计入（{names}）。剩余 {n_views} 个视图。请在视图之间移动标定板。</translation>
     </message>
     <message>
         <source>{n_found} LEDs are found; the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
@@ -7141,20 +7141,20 @@ mm</translation>
         <translation>{part}：全部 {n_judged} 个特性均在公差内。</translation>
     </message>
     <message>
-        <source>{part}: not all features were probed. Missing: {names}.</source>
-        <translation>{part}：并非所有要素都已触测。缺少：{names}。</translation>
+        <source>{part}: not all features were probed ({names} missing).</source>
+        <translation>{part}：并非所有要素都已触测（缺少 {names}）。</translation>
     </message>
     <message>
         <source>{part}: {n_features} features measured; the plan has no tolerances.</source>
         <translation>{part}：已测量 {n_features} 个要素；计划未规定公差。</translation>
     </message>
     <message>
-        <source>{part}: {n_open} of {n_judged} characteristics are neither proven within nor out of tolerance: {names}.</source>
-        <translation>{part}：{n_judged} 个特性中有 {n_open} 个既未证明合格也未证明超差：{names}。</translation>
+        <source>{part}: {n_open} of {n_judged} characteristics are neither proven within nor out of tolerance ({names}).</source>
+        <translation>{part}：{n_judged} 个特性中有 {n_open} 个既未证明合格也未证明超差（{names}）。</translation>
     </message>
     <message>
-        <source>{part}: {n_out} of {n_judged} characteristics are out of tolerance: {names}.</source>
-        <translation>{part}：{n_judged} 个特性中有 {n_out} 个超差：{names}。</translation>
+        <source>{part}: {n_out} of {n_judged} characteristics are out of tolerance ({names}).</source>
+        <translation>{part}：{n_judged} 个特性中有 {n_out} 个超差（{names}）。</translation>
     </message>
     <message>
         <source>{path} cannot be written: {reason} The images recorded so far are safe.</source>
@@ -9953,8 +9953,8 @@ mm</translation>
         <translation>{n_poses} 个位姿中有 {n_left_out} 个为离群值，已剔除：{poses}。请检查跟踪是否受到干扰。</translation>
     </message>
     <message>
-        <source>{n_named} of {n_views} images are rotated by 180°: {names}. Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>
-        <translation>{n_views} 幅图像中有 {n_named} 幅旋转了 180°：{names}。请转回或剔除；标定期间不得转动相机，看图软件也不得旋转其图像。</translation>
+        <source>{n_named} of {n_views} images are rotated by 180° ({names}). Rotate them back, or leave them out; the camera must not be turned during a calibration, and viewers must not rotate its images.</source>
+        <translation>{n_views} 幅图像中有 {n_named} 幅旋转了 180°（{names}）。请转回或剔除；标定期间不得转动相机，看图软件也不得旋转其图像。</translation>
     </message>
     <message>
         <source>{n_points} datum points are given; an alignment needs at least {needed}, each with its nominal position.</source>
