@@ -12,7 +12,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.circle import Circle, CircleOptions, measure_circle
-from lightpen.verification.tasks.circle_fit import fit_circle, residuals_of
+from lightpen.verification.tasks.circle_fit import fit_circle, on_ring_of, residuals_of
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import Conditions, Surface
 
@@ -136,6 +136,19 @@ def test_a_lifted_pen_is_left_out_and_named(
     assert [touch.label for touch in found.runs[0].left_out] == ["touch 8 image 1"]
     assert found.assessment.grade is Grade.CHECK
     assert abs(found.errors[0]) < 0.01
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_points_off_the_ring_of_the_others_are_left_out(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, 9))
+    off = np.zeros(9, dtype=bool)
+    off[rng.choice(9, 3, replace=False)] = True
+    radii = np.where(off, 25.0 + rng.uniform(1, 4, 9), 25.0)
+    flat = np.column_stack([radii * np.cos(angles), radii * np.sin(angles), 3.0 * off])
+    turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    points = flat @ turn.T + [10.0, -20.0, 1100.0] + rng.normal(0, 0.002, (9, 3))
+    assert np.array_equal(on_ring_of(points), ~off)
 
 
 def test_a_diameter_given_for_the_radius_is_reported(
