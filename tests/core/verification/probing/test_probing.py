@@ -13,6 +13,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.posture import rotations_of
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, simulate_centers
 from lightpen.verification.probing.probing import (
+    ONE_IMAGE,
     ProbingEvent,
     ProbingEventKind,
     ProbingPhase,
@@ -78,6 +79,15 @@ def test_a_still_pen_is_taken_after_so_many_images(instrument: Instrument) -> No
     assert events[0].names == tuple(f"image {i}" for i in range(8, 13))
     assert state.phase is ProbingPhase.RECORDED
     assert len(state.taken[0].frames) == RULES.n_frames
+
+
+def test_each_of_single_images_is_a_point_even_in_one_place(
+    instrument: Instrument,
+) -> None:
+    state, events = run(instrument, [HELD, HELD, moving()[0], HELD], ONE_IMAGE)
+
+    assert [event.names for event in events] == [(f"image {i}",) for i in range(4)]
+    assert len(state.taken) == 4
 
 
 def test_a_pen_that_rests_is_not_touching_until_it_was_taken_up(
