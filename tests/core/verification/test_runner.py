@@ -397,6 +397,7 @@ def test_a_bug_pauses_it_and_loses_nothing(
 
     assert crashes.get(timeout=TIMEOUT) is AttributeError
     assert at_it.status.is_paused
+    assert at_it.status.refusal is None  # the tip is still known
     assert at_it.status.state is not None
     assert len(at_it.status.state.touches) == 1
 
