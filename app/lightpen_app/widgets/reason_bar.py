@@ -42,8 +42,8 @@ def usual_reasons() -> tuple[str, ...]:
 class ReasonBar(AskingBar):
     """Hidden until it asks; either answer hides it again."""
 
-    # str, Signature: the reason, which is not empty, and who signs as a supervisor;
-    # None if nobody is asked to
+    # str, Signature or None: the reason, not empty, and the supervisor's signature if
+    # one is required
     given = Signal(str, object)
     declined = Signal()
 

@@ -91,8 +91,8 @@ class LiveView(QObject):
     """Opens one or two cameras and signals their images.
 
     Of two, one is `chosen`: queries, signals and settings are of it, except `failed`
-    and `configured`, which are of both. Images go to the verification that somebody is
-    at, else to the swing; other programs get what the first camera shows.
+    and `configured`, which are of both. Images go to the active verification, else to
+    the swing; the live stream gets those of the first camera.
     """
 
     # Shown: the newest image; those that the GUI had no time for are skipped

@@ -43,8 +43,8 @@ class SkippingClock:
     """A clock that advances only by waiting, at once.
 
     With it a simulated hour takes as long as its images take to make, and the same
-    calls give the same images. If it ``rests``, a wait that may be ended takes its time
-    nevertheless: a camera of which nobody needs images leaves the processor to others.
+    calls give the same images. If it ``rests``, a wait that can be interrupted takes
+    real time, so that a camera without a reader does not occupy the processor.
     """
 
     is_real = False

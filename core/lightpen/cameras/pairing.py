@@ -18,7 +18,7 @@ from lightpen.messages import Message, message
 WAITING = 6  # frames of one camera that wait for the other
 LONGEST_WAITING = 16  # while the clocks are not known
 WINDOW = 64  # frames by which rates are estimated
-CLOCK_WINDOW = 256  # frames by which clocks are estimated; they drift by less than 1 ms
+CLOCK_WINDOW = 256  # frames to estimate clock offsets, which drift by less than 1 ms
 SETTLED = 6  # frames after which a clock is known, if none was much faster
 CLOCK_SET_NS = 1_000_000_000  # jump of a clock that is set manually
 SAME_CLOCK_NS = 50_000_000  # apart at most; clocks of two cameras are hours apart

@@ -66,7 +66,7 @@ class EndOfImages(Exception):  # noqa: N818 - not an error
 class Frame:
     """One complete image of a camera."""
 
-    image: Image  # (H, W), read-only and nobody else's memory, see `sealed`
+    image: Image  # (H, W), read-only, in memory of its own; see `sealed`
     seq: int  # ascends over the life of the `ImageCamera`; a gap is a lost image
     host_ts_ns: int  # when the image was there, by the monotonic clock of the machine
     device_ts_ns: int | None = None  # time stamp of the camera, ns
@@ -200,7 +200,7 @@ class CameraCapabilities:
     gain_in_db: bool = True  # whether the gain is in dB and not in device units
     regions: RegionLimits | None = None  # None if the region cannot be set
     triggers: tuple[TriggerMode, ...] = (TriggerMode.FREE,)  # free running first
-    waits: bool = False  # whether no image is lost when nobody reads, as with a file
+    waits: bool = False  # for its reader: no image is lost, as with a file
     has_link: bool = False  # whether images come over a cable that may lose some
     n_images: int | None = None  # after so many images a recording restarts
 

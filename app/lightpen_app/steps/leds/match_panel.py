@@ -33,7 +33,7 @@ from lightpen_app.work.live_view import DisplayedImage
 class FixableMessage(Translated, QWidget):
     """Shows a remark; hidden while there is none."""
 
-    mend_requested = Signal(object)  # Finding: the button was pressed
+    mend_requested = Signal(object)  # Finding to correct: the button was pressed
 
     def __init__(self) -> None:
         super().__init__()
@@ -88,7 +88,7 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 class MatchPanel(Translated, QGroupBox):
     """Shows images with numbered LEDs and the match of each."""
 
-    mend_requested = Signal(object)  # Finding by which to correct the table
+    mend_requested = Signal(object)  # Finding to correct in the table
 
     def __init__(self, foot: QWidget) -> None:
         super().__init__()
