@@ -159,7 +159,7 @@ def followed() -> Calibration:
 
 
 def larger_discs() -> Calibration:
-    """Discs larger than in the file, and a lens whose field the camera file states."""
+    """Discs larger than in the file, that may face elsewhere, and a stated lens field."""
     swing, rng = swing_of(9, 25), np.random.default_rng(9)
     field = LensField.of(CAMERA.width, CAMERA.height, 0.05, 300.0)
     waves = 0.1 * np.sin(field.nodes / 260.0)
@@ -168,17 +168,22 @@ def larger_discs() -> Calibration:
     seen = observed(swing, 0.03 * lasting(9, 0.7, 25), camera)
     areas = disc_areas(swing, 1.02 * PEN.diameter, rng)
     seen = replace(seen, areas=areas, edge_widths=np.full(25, 2.2))
-    return calibrate(camera, replace(PEN, diameter_sigma=0.002), seen)
+    turns = np.diag([0.1, 0.2, 0.3]) ** 2
+    pen = replace(PEN, diameter_sigma=0.002, normal_covariance=turns)
+    return calibrate(camera, pen, seen)
 
 
 def by_two_cones() -> Calibration:
+    """In the second swing, an image does not fit, and LEDs are missing."""
     pen = replace(PEN, scale_sigma=None, expansion=None)
     cones = PAPER_CONE + np.array([[-70.0, 0.0, 0.0], [70.0, 0.0, 10.0]])
-    rng = np.random.default_rng(6)
-    first, second = (
-        observed(swing_poses(25, rng, cone_cam=cone), 0.03 * lasting(seed, 0.0, 25))
-        for seed, cone in enumerate(cones)
+    rng, errors = np.random.default_rng(6), 0.03 * lasting(1, 0.0, 20)
+    first = observed(
+        swing_poses(25, rng, cone_cam=cones[0]), 0.03 * lasting(0, 0.0, 25)
     )
+    errors[4] += np.linspace(-2, 2, PEN.n_leds)[:, None]
+    errors[9, 3:] = errors[12:, 5] = np.nan
+    second = observed(swing_poses(20, rng, cone_cam=cones[1]), errors)
     apart = float(np.linalg.norm(cones[1] - cones[0]))
     return calibrate(
         *(CAMERA, pen, first),
@@ -230,11 +235,32 @@ def uneven() -> Calibration:
     return calibrate(CAMERA, PEN, replace(seen, sigmas=sigmas))
 
 
+def lobed(seed: int, n_lobes: int) -> Calibration:
+    """A seat 10 um out of round."""
+    swing = swing_of(seed)
+    right, away = swing.rotations[:, 0, 1], swing.rotations[:, 2, 1]
+    angle = np.arctan2(away, right)
+    sides = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    moves = 0.01 * np.cos(n_lobes * angle - 0.7)[:, None] * sides
+    moved = replace(swing, translations=swing.translations + moves)
+    return calibrate(CAMERA, PEN, observed(moved, 0.03 * lasting(seed, 0.0)))
+
+
+def two_lobes() -> Calibration:
+    """An oval seat is found; waves round the cone are expected beside it."""
+    return lobed(11, 2)
+
+
+def three_lobes() -> Calibration:
+    """Waves round the cone are found; an oval seat is expected beside them."""
+    return lobed(12, 3)
+
+
 SWINGS: dict[str, Callable[[], Calibration]] = {
     each.__name__: each
     for each in (
-        *(usual, restless, unstated, spoilt_files),
-        *(followed, uneven, larger_discs, by_two_cones, by_two_cameras),
+        *(usual, restless, unstated, spoilt_files, followed, uneven),
+        *(larger_discs, two_lobes, three_lobes, by_two_cones, by_two_cameras),
     )
 }
 
