@@ -159,7 +159,7 @@ def followed() -> Calibration:
 
 
 def larger_discs() -> Calibration:
-    """Discs larger than in the file, that may face elsewhere, and a stated lens field."""
+    """Larger discs than the file has, that may be turned, and a stated lens field."""
     swing, rng = swing_of(9, 25), np.random.default_rng(9)
     field = LensField.of(CAMERA.width, CAMERA.height, 0.05, 300.0)
     waves = 0.1 * np.sin(field.nodes / 260.0)
