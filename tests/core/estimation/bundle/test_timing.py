@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.simulated_centers import simulate_rig_centers
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.effect_findings import FoundEffect
 from lightpen.estimation.bundle.effects import EffectName, lens_and_timing
@@ -142,6 +142,63 @@ def test_an_led_that_the_next_image_lacks_moves_as_from_the_one_before() -> None
     np.testing.assert_allclose(found[3, 0], 10.0)
     np.testing.assert_allclose(found[6, 1], np.delete(speeds, 1).mean())
     assert (strobe.columns[..., 1, 0] == 0).all()
+
+
+def test_what_may_be_late_has_the_motion_times_its_delay_as_columns() -> None:
+    """Of two cameras, the second of which sees all move twice as fast."""
+    rng = np.random.default_rng(1)
+    pixels = 500.0 + np.zeros((5, 2, 3, 2))
+    pixels += np.arange(5.0)[:, None, None, None] * [4.0, -3.0]
+    pixels[:, 1] = 2 * pixels[:, 1] + rng.uniform(0, 300, (3, 2))
+    lower = replace(CAMERA, height=CAMERA.height // 2)
+    effects = lens_and_timing(pixels, np.ones((5, 2, 3), bool), (CAMERA, lower))
+
+    speed = np.array([1.0, 2.0])[:, None, None] * [4.0, -3.0]
+    by_row = [
+        pixels[:, c, :, 1, None] / camera.height - 0.5
+        for c, camera in enumerate((CAMERA, lower))
+    ]
+    nothing = np.zeros((5, 3, 1))
+    expected = [
+        (EffectName.STROBE, 0, np.tile([[-1.0], [0.0], [1.0]], (5, 2, 1, 1))),
+        (EffectName.SHUTTER, 0, np.stack([by_row[0], nothing], axis=1)),
+        (EffectName.DELAY, 1, np.stack([nothing, nothing + 1], axis=1)),
+        (EffectName.SHUTTER, 1, np.stack([nothing, by_row[1]], axis=1)),
+    ]
+    timing = [each for each in effects if each.name is not EffectName.LENS]
+    assert [(each.name, each.camera) for each in timing] == [e[:2] for e in expected]
+    for each, (_, _, delays) in zip(timing, expected, strict=True):
+        np.testing.assert_allclose(each.columns[..., 0], delays * speed)
+        assert each.shapes == (np.eye(1),)
+        assert (each.stated, each.is_exact) == (0.0, False)
+
+
+@pytest.mark.parametrize(
+    ("steps", "is_known"),
+    [
+        ([2.0, 1.5, 2.2, 1.6], True),
+        ([1.01, 1.01, 1.01, 1.01], True),
+        ([0.99, 0.99, 0.99, 0.99], False),  # the pen rests
+        ([2.0, 2.99, 2.0, 2.99], True),
+        ([2.0, 3.01, 2.0, 3.01], False),  # a step half as long again as the one before
+        ([2.0, 2.0, 4.0], True),  # half of them are even
+        ([2.0, 2.0, 4.0, 2.0], False),
+    ],
+)
+def test_only_an_even_motion_tells_times(steps: list[float], is_known: bool) -> None:
+    pixels = np.zeros((len(steps) + 1, 1, 4, 2))
+    pixels[..., 0] = np.cumsum([0.0, *steps])[:, None, None]
+    effects = lens_and_timing(pixels, np.ones(pixels.shape[:-1], bool), (CAMERA,))
+    assert (EffectName.STROBE in [each.name for each in effects]) == is_known
+
+
+@pytest.mark.parametrize("used", [np.arange(5) % 2 == 0, np.zeros(5, bool)])
+def test_images_without_neighbours_tell_no_times(used: BoolArray) -> None:
+    pixels = np.zeros((5, 1, 4, 2))
+    pixels[..., 0] = 10 * np.arange(5)[:, None, None]
+    shown = np.tile(used[:, None, None], (1, 1, 4))
+    effects = lens_and_timing(pixels, shown, (CAMERA,))
+    assert [each.name for each in effects] == [EffectName.LENS]
 
 
 def test_a_time_is_stated_in_ms_if_the_image_rate_is_known_with_its_sign() -> None:
