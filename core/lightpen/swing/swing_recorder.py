@@ -1,6 +1,5 @@
 """The open record of a swing: which images of its source go there, and how."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -18,7 +17,7 @@ from lightpen.messages import message
 from lightpen.record.swings.reading import DISCARDED, Record
 from lightpen.record.swings.writing import RecordWriter, SecondaryView
 from lightpen.swing.capture.kept_images import keep
-from lightpen.swing.capture.rules import Transition, advance_swing, finish
+from lightpen.swing.capture.rules import advance_swing, finish
 from lightpen.swing.capture.state import (
     Phase,
     Progress,
@@ -26,6 +25,7 @@ from lightpen.swing.capture.state import (
     SwingEventKind,
     SwingSetup,
     SwingState,
+    Transition,
 )
 from lightpen.swing_messages import Code
 
@@ -94,7 +94,7 @@ def take_recorded_image(
     events: tuple[SwingEvent, ...] = ()
     flaw = _flaw(detection)
     if flaw is not Reason.NONE:
-        state = _with_dropped(state, flaw)
+        state = state.with_dropped(1, flaw)
     elif not is_known:
         number = state.next_number
         kept = keep(setup.rig, setup.pen, state.kept, detection, number, time)
@@ -106,7 +106,7 @@ def take_recorded_image(
 
 def pass_over(state: SwingState, n_images: int) -> Transition:
     """Leave out the next recorded image, which cannot be read or is of another size."""
-    passed = _with_dropped(_further(state, n_images), Reason.UNREADABLE)
+    passed = _further(state, n_images).with_dropped(1, Reason.UNREADABLE)
     return _ended_by_last(Transition(passed))
 
 
@@ -120,19 +120,12 @@ def _further(state: SwingState, n_images: int) -> SwingState:
     )
 
 
-def _with_dropped(state: SwingState, reason: Reason) -> SwingState:
-    counts = Counter(state.n_dropped)
-    counts[reason] += 1
-    return replace(state, n_dropped=counts)
-
-
 def _ended_by_last(transition: Transition) -> Transition:
     """End the capture where no image is left."""
     progress = transition.state.progress
     if progress.n_read < progress.n_images:
         return transition
-    ended = finish(transition.state)
-    return Transition(ended.state, (*transition.events, *ended.events))
+    return finish(transition.state).after(transition.events)
 
 
 def _flaw(detection: PenDetection) -> Reason:

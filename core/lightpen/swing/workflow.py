@@ -41,7 +41,6 @@ from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, Task
 from lightpen.swing.capture.rig_sighting import seen_by_rig
 from lightpen.swing.capture.rules import (
-    Transition,
     advance_swing,
     conclude,
     finish,
@@ -57,6 +56,7 @@ from lightpen.swing.capture.state import (
     SwingEventKind,
     SwingSetup,
     SwingState,
+    Transition,
 )
 from lightpen.swing.failed_swing import failed_swing
 from lightpen.swing.operator_presence import OperatorPresence

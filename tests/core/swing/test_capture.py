@@ -31,13 +31,13 @@ from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP, paper_camera
-from lightpen.swing.capture.rules import Transition
 from lightpen.swing.capture.state import (
     Phase,
     SwingEvent,
     SwingEventKind,
     SwingSetup,
     SwingState,
+    Transition,
     start_swing,
 )
 from lightpen.swing.resuming import resume_swing

@@ -8,25 +8,24 @@ tip that leaves the cone costs the images that it spoils, and no others. The swi
 when the postures and the uncertainty suffice.
 """
 
-from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
-from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
 from lightpen.messages import Message, message
 from lightpen.model.posture import angles_between, posture_of
-from lightpen.swing.capture.kept_images import (
-    AcceptedImages,
-    keep,
-    none_kept,
-    without_slipped,
+from lightpen.swing.capture.image_choice import (
+    FEW,
+    drop_all,
+    drop_slipped,
+    take_image,
+    with_new,
 )
+from lightpen.swing.capture.kept_images import AcceptedImages, without_slipped
 from lightpen.swing.capture.rest import (
     BATCH,
     in_place,
@@ -49,6 +48,7 @@ from lightpen.swing.capture.state import (
     SwingEventKind,
     SwingSetup,
     SwingState,
+    Transition,
     start_swing,
     trace_of,
 )
@@ -64,7 +64,6 @@ from lightpen.swing_messages import (
     SHOW_PEN,
     SOLVING,
     SWING_TO_SEAT,
-    TOO_FAST,
     Code,
 )
 
@@ -77,20 +76,9 @@ LEAVING = 0.2  # s out of the cone until the pen counts as lifted
 ABOUT_TO_SLIP = 0.5  # s before a slip, in which the tip may be half out
 SLIP_REPORTED = 4.0  # s for which a slip is reported, at least
 ASTRAY = 2.0  # s out of the cone until the capture pauses
-FEW = 12  # images; not worth more than a new start
-BAD_SIGMA = 3.0  # times the noise of the other images
-SOME_SIGMA = 0.05  # px; less is never bad
 UPRIGHT = np.radians(8.0)
 STILL = np.radians(1.5)
 CONFIRMING = 3.0  # s upright and still that confirm without a key
-
-
-@dataclass(frozen=True, eq=False)
-class Transition:
-    """A swing after one more image."""
-
-    state: SwingState
-    events: tuple[SwingEvent, ...] = ()
 
 
 def advance_swing(
@@ -234,14 +222,14 @@ def _seen(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Tran
 
 def _settle(setup: SwingSetup, state: SwingState, seat: Seat) -> Transition:
     """Start with a resting tip, or continue if it is in the same place."""
-    events = [SwingEvent(SwingEventKind.SEATED)]
+    events: tuple[SwingEvent, ...] = (SwingEvent(SwingEventKind.SEATED),)
     if state.n_kept and not rests_in_place(state, BATCH):
         if state.n_kept >= FEW:
             return Transition(replace(state, message=_elsewhere(state)))
-        transition = _dropped_all(setup, state)
-        state, events = transition.state, [*events, *transition.events]
+        dropped = drop_all(setup, state).after(events)
+        state, events = dropped.state, dropped.events
     settled = _enter(state, Phase.SETTLED, HOLD_STILL)
-    return Transition(replace(settled, seat=state.kept.seat or seat), tuple(events))
+    return Transition(replace(settled, seat=state.kept.seat or seat), events)
 
 
 def _settled(
@@ -292,47 +280,18 @@ def _capturing(
     if _is_lost(state):
         return _pause_for(state, Pause.LOST, PEN_LOST)
     if detection.reason is Reason.UNHANDLED:
-        state = replace(state, n_dropped=_more(state, 1, detection.reason))
+        state = state.with_dropped(1, detection.reason)
     if not detection.has_pose:
         return Transition(state)
     if not in_place(state, state.recent[-1:]).all():
         return _astray(setup, state, detection)
     state = replace(state, strayed_since=None, stray_rotations=np.zeros((0, 3, 3)))
     state = guided(setup, oriented(setup, state, detection), detection)
-    state = replace(state, message=_asking(state))
-    if not _is_new(state.kept.rotations, detection, setup.limits.spacing):
-        return Transition(state)
-    flaw = _flaw(setup, state, detection)
-    if flaw is not Reason.NONE:
-        return Transition(_flawed(setup, state, detection, flaw))
-    return _kept(setup, state, detection)
-
-
-def _kept(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Transition:
-    """Accept an image, and exclude earlier ones that have slipped."""
-    number, counts = state.next_number, state.counts
-    kept = keep(setup.rig, setup.pen, state.kept, detection, number, state.time)
-    kept, dropped = without_slipped(setup.rig, setup.pen, kept)
-    state = replace(state, kept=kept)
-    if number in dropped:  # it was never recorded
-        return _dropped(replace(state, n_dropped=_more(state, 1)), dropped - {number})
-    state = replace(state, next_number=number + 1, flawed_rotations=np.zeros((0, 3, 3)))
-    transition = _dropped(state, dropped)
-    state, events = (
-        transition.state,
-        [SwingEvent(SwingEventKind.KEPT, (number,)), *transition.events],
-    )
-    state = replace(state, trace=state.trace.with_estimate(kept))
-    enough = setup.limits.min_per_field
-    full = (state.counts >= enough) & (counts < enough)
-    events += [
-        SwingEvent(SwingEventKind.FIELD_FULL, (int(row), int(column)))
-        for row, column in np.argwhere(full)
-    ]
-    if has_enough(setup, state):
-        ended = finish(state)
-        return Transition(ended.state, (*events, *ended.events))
-    return Transition(state, tuple(events))
+    taken = take_image(setup, replace(state, message=_asking(state)), detection)
+    is_kept = taken.state.next_number > state.next_number
+    if is_kept and has_enough(setup, taken.state):
+        return finish(taken.state).after(taken.events)
+    return taken
 
 
 def _astray(
@@ -347,23 +306,19 @@ def _astray(
     if begins:
         since = state.strayed_since - ABOUT_TO_SLIP
         kept, dropped = without_slipped(setup.rig, setup.pen, kept, since)
-    strays = _with_new(setup, state.stray_rotations, detection)
+    strays = with_new(setup, state.stray_rotations, detection)
     n_new = len(strays) - len(state.stray_rotations)
-    state = replace(
-        state, kept=kept, stray_rotations=strays, n_dropped=_more(state, n_new)
-    )
-    transition = _dropped(state, dropped)
+    state = replace(state, kept=kept, stray_rotations=strays).with_dropped(n_new)
+    transition = drop_slipped(state, dropped)
     state, events = transition.state, transition.events
     if offset(state) > LIFTED:
         if strayed_for < LEAVING:
             return transition
-        paused = _pause_for(state, Pause.LIFTED, PEN_LIFTED)
-        return Transition(paused.state, (*events, *paused.events))
+        return _pause_for(state, Pause.LIFTED, PEN_LIFTED).after(events)
     if strayed_for > ASTRAY:
         if max(len(strays), FEW) < state.n_kept:
-            paused = _pause_for(state, Pause.ELSEWHERE, _elsewhere(state))
-            return Transition(paused.state, (*events, *paused.events))
-        transition = _dropped_all(setup, state)
+            return _pause_for(state, Pause.ELSEWHERE, _elsewhere(state)).after(events)
+        transition = drop_all(setup, state)
         seating = _enter(transition.state, Phase.SEEN, _seating(setup))
         return Transition(replace(seating, recent=()), (*events, *transition.events))
     if begins and not events:
@@ -445,79 +400,3 @@ def _asking(state: SwingState) -> Message:
     if state.heading is None:
         return LEAN_TO_YOUR_RIGHT
     return FOLLOW_ARROW
-
-
-def _is_new(rotations: FloatArray, detection: PenDetection, spacing: float) -> bool:
-    if not len(rotations):
-        return True
-    return bool(angles_between(detection.rotation[None], rotations).min() >= spacing)
-
-
-def _with_new(
-    setup: SwingSetup, rotations: FloatArray, detection: PenDetection
-) -> FloatArray:
-    """Return the postures, with that of the detection if it is new."""
-    if not _is_new(rotations, detection, setup.limits.spacing):
-        return rotations
-    return np.concatenate([rotations, detection.rotation[None]])
-
-
-def _flawed(
-    setup: SwingSetup, state: SwingState, detection: PenDetection, flaw: Reason
-) -> SwingState:
-    """Set the message on an unusable image, and count it once a posture."""
-    flawed = _with_new(setup, state.flawed_rotations, detection)
-    needed = certain_leds(setup.pen)
-    messages = {
-        Reason.TOO_FEW_LEDS: message(
-            Code.FEW_LEDS, seen=detection.n_leds, needed=needed
-        ),
-        Reason.BLURRED: TOO_FAST,
-        Reason.MISFIT: message(
-            Code.BAD_FIT, noise=detection.sigma, usual=state.kept.sigma
-        ),
-    }
-    return replace(
-        state,
-        message=messages[flaw],
-        flawed_rotations=flawed,
-        n_dropped=_more(state, len(flawed) - len(state.flawed_rotations), flaw),
-    )
-
-
-def _flaw(setup: SwingSetup, state: SwingState, detection: PenDetection) -> Reason:
-    """Return why an image with a new posture is of no use."""
-    if detection.n_leds < certain_leds(setup.pen):
-        return Reason.TOO_FEW_LEDS
-    if detection.is_blurred:
-        return Reason.BLURRED
-    usual = state.kept.sigma if state.n_kept >= FEW else np.inf
-    if detection.sigma > max(BAD_SIGMA * usual, SOME_SIGMA):
-        return Reason.MISFIT
-    return Reason.NONE
-
-
-def _dropped(state: SwingState, numbers: set[int]) -> Transition:
-    """Count rejected images, with an event."""
-    if not numbers:
-        return Transition(state)
-    state = replace(state, n_dropped=_more(state, len(numbers)))
-    return Transition(
-        state, (SwingEvent(SwingEventKind.SLIPPED, tuple(sorted(numbers))),)
-    )
-
-
-def _dropped_all(setup: SwingSetup, state: SwingState) -> Transition:
-    """Drop all images: they were taken while the tip was in a wrong place."""
-    numbers = set(map(int, state.kept.numbers))
-    kept = none_kept(setup.rig.n_cameras, setup.pen.n_leds, setup.assumptions)
-    return _dropped(replace(state, kept=kept), numbers)
-
-
-def _more(
-    state: SwingState, n_images: int, reason: Reason = Reason.SLIPPED
-) -> Counter[Reason]:
-    counts = Counter(state.n_dropped)
-    if n_images:
-        counts[reason] += n_images
-    return counts

@@ -10,7 +10,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -214,6 +214,27 @@ class SwingState:
     def counts(self) -> IntArray:
         """Kept images by field of the dial, (3, 8); upright in the first column."""
         return dial_counts(self.kept.rotations)
+
+    def with_dropped(
+        self, n_images: int, reason: Reason = Reason.SLIPPED
+    ) -> "SwingState":
+        """Return the state with more images counted as dropped."""
+        n_dropped = Counter(self.n_dropped)
+        if n_images:
+            n_dropped[reason] += n_images
+        return replace(self, n_dropped=n_dropped)
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """A swing after one more image."""
+
+    state: SwingState
+    events: tuple[SwingEvent, ...] = ()
+
+    def after(self, earlier: tuple[SwingEvent, ...]) -> "Transition":
+        """Return the transition with the events that came before it."""
+        return Transition(self.state, (*earlier, *self.events))
 
 
 def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:

@@ -26,7 +26,6 @@ from lightpen.simulator.swings import (
 )
 from lightpen.swing.capture.kept_images import kept_before
 from lightpen.swing.capture.rules import (
-    Transition,
     advance_swing,
     conclude,
     finish,
@@ -45,6 +44,7 @@ from lightpen.swing.capture.state import (
     SwingEventKind,
     SwingSetup,
     SwingState,
+    Transition,
     start_swing,
 )
 from lightpen.swing_messages import (
