@@ -22,8 +22,8 @@ from benchmarks.hostile_records import make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.archive.chains.chains import append, copy_entries, own_chain
 from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
+from lightpen.archive.chains.growth import append, copy_entries, own_chain
 from lightpen.archive.chains.seal import seal_of
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.queries import EntryFilter, last_accepted, newest

@@ -23,8 +23,9 @@ from benchmarks.hostile_records import NAMES, NOON
 from benchmarks.write_until_killed import tell
 from msgspec import structs
 
-from lightpen.archive.chains.chains import copy_entries, heads
+from lightpen.archive.chains.chains import heads
 from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
+from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.history.queries import EntryFilter, newest
 from lightpen.archive.logbook.logbook import Logbook
 from lightpen.errors import LightpenError

@@ -39,8 +39,8 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
-from lightpen.archive.chains.chains import append
 from lightpen.archive.chains.entries import Event, Kind
+from lightpen.archive.chains.growth import append
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, Stats, sealed
 from lightpen.detection.pen_detection import detect_from_centers, detect_pen

@@ -11,7 +11,7 @@ from subprocess import CompletedProcess
 import pytest
 from tests.core.archive.conftest import accepted
 
-from lightpen.archive.chains.chains import append, own_chain
+from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.logbook.lazy_logbook import SERVER
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook

@@ -8,8 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 
-from lightpen.archive.chains.chains import entries_of, own_chain
+from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.chains.entries import Kind
+from lightpen.archive.chains.growth import own_chain
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
 from lightpen.archive.store.database import open_file
 from lightpen.record.library.guard_files import LIMITS_FOLDER

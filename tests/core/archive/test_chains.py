@@ -13,15 +13,9 @@ from msgspec import structs
 from sqlalchemy import update
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import (
-    append,
-    copy_entries,
-    entries_of,
-    heads,
-    own_chain,
-    records_of,
-)
+from lightpen.archive.chains.chains import entries_of, heads, records_of
 from lightpen.archive.chains.entries import NOTHING_BEFORE, FileHash, Kind
+from lightpen.archive.chains.growth import append, copy_entries, own_chain
 from lightpen.archive.history.queries import (
     EntryFilter,
     last_accepted,

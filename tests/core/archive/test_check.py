@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains.chains import copy_entries, records_of
+from lightpen.archive.chains.chains import records_of
+from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.chains.seal import close_sealed, seal_of
 from lightpen.archive.checks.check import check_archive, check_file
 from lightpen.archive.store.database import look_into

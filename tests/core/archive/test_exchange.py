@@ -12,14 +12,9 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains.chains import (
-    append,
-    entries_of,
-    heads,
-    own_chain,
-    records_of,
-)
+from lightpen.archive.chains.chains import entries_of, heads, records_of
 from lightpen.archive.chains.entries import FileHash
+from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.checks.check import check_archive, check_file
 from lightpen.archive.logbook.logbook import ARCHIVE

@@ -12,8 +12,8 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import append
 from lightpen.archive.chains.entries import Event, Kind, StoredEntry
+from lightpen.archive.chains.growth import append
 from lightpen.archive.history.due import due_tips
 from lightpen.archive.history.history import TipState, known_names, lines, messages_on
 from lightpen.archive.history.listing import COLUMNS, save_entries

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import append, entries_of
+from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.chains.entries import Entry, Kind
+from lightpen.archive.chains.growth import append
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.due import due_tips
 from lightpen.archive.history.history import known_names

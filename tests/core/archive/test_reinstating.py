@@ -13,7 +13,7 @@ from msgspec import structs
 from tests.core.archive.conftest import Station
 from tests.core.archive.test_logbook import NAMES, checked, result
 
-from lightpen.archive.chains.chains import append, copy_entries, entries_of, records_of
+from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import (
     ChainHead,
     Event,
@@ -22,6 +22,7 @@ from lightpen.archive.chains.entries import (
     chained,
     text_sha256,
 )
+from lightpen.archive.chains.growth import append, copy_entries
 from lightpen.archive.history.due import due_tips
 from lightpen.archive.history.history import lines, messages_on
 from lightpen.archive.history.queries import EntryFilter, last_accepted

@@ -8,8 +8,9 @@ import pytest
 from sqlalchemy import update
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains.chains import copy_entries, entries_of, records_of
+from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
+from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.history import lines
 from lightpen.archive.history.queries import EntryFilter

@@ -15,8 +15,9 @@ from msgspec import structs
 from tests.core.archive.conftest import NOON
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains.chains import columns_of, entries_of, heads
+from lightpen.archive.chains.chains import entries_of, heads
 from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
+from lightpen.archive.chains.rows import columns_of
 from lightpen.archive.chains.seal import close_sealed, seal_of
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook

@@ -14,8 +14,8 @@ from sqlalchemy import delete, update
 from tests.core.archive.conftest import Station, accepted
 from tests.timestamp_authority import Tsa, running_tsa
 
-from lightpen.archive.chains.chains import append
 from lightpen.archive.chains.entries import NOTHING_BEFORE
+from lightpen.archive.chains.growth import append
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.checks.timestamps import (
     TIMESTAMPS,

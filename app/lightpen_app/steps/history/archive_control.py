@@ -8,7 +8,7 @@ from typing import TypeVar
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFileDialog
 
-from lightpen.archive.chains.chains import CopyResult
+from lightpen.archive.chains.growth import CopyResult
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.checks.recompute_check import with_recomputed
 from lightpen.archive.checks.timestamps import with_timestamps

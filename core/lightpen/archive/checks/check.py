@@ -1,6 +1,6 @@
 """Check of an archive for changes: its rows, chains and records."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import Row, exists, select, text
 
-from lightpen.archive.chains.chains import chain_at_home, heads, searchable, sound_entry
+from lightpen.archive.chains.chains import chain_at_home, heads
 from lightpen.archive.chains.entries import (
     NOTHING_BEFORE,
     SHORT,
@@ -16,6 +16,7 @@ from lightpen.archive.chains.entries import (
     named_entry,
     text_sha256,
 )
+from lightpen.archive.chains.rows import searchable, sound_entry
 from lightpen.archive.chains.seal import is_sealed_otherwise, lost_heads, read_seal
 from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys
 from lightpen.archive.checks.check_notes import check_notes
@@ -105,11 +106,9 @@ def _damage(database: Database) -> Iterator[Message]:
     """Yield what SQLite itself finds in its file."""
     if database.file is None:
         return
-    with database.reading() as connection:
-        found = connection.execute(text("PRAGMA integrity_check(10)")).scalars().all()
-    for each in found:
-        if each != SOUND:
-            yield message("archive.file-damaged", file=database.name, what=str(each))
+    for (found,) in database.rows(text("PRAGMA integrity_check(10)")):
+        if found != SOUND:
+            yield message("archive.file-damaged", file=database.name, what=str(found))
 
 
 def _broken_seal(database: Database, ends: tuple[ChainHead, ...]) -> Iterator[Message]:
@@ -175,15 +174,14 @@ def _head_now(database: Database, head: ChainHead) -> ChainHead:
     return next((h for h in heads(database) if h.chain == head.chain), head)
 
 
-def _rows_after(database: Database, chain: str, number: int) -> list[Row[Any]]:
+def _rows_after(database: Database, chain: str, number: int) -> Sequence[Row[Any]]:
     rows = (
         select(ENTRIES)
         .where(ENTRIES.c.chain == chain, ENTRIES.c.number > number)
         .order_by(ENTRIES.c.number)
         .limit(BATCH)
     )
-    with database.reading() as connection:
-        return list(connection.execute(rows))
+    return database.rows(rows)
 
 
 def _strays(database: Database) -> Iterator[Message]:
@@ -192,9 +190,7 @@ def _strays(database: Database) -> Iterator[Message]:
         return
     known = select(CHAINS.c.chain)
     strays = select(ENTRIES.c.chain).where(ENTRIES.c.chain.not_in(known)).distinct()
-    with database.reading() as connection:
-        found = connection.execute(strays).scalars().all()
-    for chain in found:
+    for (chain,) in database.rows(strays):
         yield message("archive.no-such-chain", chain=str(chain)[:SHORT])
 
 
@@ -202,8 +198,7 @@ def _changed_records(database: Database) -> Iterator[Message]:
     n_read = 0  # not paged by hash: a hash may be damaged, too
     in_order = select(RECORDS).order_by(RECORDS.c.sha256).limit(BATCH)
     while True:
-        with database.reading() as connection:
-            found = connection.execute(in_order.offset(n_read)).all()
+        found = database.rows(in_order.offset(n_read))
         for row in found:
             if not isinstance(row.text, str) or text_sha256(row.text) != row.sha256:
                 name = searchable(str(row.sha256))
@@ -223,9 +218,7 @@ def _lost_records(database: Database) -> Iterator[Message]:
     lost = select(ENTRIES.c.chain, ENTRIES.c.number).where(
         ENTRIES.c.record_sha256 != "", ~is_there
     )
-    with database.reading() as connection:
-        rows = connection.execute(lost).all()
-    for row in rows:
+    for row in database.rows(lost):
         yield message("archive.record-lost", entry=named_entry(row.chain, row.number))
 
 
@@ -233,9 +226,7 @@ def _entries_of(database: Database, record: str) -> tuple[Message, ...]:
     vouching = select(ENTRIES.c.chain, ENTRIES.c.number).where(
         ENTRIES.c.record_sha256 == record
     )
-    with database.reading() as connection:
-        rows = connection.execute(vouching).all()
-    found = tuple(named_entry(row.chain, row.number) for row in rows)
+    found = tuple(named_entry(row.chain, row.number) for row in database.rows(vouching))
     return found or (message("archive.no-entry"),)
 
 

@@ -22,8 +22,9 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy import select
 
-from lightpen.archive.chains.chains import READ, chain_at_home, heads, read_entries
+from lightpen.archive.chains.chains import chain_at_home, heads
 from lightpen.archive.chains.entries import SHORT, StoredEntry
+from lightpen.archive.chains.rows import READ, read_entries
 from lightpen.archive.checks.check import ArchiveCheckResult
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES

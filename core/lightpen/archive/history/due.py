@@ -8,8 +8,8 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import select
 
-from lightpen.archive.chains.chains import searchable
 from lightpen.archive.chains.entries import Kind, StoredEntry, since_us
+from lightpen.archive.chains.rows import searchable
 from lightpen.archive.history.history import known_names
 from lightpen.archive.history.queries import calibrating, last_accepted, of_chain
 from lightpen.archive.store.database import Database
@@ -109,7 +109,6 @@ def _swings(database: Database, chain: str, since: datetime) -> dict[str, list[i
         .order_by(ENTRIES.c.since_us)
     )
     swings = defaultdict[str, list[int]](list)
-    with database.reading() as connection:
-        for row in connection.execute(found):
-            swings[row.pen].append(row.since_us)
+    for row in database.rows(found):
+        swings[row.pen].append(row.since_us)
     return swings

@@ -6,8 +6,8 @@ from typing import Any
 
 from sqlalchemy import Row, select
 
-from lightpen.archive.chains.chains import READ, read_entries, sound_entry
 from lightpen.archive.chains.entries import IN_FORCE_BY, StoredEntry
+from lightpen.archive.chains.rows import READ, read_entries, sound_entry
 from lightpen.archive.history.queries import (
     IN_ORDER,
     EntryFilter,
@@ -84,8 +84,7 @@ def lines(
         )
         .order_by(*newest_first)
     )
-    with database.reading() as connection:
-        return tuple(map(_line, connection.execute(found)))
+    return tuple(map(_line, database.rows(found)))
 
 
 def messages_on(database: Database, entry: StoredEntry) -> tuple[StoredEntry, ...]:

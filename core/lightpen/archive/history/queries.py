@@ -14,7 +14,6 @@ from sqlalchemy import (
     tuple_,
 )
 
-from lightpen.archive.chains.chains import READ, read_entries, searchable
 from lightpen.archive.chains.entries import (
     IN_FORCE_BY,
     Entry,
@@ -22,6 +21,7 @@ from lightpen.archive.chains.entries import (
     StoredEntry,
     since_us,
 )
+from lightpen.archive.chains.rows import READ, read_entries, searchable
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import CHAINS, ENTRIES
 

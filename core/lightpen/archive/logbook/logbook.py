@@ -21,14 +21,13 @@ from msgspec import structs
 
 from lightpen.archive.chains.chains import (
     ArchivedFiles,
-    append,
     entries_of_limits,
     entry_of_result,
     heads,
-    own_chain,
     records_of,
 )
 from lightpen.archive.chains.entries import Event, Kind, StoredEntry, this_program
+from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.events.event_extraction import (
     ExtractedEvent,

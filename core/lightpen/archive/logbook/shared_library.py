@@ -15,9 +15,10 @@ from pathlib import Path
 from msgspec import structs
 from sqlalchemy import select, text
 
-from lightpen.archive.chains.chains import READ as OF_ENTRY
-from lightpen.archive.chains.chains import chain_at_home, read_entries, records_of
+from lightpen.archive.chains.chains import chain_at_home, records_of
 from lightpen.archive.chains.entries import Kind, StoredEntry, read_entry, text_sha256
+from lightpen.archive.chains.rows import READ as OF_ENTRY
+from lightpen.archive.chains.rows import read_entries
 from lightpen.archive.chains.signatures import ChainKeys
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES
@@ -143,9 +144,7 @@ def _copied(database: Database) -> Iterator[tuple[StoredEntry, LibraryChange]]:
 
 def _on_server(server: Database) -> Iterator[tuple[StoredEntry, LibraryChange]]:
     """Yield the changes of all stations that the first key of their chain signed."""
-    with server.reading() as connection:
-        rows = connection.execute(_SHARED).all()
-    for row in rows:
+    for row in server.rows(_SHARED):
         try:
             entry = read_entry(row.text, row.signature)
         except DamagedError:

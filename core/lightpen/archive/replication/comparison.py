@@ -121,8 +121,7 @@ def _block_hashes(database: Database, chain: str, end: int) -> list[str]:
             hashes[(number - 1) // BLOCK].update(f"{number} {digest};".encode())
         return [each.hexdigest() for each in hashes]
     wanted = {"size": BLOCK, "chain": chain, "end": end}
-    with database.reading() as connection:
-        found = {row.block: row.hash for row in connection.execute(_BLOCKS, wanted)}
+    found = {row.block: row.hash for row in database.rows(_BLOCKS, wanted)}
     return [found.get(n, sha256().hexdigest()) for n in range(n_blocks)]
 
 
@@ -134,5 +133,4 @@ def _hashes(
         .where(ENTRIES.c.chain == chain, ENTRIES.c.number.between(after + 1, end))
         .order_by(ENTRIES.c.number)
     )
-    with database.reading() as connection:
-        return [(row.number, row.sha256) for row in connection.execute(wanted)]
+    return [(row.number, row.sha256) for row in database.rows(wanted)]

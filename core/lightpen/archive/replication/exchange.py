@@ -20,16 +20,15 @@ from msgspec import Struct
 
 from lightpen.archive.chains.chains import (
     BATCH,
-    CopyResult,
     batch_of,
     chain_head,
-    copy_entries,
     entries_of,
     heads,
     note_delivered,
     records_of,
 )
 from lightpen.archive.chains.entries import StoredEntry, read_entry
+from lightpen.archive.chains.growth import CopyResult, copy_entries
 from lightpen.archive.replication.comparison import require_continued
 from lightpen.archive.store.database import Database
 from lightpen.errors import FileError, NameTakenError

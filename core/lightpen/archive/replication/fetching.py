@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from lightpen.archive.chains.chains import (
-    adopt_entries,
     batch_of,
     chain_at_home,
     chain_head,
@@ -20,6 +19,7 @@ from lightpen.archive.chains.chains import (
     records_of,
 )
 from lightpen.archive.chains.entries import SHORT, StoredEntry
+from lightpen.archive.chains.growth import adopt_entries
 from lightpen.archive.replication.comparison import first_difference
 from lightpen.archive.store.database import Database
 from lightpen.errors import ArchiveError, NameTakenError

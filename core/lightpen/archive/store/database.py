@@ -7,7 +7,7 @@ of an earlier version is brought up to date by the steps in the folder ``migrati
 
 import socket
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import (
     AbstractContextManager,
     closing,
@@ -20,13 +20,16 @@ from functools import partial
 from pathlib import Path
 from threading import Timer
 from time import monotonic, sleep
+from typing import Any
 
 from sqlalchemy import (
     Column,
     Connection,
     Engine,
+    Executable,
     MetaData,
     PrimaryKeyConstraint,
+    Row,
     String,
     Table,
     create_engine,
@@ -81,6 +84,13 @@ class Database:
         """Read within one transaction."""
         with self._used(self.engine) as connection:
             yield connection
+
+    def rows(
+        self, wanted: Executable, values: Mapping[str, Any] | None = None
+    ) -> Sequence[Row[Any]]:
+        """Return the rows that a query finds, with values of its parameters."""
+        with self.reading() as connection:
+            return connection.execute(wanted, values).all()
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:

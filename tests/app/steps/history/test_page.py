@@ -30,8 +30,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 
-from lightpen.archive.chains.chains import append, own_chain
 from lightpen.archive.chains.entries import Event, Kind
+from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook.logbook import ARCHIVE

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.archive.chains.chains import append, own_chain
 from lightpen.archive.chains.entries import Event, Kind, StoredEntry
+from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.history.queries import EntryFilter
 from lightpen.archive.store.database import Database, open_file
 from lightpen.model.limits import VerificationLimits
