@@ -4,7 +4,7 @@ That it is right is shown by the other tests; that nothing changes unnoticed, he
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from tests.reference import assert_as_before, text_figures
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.plan import Plan
+from lightpen.messages import Message
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
@@ -33,7 +34,7 @@ from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.plane import PlaneOptions
 from lightpen.verification.tasks.probed_point import ProbedPoint
-from lightpen.verification.tasks.registry import AnyTask, task_of
+from lightpen.verification.tasks.registry import ALL_TASKS, AnyTask, task_of
 from lightpen.verification.tasks.repeatability import (
     STUDY,
     TipEstimate,
@@ -58,7 +59,8 @@ Named = tuple[tuple[str, tuple[ProbedPoint, ...]], ...]
 
 ENDS = PAPER_CONE + np.array([[-75.0, 0.0, 0.0], [75.0, 4.0, 20.0]])
 LIMITS = VerificationLimits(form=0.12)
-HOLES = Plan("Holes", plate_plan().features[:4])
+PLATE = plate_plan()
+HOLES = Plan("Holes", PLATE.features[:4])
 DENTS = 0.003 * (-1.0) ** np.arange(25)
 DRIFT = np.array([0.004, 0.001, 0.006])
 
@@ -68,10 +70,12 @@ def spread(points: FloatArray, seed: int, by: float = 0.01) -> FloatArray:
     return points + by * np.random.default_rng(seed).standard_normal(points.shape)
 
 
-def plate_runs(touching: Touching) -> Iterator[tuple[str, tuple[ProbedPoint, ...]]]:
-    """Return the points of a face and two holes of the simulated plate."""
-    options = PartOptions(HOLES)
-    for run, planned in enumerate(HOLES.features):
+def plate_runs(
+    touching: Touching, plan: Plan
+) -> Iterator[tuple[str, tuple[ProbedPoint, ...]]]:
+    """Return the points of features of the simulated plate."""
+    options = PartOptions(plan)
+    for run, planned in enumerate(plan.features):
         places = []
         for step in range(planned.n_touches):
             goal = PART.hand(options, run, step)
@@ -105,6 +109,7 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
         (f"run {k}", touching(spread(ring(20 + k), k), seed=k, n_frames=1 + k))
         for k in range(3)
     ]
+    whole = tuple(plate_runs(touching, PLATE))
     return {
         "fixed point": (FixedPointOptions(), (("", touching(spread(cone, 1))),)),
         "fixed point, lifted": (
@@ -149,7 +154,9 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
             PlaneOptions(0.004, 9),
             (("", touching(spread(PAPER_CONE + tilted, 4), n_frames=2)),),
         ),
-        "part": (PartOptions(HOLES), tuple(plate_runs(touching))),
+        "part": (PartOptions(HOLES), tuple(plate_runs(touching, HOLES))),
+        "part, whole": (PartOptions(PLATE), whole),
+        "part, not whole": (PartOptions(PLATE), whole[:6]),
         "articulation": (
             ArticulationOptions(),
             tuple(zip("abcde", again, strict=True)),
@@ -174,6 +181,7 @@ CASES = (
     *("circle, not round", "circle, lifted", "circle, uncertain", "circle, another"),
     *("sphere, too large", "sphere, another", "sphere, uncertain", "sphere, not round"),
     *("sphere, lifted", "articulation, one run"),
+    *("part", "part, whole", "part, not whole"),
 )
 
 
@@ -189,22 +197,30 @@ def conditions(instrument: Instrument) -> Conditions:
     )
 
 
-def shown(tables: tuple[ResultTable, ...]) -> list[dict[str, Any]]:
-    """Return tables as mappings of names, figures and codes."""
-    return [
-        {
-            "code": table.title.code,
-            "columns": len(table.columns),
+def shown(tables: tuple[ResultTable, ...]) -> dict[str, Any]:
+    """Return tables by their codes; each quantity apart, whatever its size."""
+    return {
+        table.title.code: {
+            "columns": [{"name": code_of(each)} for each in table.columns],
+            "notes": table.notes,
             "rows": [
                 {
-                    "decimals": row.decimals,
-                    "values": [v for v in row.values if not isinstance(v, str)],
+                    code_of(row.name): {
+                        "decimals": row.decimals,
+                        "remark": row.remark,
+                        "values": {str(i): v for i, v in enumerate(row.values)},
+                    }
                 }
                 for row in table.rows
             ],
         }
         for table in tables
-    ]
+    }
+
+
+def code_of(name: Message | str) -> str:
+    """Return what a row or column is known by, however it is worded."""
+    return name.code if isinstance(name, Message) else name
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -275,7 +291,7 @@ def test_how_a_task_goes_on_is_as_before(
     goals = [task.hand(options, i, k) for i in range(2) for k in range(6)]
     about = {
         "hand": [[g.point, g.tilt, g.direction] for g in goals],
-        "newness": task.newness(options),
+        "newness": dict(zip(("turn", "distance"), task.newness(options), strict=True)),
         "needed": [task.n_points(options), task.n_runs(options)],
     }
 
@@ -320,6 +336,26 @@ def test_how_well_tips_repeat_is_as_before(tmp_path: Path) -> None:
             "texts": [text_figures(repeatability_text(each)) for each in (found, few)],
         },
     )
+
+
+def test_what_can_be_entered_is_as_before() -> None:
+    tasks = {
+        task.kind: {
+            "fields": {
+                each.name: asdict(each) | {"usual": getattr(task.options(), each.name)}
+                for each in task.fields
+            },
+            "traits": {
+                each.name: value
+                for each in fields(task)
+                if isinstance(value := getattr(task, each.name), bool)
+            },
+            "scans": [task.scans(task.options(), run) for run in range(2)],
+        }
+        for task in ALL_TASKS
+    }
+
+    assert_as_before("verification-tasks", tasks)
 
 
 @pytest.mark.parametrize(
