@@ -1,0 +1,417 @@
+"""Whole verifications publish and keep the same as before, event by event.
+
+That it is right is shown by the other tests; that nothing changes unnoticed, here. The
+workflow runs without threads: what it has done in the background is done when a test
+says so.
+"""
+
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.accepted_tip import Hold, Holder, accept_tip, leant, round_a_ring
+from tests.reference import assert_as_before
+from tests.verifying import BAR, CHOICES, FRAME, NOON, TABLE
+
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.errors import LightpenError
+from lightpen.formats.decoding import encode_png
+from lightpen.measuring.plan import Plan, PlannedFeature, Side
+from lightpen.measuring.surfaces import FeatureKind
+from lightpen.messages import Message
+from lightpen.model.rig import rig_of
+from lightpen.record.folder.verifications import VERIFICATIONS
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import set_password
+from lightpen.record.results.result_folder import SIMULATED, FolderArchive
+from lightpen.runners.serial_queue import Act, Report, T, Task
+from lightpen.simulator.image_plans import plan_scene, render_plan
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import PAPER_TIP
+from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.session.status import SessionEventKind, VerificationStatus
+from lightpen.verification.storage.checkpoint import find_interrupted
+from lightpen.verification.storage.resuming import abandon_interrupted
+from lightpen.verification.tasks.circle import SIMULATED_RADIUS, CircleOptions
+from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
+from lightpen.verification.workflow import VerificationWorkflow
+
+UPRIGHT = (Hold(tilt=0.0),) * 3
+EVE = Signature("Eve", "correct horse")
+# Texts that differ from run to run: hashes, times, processes, folders
+CHANGING = re.compile(
+    r"[0-9a-f]{64}|\d{4}-\d\d-\d\dT.*|\d{8}-\d{6}_LP-04_T-10(-\d+)*|^/.*"
+)
+
+
+class Trace:
+    """A workflow, and a list of all that it publishes."""
+
+    def __init__(self, folder: Path, prepared: Preparation) -> None:
+        self.folder, self.prepared = folder, prepared
+        self.told: list[dict[str, Any]] = []
+        self._waiting: list[Act] = []
+        archive = FolderArchive(folder)
+        self.workflow = VerificationWorkflow(
+            archive, folder, self, lambda: NOON, self._begin
+        )
+        assert prepared.camera is not None
+        assert prepared.pen is not None
+        self.holder = Holder(rig_of(prepared.camera), prepared.pen)
+
+    def _begin(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Message], None],
+        on_bug: Act,
+        on_progress: Report,
+    ) -> Task:
+        task = Task()
+
+        def run() -> None:
+            try:
+                outcome = partial(then, work(on_progress))
+            except LightpenError as error:
+                outcome = partial(otherwise, error.message)
+            if not task.is_cancelled:
+                outcome()
+
+        self._waiting.append(run)
+        return task
+
+    def settle(self) -> None:
+        """Have done what waits in the background."""
+        while self._waiting:
+            self._waiting.pop(0)()
+
+    def come(self, choices: VerificationChoices = CHOICES) -> None:
+        self.workflow.choose(self.prepared, choices)
+        self.workflow.come()
+        self.settle()
+
+    def see(self, detections: Iterator[PenDetection]) -> None:
+        region = self.workflow.status.region
+        assert region is not None
+        for detection in detections:
+            self.workflow.take(FRAME, detection, region)
+
+    def touch(self, *holds: Hold, n_images: int = 6) -> None:
+        for hold in holds:
+            self.see(self.holder.still(hold, n_images))
+
+    def pick_up(self) -> None:
+        self.touch(TABLE, n_images=1)
+
+    # What it publishes
+
+    def on_verification(
+        self, status: VerificationStatus, events: tuple[SessionEventKind, ...]
+    ) -> None:
+        self.told.append({"events": named(*events), **snapshot(status)})
+
+    def on_progress(self, fraction: float) -> None:
+        self.told.append({"progress": fraction})
+
+    def on_fault(self, message: Message) -> None:
+        self.told.append({"fault": message})
+
+    def on_fault_cleared(self, message: Message) -> None:
+        self.told.append({"cleared": message})
+
+    def assert_as_before(self, name: str) -> None:
+        """Compare all that was published, and what is in the folder now."""
+        assert_as_before(
+            f"workflow-{name}",
+            {"told": self.told, "kept": list(files_in(self.folder / SIMULATED))},
+        )
+
+
+def named(*texts: object) -> list[dict[str, str]]:
+    """Return texts that are compared."""
+    return [{"name": CHANGING.sub("*", str(each))} for each in texts]
+
+
+def snapshot(status: VerificationStatus) -> dict[str, Any]:
+    """Return what a status says."""
+    state, task = status.state, status.task
+    found = status.assessment
+    return {
+        "is": named(status.reading, "" if task is None else task.kind),
+        "flags": [
+            *(status.is_here, status.is_paused, status.is_touching, status.is_done),
+            *(status.tip is not None, status.region is not None),
+            status.began is not None,
+        ],
+        "refusal": status.refusal,
+        "files": named(*(each.name for each in status.files), status.accepted_by),
+        "lamps": None if status.lamp_drift is None else status.lamp_drift.moved,
+        "verdict": None if found is None else [found.reason, *named(found.grade)],
+        "state": None
+        if state is None
+        else {
+            "phase": named(state.touching.phase, *state.found),
+            "counts": [len(state.touches), *map(len, (*state.runs, *state.visits))],
+            "pending": named(*(each.task for each in state.pending)),
+            "last": [each.point_cam for each in state.touches[-1:]],
+        },
+    }
+
+
+def files_in(folder: Path) -> Iterator[Any]:
+    """Return names and content of the files of verifications."""
+    for file in sorted((folder / VERIFICATIONS).rglob("*")):
+        yield named(file.relative_to(folder))
+        if file.suffix == ".json":
+            yield tree_of(json.loads(file.read_bytes()))
+        elif file.suffix == ".jsonl":
+            yield [tree_of(json.loads(each)) for each in file.read_text().splitlines()]
+
+
+def tree_of(entry: Any) -> Any:
+    """Return a content with its texts compared, too."""
+    if isinstance(entry, dict):
+        return {
+            name: tree_of(each)
+            for name, each in entry.items()
+            if name not in {"program", "checksum", "text", "created", "size"}
+        }
+    if isinstance(entry, list):
+        return [tree_of(each) for each in entry]
+    return named(entry) if isinstance(entry, str) else entry
+
+
+@pytest.fixture
+def trace(tmp_path: Path, prepared: Preparation) -> Trace:
+    """A tip is in force."""
+    accept_tip(tmp_path, prepared)
+    return Trace(tmp_path, prepared)
+
+
+@pytest.fixture(scope="module")
+def recorded(prepared: Preparation, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five images of the pen in the cone, each in another posture."""
+    assert prepared.camera is not None
+    scene = Scene(n_images=5, camera=prepared.camera)
+    folder = tmp_path_factory.mktemp("touches")
+    for plan in plan_scene(scene).image_plans:
+        image = render_plan(scene, plan)
+        (folder / f"{plan.index}.png").write_bytes(encode_png(image))
+    return folder
+
+
+def test_a_verification_with_pauses_and_points_taken_back(trace: Trace) -> None:
+    act = trace.workflow
+    trace.come()
+    act.undo()  # nothing yet
+    trace.pick_up()
+    trace.touch(leant(4)[0])
+    trace.touch(leant(4)[0])  # is known
+    trace.touch(leant(4)[1], n_images=3)
+    trace.see(trace.holder.away(2))  # broken off
+    trace.touch(leant(4)[2])
+    act.undo()
+    act.toggle_pause()
+    trace.touch(leant(4)[2])
+    act.toggle_pause()
+    trace.pick_up()
+    act.leave()
+    trace.touch(leant(4)[2])
+    act.come()
+    trace.settle()
+    trace.pick_up()
+    trace.touch(*leant(4)[1:])
+    trace.pick_up()
+    trace.touch(*round_a_ring(11, 31.751)[:10])
+    act.accept("Too early.")
+    trace.pick_up()
+    trace.touch(*BAR)
+    act.accept(" ")
+    act.touch_anew(FIXED_POINT)
+    trace.pick_up()
+    trace.touch(*leant(3))
+    act.end_task()
+    act.accept("Seen on another station.")
+    act.accept("Once more.")
+    act.shut_down()
+
+    trace.assert_as_before("usual")
+
+
+def test_a_verification_with_other_choices(
+    trace: Trace, recorded: Path, tmp_path: Path
+) -> None:
+    act = trace.workflow
+    act.come()  # nothing is chosen
+    act.end_task()
+    act.choose(trace.prepared, VerificationChoices(()))
+    trace.settle()
+    trace.come(replace(CHOICES, kinds=("circle",), options=()))
+    trace.come()
+    trace.come()  # the same
+    trace.pick_up()
+    trace.touch(*leant(4)[:2])
+    act.choose(trace.prepared, CHOICES.with_options(FixedPointOptions(n_touches=3)))
+    trace.touch(leant(4)[2])
+    trace.pick_up()
+    trace.touch(*round_a_ring(11, 31.751)[:3])
+    faster = replace(CHOICES.with_options(FixedPointOptions(n_touches=3)), n_frames=2)
+    act.choose(trace.prepared, faster)
+    trace.pick_up()
+    trace.touch(*round_a_ring(11, 31.751)[:10])
+    radius = SIMULATED_RADIUS + 0.2
+    act.choose(trace.prepared, faster.with_options(CircleOptions(radius, 0.001)))
+    act.read(FIXED_POINT, str(recorded), is_still=False)
+    act.read(FIXED_POINT, str(tmp_path), is_still=False)  # one at a time
+    trace.settle()
+    act.read(FIXED_POINT, str(tmp_path / "nothing"), is_still=True)
+    trace.settle()
+    act.read(FIXED_POINT, str(recorded), is_still=False)
+    act.cancel()
+    trace.settle()
+    other = replace(trace.prepared, source=SourceChoice(place="other"))
+    act.choose(other, faster)
+    trace.settle()
+    accept_tip(trace.folder, trace.prepared, seed=4)
+    act.leave()
+    act.come()
+    trace.settle()
+    trace.pick_up()
+    trace.touch(leant(4)[0])
+    act.start_over()
+    trace.settle()
+    trace.pick_up()
+    trace.touch(leant(4)[0])
+    act.recover()
+    act.shut_down()
+
+    trace.assert_as_before("other-choices")
+
+
+def test_a_tip_that_fails(trace: Trace) -> None:
+    act = trace.workflow
+    bent = PAPER_TIP + np.array([0.3, 0.0, 0.0])
+    trace.holder = Holder(trace.holder.rig, trace.holder.pen, bent)
+    trace.come(replace(CHOICES, kinds=(FIXED_POINT.kind,)))
+    trace.pick_up()
+    trace.touch(*leant(4))
+    act.accept("It will do.")
+    set_password(trace.folder, EVE, EVE.password, NOON)
+    act.accept("It will do.", replace(EVE, password="wrong"))
+    act.accept("It will do.", EVE)
+    act.shut_down()
+
+    trace.assert_as_before("failed")
+
+
+def in_turn(trace: Trace) -> Iterator[Callable[[], None]]:
+    """Yield what is done in a verification with a witness, hold by hold."""
+
+    def lifted(hold: Hold) -> None:
+        trace.touch(hold)
+        trace.see(trace.holder.away(3))
+
+    for holds in (leant(4), round_a_ring(11, 31.751)[:10], ()):
+        yield from [partial(lifted, hold) for hold in UPRIGHT]
+        yield from [partial(trace.touch, hold) for hold in holds]
+
+
+@pytest.mark.parametrize("n_acts", [2, 8, 12])
+def test_a_verification_that_is_resumed(
+    trace: Trace,
+    prepared: Preparation,
+    tmp_path_factory: pytest.TempPathFactory,
+    n_acts: int,
+) -> None:
+    witnessed = replace(CHOICES, kinds=("fixed point", "circle", DRIFT.kind))
+    trace.come(witnessed)
+    trace.pick_up()
+    for act in [*in_turn(trace)][:n_acts]:
+        act()
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(trace.folder, copy)
+    trace.workflow.shut_down()
+
+    again = Trace(copy, prepared)
+    (interrupted,) = find_interrupted(copy)
+    again.workflow.go_on(interrupted)  # nothing is chosen
+    again.workflow.choose(prepared, replace(witnessed, n_frames=5))
+    again.workflow.come()
+    again.settle()
+    again.workflow.go_on(interrupted)
+    again.workflow.go_on(interrupted)  # is going on
+    again.settle()
+    again.pick_up()
+    for act in [*in_turn(again)][n_acts:]:
+        act()
+    again.workflow.go_on(interrupted)
+    again.settle()
+    again.workflow.shut_down()
+    assert find_interrupted(copy) == ()
+
+    again.assert_as_before(f"resumed-{n_acts}")
+
+
+def test_a_verification_that_is_closed(trace: Trace) -> None:
+    trace.come()
+    trace.pick_up()
+    trace.touch(*leant(4), *round_a_ring(11, 31.751)[:2])
+    copy = trace.folder / "copy"
+    shutil.copytree(trace.folder / SIMULATED, copy / SIMULATED)
+    trace.workflow.shut_down()
+    (interrupted,) = find_interrupted(copy)
+    abandon_interrupted(copy, interrupted, NOON)
+
+    closed = Trace(copy, trace.prepared)
+    assert find_interrupted(copy) == ()
+    closed.assert_as_before("closed")
+
+
+def over_and_at(places: Sequence[Sequence[float]]) -> list[Hold]:
+    """Return holds above places and on them."""
+    return [
+        Hold(tuple(np.add(place, [0.0, up, 0.0]).tolist()), tilt=0.1)
+        for place in places
+        for up in (-8.0, 0.0)
+    ]
+
+
+def test_a_part_that_is_moved(trace: Trace) -> None:
+    act = trace.workflow
+    places = np.array([[0.0, 0, 0], [40, 0, 0], [0, 30, 0], [40, 30, 5]])
+    plan = Plan(
+        "Points",
+        tuple(
+            PlannedFeature(f"p{i}", FeatureKind.POINT, side=Side.OUTSIDE)
+            for i in range(len(places))
+        ),
+    )
+    choices = VerificationChoices((PART.kind,), (PartOptions(plan),), n_frames=2)
+    act.part_moved()
+    trace.come(choices)
+    trace.pick_up()
+    act.part_moved()  # too early
+    trace.touch(*over_and_at(places[:3].tolist()))
+    act.part_moved()
+    away = places + np.array([3.0, -2.0, 4.0])
+    trace.touch(*over_and_at(away[:2].tolist()))
+    act.undo()
+    trace.touch(*over_and_at(away[1:].tolist()))
+    act.touch_anew(PART)
+    trace.pick_up()
+    trace.touch(*over_and_at(places[:1].tolist()))
+    act.shut_down()
+
+    trace.assert_as_before("part")
