@@ -121,7 +121,10 @@ def _find(producer: str) -> tuple[FoundDevice, ...]:
     if sys.platform == "linux":
         folders = sorted(LISTED.glob("video*")) if LISTED.is_dir() else []
         return tuple(
-            FoundDevice(folder.name.removeprefix("video"), _name(folder))
+            FoundDevice(
+                folder.name.removeprefix("video"),
+                f"{(folder / 'name').read_text().strip()} ({folder.name})",
+            )
             for folder in folders
             if (folder / "index").read_text().strip() == "0"  # others hold no images
         )
@@ -132,10 +135,6 @@ def _find(producer: str) -> tuple[FoundDevice, ...]:
             found.append(FoundDevice(str(number), str(number)))
         capture.release()
     return tuple(found)
-
-
-def _name(folder: Path) -> str:
-    return f"{(folder / 'name').read_text().strip()} ({folder.name})"
 
 
 def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:

@@ -99,13 +99,12 @@ def _change(options: argparse.Namespace) -> None:
 
 
 @printing
-def _retire(options: argparse.Namespace) -> None:
-    _set_retired(options, is_retired=True)
-
-
-@printing
-def _return(options: argparse.Namespace) -> None:
-    _set_retired(options, is_retired=False)
+def _set_retired(options: argparse.Namespace) -> None:
+    data, kind = _data(options), ItemKind(options.kind)
+    is_retired = options.action == "retire"
+    by, now = _author(options), local_now()
+    library = retire_item(data, kind, options.id, by, now, is_retired=is_retired)
+    _enter_and_print(options, known_item(library, kind, options.id), library)
 
 
 @printing
@@ -152,8 +151,8 @@ ACTIONS: dict[str, Command] = {
     "list": _list,
     "add": _add,
     "change": _change,
-    "retire": _retire,
-    "return": _return,
+    "retire": _set_retired,
+    "return": _set_retired,
     "share": _share,
     "spin": _spin,
 }
@@ -166,19 +165,6 @@ def _spun(options: argparse.Namespace) -> SpinFit:
         seen = observe_images(find_images(*options.images), camera, pen, report)
     fit = [i for i, reason in enumerate(seen.reasons) if not reason]
     return fit_spin(seen.rotations[fit])
-
-
-def _set_retired(options: argparse.Namespace, *, is_retired: bool) -> None:
-    kind = ItemKind(options.kind)
-    library = retire_item(
-        _data(options),
-        kind,
-        options.id,
-        _author(options),
-        local_now(),
-        is_retired=is_retired,
-    )
-    _enter_and_print(options, known_item(library, kind, options.id), library)
 
 
 def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:

@@ -69,7 +69,7 @@ class AutoExposure:
             outcome = ExposureState.NO_LEDS if n_blind >= MAX_BLIND else self.outcome
             return replace(self, n_blind=n_blind, outcome=outcome)
         level = brightest_level(frame, spots, leds.chosen)
-        light = _light(self.asked)
+        light = (self.asked.exposure_us or 0.0) * _gain(self.asked.gain_db)
         seen = replace(self, level=level, n_blind=0, n_steps=self.n_steps + 1)
         if leds.exposure.n_saturated:
             seen = replace(seen, saturating=min(self.saturating, light))
@@ -131,7 +131,3 @@ def brightest_level(frame: Frame, spots: Spots, chosen: IntArray) -> float:
 
 def _gain(gain_db: float | None) -> float:
     return float(10 ** ((gain_db or 0.0) / 20))
-
-
-def _light(settings: CameraSettings) -> float:
-    return (settings.exposure_us or 0.0) * _gain(settings.gain_db)

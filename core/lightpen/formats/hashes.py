@@ -63,8 +63,5 @@ def all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:
     n_each = -(-len(paths) // n_threads) or 1  # taking one by one, threads wait in turn
     shares = [paths[i : i + n_each] for i in range(0, len(paths), n_each)]
     with ThreadPoolExecutor(n_threads) as executor:
-        return tuple(chain.from_iterable(executor.map(_hashed_in_turn, shares)))
-
-
-def _hashed_in_turn(paths: Sequence[Path]) -> list[InputFile]:
-    return [hashed(path) for path in paths]
+        found = executor.map(lambda some: list(map(hashed, some)), shares)
+        return tuple(chain.from_iterable(found))

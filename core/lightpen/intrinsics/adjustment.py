@@ -189,7 +189,7 @@ def _step(
     weight = sigma**-2
     own = weight * system.own
     # A view without points leaves nothing to divide by.
-    own = own + (damping * _diagonals(own) + 1e-12 * np.eye(N_POSE))
+    own = own + (damping * (own * np.eye(N_POSE)) + 1e-12 * np.eye(N_POSE))
     shared = weight * system.shared.sum(axis=0) + prior
     shared = shared + damping * np.diag(np.diag(shared))
     right = weight * system.right.sum(axis=0) - prior @ _away(state, origin)
@@ -215,10 +215,6 @@ def _eliminated(system: _System) -> tuple[FloatArray, FloatArray]:
     information = system.shared - system.cross @ solved
     scores = system.right - np.einsum("viq,vi->vq", solved, system.own_right)
     return information, scores
-
-
-def _diagonals(matrices: FloatArray) -> FloatArray:
-    return np.asarray(matrices * np.eye(matrices.shape[-1]))
 
 
 def _cost_of(

@@ -274,7 +274,8 @@ def _calibrated(
         kept, tolerances, fitted, report, has_k3=has_k3
     )
     _require_determined(fitted)
-    _require_no_fold(fitted.state.cameras[0])
+    if folds(fitted.state.cameras[0]):
+        raise CalibrationError("intrinsics.folds")
     _message_on_projection(fitted)
     choice, effects = _fit_unfolded(kept, tolerances, choice, fitted)
     return _Found(kept, left_out, denied, choice, held_out, effects)
@@ -366,11 +367,6 @@ def _n_points_left_out(views: Views, kept: Views) -> int:
     """Return the number of excluded points in accepted views."""
     taking_part = np.isin(views.names, kept.names)
     return int(views.seen[taking_part].sum()) - int(kept.seen.sum())
-
-
-def _require_no_fold(camera: Camera) -> None:
-    if folds(camera):
-        raise CalibrationError("intrinsics.folds")
 
 
 def _message_on_projection(fitted: BoardFit, apart: float = 0.0) -> Message | None:

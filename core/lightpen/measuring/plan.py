@@ -350,7 +350,11 @@ def _alignment_problems(
         if any(used):
             yield "the alignment has either plane, line and point, or points"
         yield from _unknown("alignment", alignment.points, known)
-        nominal = {each.name for each in plan.features if _has_origin(each)}
+        nominal = {
+            each.name
+            for each in plan.features
+            if each.nominal is not None and each.nominal.origin is not None
+        }
         for name in alignment.points:
             if name not in nominal:
                 yield f"the alignment needs a nominal origin of {name!r}"
@@ -358,10 +362,6 @@ def _alignment_problems(
         yield "the alignment needs plane, line and point, or points"
     else:
         yield from _unknown("alignment", used, known)
-
-
-def _has_origin(feature: PlannedFeature) -> bool:
-    return feature.nominal is not None and feature.nominal.origin is not None
 
 
 def _has_known_form(feature: PlannedFeature) -> bool:

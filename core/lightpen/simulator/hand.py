@@ -180,7 +180,7 @@ class Operator:
 
     def hold(self) -> None:
         """Hold the pen still."""
-        self._wish(self._aim_here)
+        self._wish(lambda: self._aim(self._lean, GUIDED))
 
     def lean_towards(self, tilt: float, direction: float, turn: float) -> None:
         """Tilt the pen to a posture, angles in rad, with human dynamics."""
@@ -294,9 +294,6 @@ class Operator:
 
     def _aim(self, goal: FloatArray | None, pursuit: TrackingMotion) -> None:
         self._goal, self._pursuit = goal, pursuit
-
-    def _aim_here(self) -> None:
-        self._aim(self._lean, GUIDED)
 
     def _slip(self, distance: float, seconds: float) -> None:
         direction = self._rng.standard_normal(3)

@@ -59,7 +59,9 @@ def pose_messages(
     time of exposure, s since 1970 (UTC).
     """
     basic = {"Image": str(number), "Units": "mm rad"}
-    sigma = detection.sigma if tip is None else _sigma(detection, tip.instrument)
+    sigma = detection.sigma
+    if tip is not None:  # the noise is partly known before
+        sigma = float(np.fmax(sigma, tip.instrument.sigma))
     covariance = detection.cofactors * sigma**2
     R = detection.rotation
     sent = _transform(
@@ -76,11 +78,6 @@ def pose_messages(
     return sent + _transform(
         TIP, R, place, at, {**basic, **named, **_covariance(spread, "x y z")}
     )
-
-
-def _sigma(detection: PenDetection, instrument: Instrument) -> float:
-    """Return the noise of an image coordinate, px, partly from prior knowledge."""
-    return float(np.fmax(detection.sigma, instrument.sigma))
 
 
 def _place_of_tip(

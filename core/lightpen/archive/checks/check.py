@@ -134,7 +134,8 @@ def _walked(
     while True:
         rows = _rows_after(database, head.chain, number)
         if not rows:
-            head = _head_now(database, head)
+            # As it is now, or as it was if the chain is gone.
+            head = next((h for h in heads(database) if h.chain == head.chain), head)
             if number >= head.number or not _rows_after(database, head.chain, number):
                 break
         sound = []
@@ -167,11 +168,6 @@ def _walked(
         yield _missing(head.chain, number + 1, head.number)
     elif (number, previous) != (head.number, head.sha256) and previous:
         yield message("archive.head-changed", chain=head.chain[:SHORT])
-
-
-def _head_now(database: Database, head: ChainHead) -> ChainHead:
-    """Return the present head of a chain, or the earlier one if the chain is gone."""
-    return next((h for h in heads(database) if h.chain == head.chain), head)
 
 
 def _rows_after(database: Database, chain: str, number: int) -> Sequence[Row[Any]]:

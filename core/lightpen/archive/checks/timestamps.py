@@ -12,7 +12,6 @@ References
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from http.client import HTTPException
@@ -124,7 +123,11 @@ def with_timestamps(
         if files and by.certificate is None:
             notes.append(message("archive.timestamps-unverified", n=len(files)))
         if files or by.address:
-            notes += _waiting(database, home, last)
+            notes += [
+                message("archive.not-timestamped", n=head.number - last, after=last)
+                for head in heads(database)
+                if head.chain == home and head.number > last
+            ]
     except ArchiveError as error:  # the package is not installed
         notes.append(error.message)
     except FileError as error:
@@ -286,10 +289,3 @@ def _stored_finding(
 def _entry(database: Database, chain: str, number: int) -> StoredEntry | None:
     wanted = select(*READ).where(ENTRIES.c.chain == chain, ENTRIES.c.number == number)
     return next(iter(read_entries(database, wanted)), None)
-
-
-def _waiting(database: Database, home: str | None, last: int) -> Iterator[Message]:
-    """Yield how many entries came after the last timestamp."""
-    for head in heads(database):
-        if head.chain == home and head.number > last:
-            yield message("archive.not-timestamped", n=head.number - last, after=last)

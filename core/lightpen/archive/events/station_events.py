@@ -16,7 +16,6 @@ from lightpen.record.folder.camera_calibrations import (
 from lightpen.record.folder.verifications import (
     TOUCHES,
     VERIFICATIONS,
-    StoredVerification,
     read_verification,
 )
 from lightpen.record.library.guard_files import LIMITS_FOLDER, read_limits_change
@@ -107,7 +106,11 @@ def _of_tip(
 ) -> Event:
     """Return the verification of a tip."""
     done = read_verification(content, file)
-    verdict = done.verdict
+    verdict, touches = done.verdict, file.parent / TOUCHES
+    journals = tuple(  # they name the images
+        FileHash(results.place_of(touches / run.folder / JOURNAL), run.journal_sha256)
+        for run in done.inputs.touches
+    )
     limits = {} if verdict is None else verdict.limits_mm
     settings: dict[str, Plain] = {
         "verified": done.verification,
@@ -127,15 +130,6 @@ def _of_tip(
         outcome=done.outcome,
         settings=settings,
         result=place,
-        files=tuple(_touched(results, file, done)),
+        files=journals,
         record_sha256=place.sha256,
     )
-
-
-def _touched(
-    results: FolderArchive, file: Path, done: StoredVerification
-) -> Iterator[FileHash]:
-    """Yield the journals of live touches, which name the images."""
-    for run in done.inputs.touches:
-        journal = file.parent / TOUCHES / run.folder / JOURNAL
-        yield FileHash(results.place_of(journal), run.journal_sha256)

@@ -67,13 +67,9 @@ def due_tips(
                 _due_tip(entry, origin, swings, rule, library)
                 for entry, origin in zip(entries, origins, strict=True)
             ),
-            key=_urgency,
+            key=lambda tip: (tip.n_left is None or tip.n_left > 0, tip.due),
         )
     )
-
-
-def _urgency(tip: DueTip) -> tuple[bool, datetime]:
-    return tip.n_left is None or tip.n_left > 0, tip.due
 
 
 def _due_tip(

@@ -8,13 +8,7 @@ of an earlier version is brought up to date by the steps in the folder ``migrati
 import socket
 import sqlite3
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import (
-    AbstractContextManager,
-    closing,
-    contextmanager,
-    nullcontext,
-    suppress,
-)
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -108,15 +102,14 @@ class Database:
     def _used(self, engine: Engine) -> Iterator[Connection]:
         with self._uses.one(), _converting_errors(self.name):
             try:
-                with engine.begin() as connection, self._in_time(connection):
+                with (
+                    engine.begin() as connection,
+                    nullcontext() if self.file else _given_up_in_time(connection),
+                ):
                     yield connection
             finally:
                 if self._uses.are_over:  # who is late takes its connection along
                     self.engine.pool.dispose()
-
-    def _in_time(self, connection: Connection) -> AbstractContextManager[None]:
-        """Abandon a server that no longer responds."""
-        return nullcontext() if self.file else _given_up_in_time(connection)
 
 
 def open_file(path: Path) -> Database:

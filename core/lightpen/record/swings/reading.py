@@ -144,21 +144,17 @@ def open_record(folder: Path) -> Record:
     header = read_header(folder)
     lines = read_lines(folder)
     parsed = parse_lines(lines, folder)
+    n_leds = next((len(x.pixels) for x in parsed if isinstance(x, ImageLine)), 0)
     last = 0
     for number, line in enumerate(parsed, start=1):
         if isinstance(line, ImageLine):
             others = (len(other.pixels) for other in line.others)
             n_seen = [len(line.pixels), *others]
-            is_whole = n_seen == header.n_cameras * [_n_leds(parsed)]
+            is_whole = n_seen == header.n_cameras * [n_leds]
             if line.number <= last or not is_whole:
                 raise damaged_line(folder, number)
             last = line.number
     return _record(folder, header, parsed, length_of(lines))
-
-
-def _n_leds(lines: Sequence[Line]) -> int:
-    """Return the number of LEDs in the first image."""
-    return next(len(line.pixels) for line in lines if isinstance(line, ImageLine))
 
 
 def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) -> Record:
