@@ -306,16 +306,33 @@ def test_too_few_swings_are_refused(swing: Swing) -> None:
 
 def test_the_figures_of_a_pen_over_its_swings_are_as_before(swing: Swing) -> None:
     pen = true_pen()
-    swings = [swing(pen, 1), swing(pen, 2), swing(with_moved_led(pen), 3)]
-    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+    knocked = with_moved_led(pen)
+    twice = replace(knocked, leds=knocked.leds + 0.06 * (np.arange(10) == 2)[:, None])
+    first, second, third = swing(pen, 1), swing(pen, 2), swing(knocked, 3)
+    warm = swing(pen, 5, growth=WARMTH)
+    inputs = structs.replace(first.calibration.inputs, camera=FileRecord("c", "2" * 64))
+    record = structs.replace(first.calibration, inputs=inputs)
+    found = [
+        examine_pen(swings, paper_camera(), PEN_FILE.leds)
+        for swings in (
+            [first, second, third],
+            [first, second, swing(twice, 4), third],
+            [first, second, warm],
+            [first, warm, swing(pen, 6, growth=2 * WARMTH)],
+            [first, replace(warm, calibration=record)],
+        )
+    ]
 
     assert_as_before(
         "pen-health",
-        {
-            **pen_health_entries(found),
-            "reason": {"code": found.assessment.reason.code},
-            "text": text_figures(pen_health_text(found)),
-        },
+        [
+            {
+                **pen_health_entries(each),
+                "said": [each.assessment.reason, each.assessment.next_step],
+                "text": text_figures(pen_health_text(each)),
+            }
+            for each in found
+        ],
     )
 
 
