@@ -5,7 +5,6 @@ That a figure is right is shown by the other tests; that none changes unnoticed,
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -265,14 +264,18 @@ SWINGS: dict[str, Callable[[], Calibration]] = {
 }
 
 
-@cache
-def calibrated(name: str) -> Calibration:
-    return SWINGS[name]()
+Named = tuple[str, Calibration]
 
 
-@pytest.mark.parametrize("name", SWINGS)
-def test_the_figures_of_a_printed_calibration_are_as_before(name: str) -> None:
-    calibration = calibrated(name)
+@pytest.fixture(scope="module")
+def named(request: pytest.FixtureRequest) -> Named:
+    """The name and the calibration of one of the swings."""
+    return request.param, SWINGS[request.param]()
+
+
+@pytest.mark.parametrize("named", SWINGS, indirect=True)
+def test_the_figures_of_a_printed_calibration_are_as_before(named: Named) -> None:
+    name, calibration = named
     verdict = judge(calibration, LIMITS)
     texts = [
         calibration_text(calibration, method, PEN.nominal_tip, verdict)
@@ -282,9 +285,9 @@ def test_the_figures_of_a_printed_calibration_are_as_before(name: str) -> None:
     assert_as_before(f"printed-{name}", [text_figures(text) for text in texts])
 
 
-@pytest.mark.parametrize("name", SWINGS)
-def test_the_record_of_a_calibration_is_as_before(name: str) -> None:
-    calibration = calibrated(name)
+@pytest.mark.parametrize("named", SWINGS, indirect=True)
+def test_the_record_of_a_calibration_is_as_before(named: Named) -> None:
+    name, calibration = named
     record: dict[str, Any] = entries_of(
         calibration_record(calibration, INPUTS, "joint", LIMITS)
     )
@@ -303,14 +306,18 @@ def test_the_record_of_a_calibration_is_as_before(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["restless", "by_two_cones", "unstated"])
-def test_what_trials_are_drawn_from_is_as_before(name: str) -> None:
-    assert_as_before(f"trials-{name}", vars(trials_of(calibrated(name))))
+@pytest.mark.parametrize(
+    "named", ["restless", "by_two_cones", "unstated"], indirect=True
+)
+def test_what_trials_are_drawn_from_is_as_before(named: Named) -> None:
+    name, calibration = named
+
+    assert_as_before(f"trials-{name}", vars(trials_of(calibration)))
 
 
-@pytest.mark.parametrize("name", ["usual", "restless", "unstated"])
-def test_what_more_images_are_predicted_to_give_is_as_before(name: str) -> None:
-    calibration = calibrated(name)
+@pytest.mark.parametrize("named", ["usual", "restless", "unstated"], indirect=True)
+def test_what_more_images_are_predicted_to_give_is_as_before(named: Named) -> None:
+    name, calibration = named
     pixels = calibration.observations.pixels[calibration.used][:, None]
     state, joint = calibration.bundle.state, calibration.joint
     prediction = predict_uncertainty(
