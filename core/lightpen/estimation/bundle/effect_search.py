@@ -113,17 +113,15 @@ def _information(
     row = N_CONE
     for c, view in enumerate(views):
         k = view.own.shape[-1]
-        seen = used[:, c, :, None]
         of_view = A[:, c].reshape(-1, E)
-        rows = np.where(seen[..., None], view.own, 0.0).reshape(-1, k) / sigma
+        rows = view.own.reshape(-1, k) / sigma
         with_columns[row : row + k] += rows.T @ of_view
         row += k
-        rows = np.where(seen[..., None], view.effects, 0.0).reshape(len(of_view), -1)
-        with_columns[at_effects] += (rows / sigma).T @ of_view
-        rows = np.where(seen, view.diameter, 0.0).reshape(-1) / sigma
+        rows = view.effects.reshape(len(of_view), -1) / sigma
+        with_columns[at_effects] += rows.T @ of_view
+        rows = np.nan_to_num(view.diameter).reshape(-1) / sigma
         with_columns[at_diameter] += rows @ of_view
-        led = np.where(seen[..., None], view.led, 0.0) / sigma
-        led = np.swapaxes(led, 0, 1).reshape(n_leds, -1, 3)
+        led = np.swapaxes(view.led, 0, 1).reshape(n_leds, -1, 3) / sigma
         of_led = np.swapaxes(A[:, c], 0, 1).reshape(n_leds, -1, E)
         with_columns[K - 3 * n_leds :] += (np.swapaxes(led, 1, 2) @ of_led).reshape(
             3 * n_leds, E

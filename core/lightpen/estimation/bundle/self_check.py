@@ -82,7 +82,7 @@ def check_prediction(
     at = np.ix_(whole, np.arange(used.shape[1]), taking_part)
     used, weights = used[at], weights[at]
     residuals = weights * np.where(used[..., None], residuals[at], 0.0)
-    J = weights[..., None] * np.where(used[..., None, None], J[at], 0.0)
+    J = weights[..., None] * J[at]
     by_led = np.einsum("nclik,nclim->nlkm", J, J)
     right = np.einsum("nclik,ncli->nlk", J, residuals)
     explained = total = 0.0
@@ -95,12 +95,11 @@ def check_prediction(
         others = J[:, :, ~predicts]
         errors = residuals[:, :, ~predicts] - np.einsum("nclik,nk->ncli", others, pose)
         variances = 1 + np.einsum("nclik,nkm,nclim->ncli", others, covariance, others)
-        errors = np.where(used[:, :, ~predicts, None], errors / np.sqrt(variances), 0.0)
-        flat = errors.reshape(len(errors), -1)
+        flat = (errors / np.sqrt(variances)).reshape(len(errors), -1)
         explained += float(np.sum((basis.T @ flat) ** 2))
         total += float(np.sum(flat**2))
     n_images, n_functions = basis.shape
-    if total <= explained or n_images <= n_functions:
+    if total <= explained:
         return None
     ratio = explained / n_functions / ((total - explained) / (n_images - n_functions))
     # The errors of one image are as many as its coordinates less those of a pose.

@@ -17,10 +17,14 @@ from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
+from lightpen.model.rig import from_first
+from lightpen.model.rigid import nearest_rotation, vector_from_rotation
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
+    seen_from,
     simulate_centers,
     swing_poses,
 )
@@ -166,3 +170,57 @@ def test_images_that_lack_an_led_take_no_part() -> None:
 def test_few_images_are_not_checked() -> None:
     _, pixels, _ = good()
     assert calibrated(pixels[:20]).self_check is None
+
+
+def test_the_value_is_the_ratio_of_what_the_posture_explains_to_the_rest() -> None:
+    """Written out image by image, for LEDs of two cameras and noise that differs."""
+    rng = np.random.default_rng(7)
+    row = row_of_cameras(2, 1000.0)
+    rig, n_images, n_leds = from_first(row), 40, 7
+    some = [0, 4, 7, 1, 5, 8, 2, 9]  # no four of them in a line
+    pen = replace(PEN, leds=PEN.leds[some], normals=PEN.normals[some])
+    swing = seen_from(swing_poses(n_images, rng), row.rotations[0], row.translations[0])
+    state = BundleState(rig, pen, swing.tip_pen, swing.cone_cam, swing.rotations)
+    noise = rng.uniform(0.5, 2.0, (n_images, 2, len(some)))
+    residuals = 0.03 * noise[..., None] * rng.standard_normal((*noise.shape, 2))
+    used = np.ones(noise.shape, bool)
+    used[3:9, 1, 2] = used[:, 0, 5] = False
+    used[35:, :, 6] = False  # so these images take no part
+    used[27:, :, 7] = False  # and this LED
+    residuals[~used] = np.nan
+
+    found = check_prediction(state, residuals, used, noise, 1.3)
+
+    views = views_at(state, residuals)
+    J = np.stack([np.concatenate([v.turn, v.cone], axis=-1) for v in views], axis=1)
+    whole = np.arange(35)
+    R = swing.rotations[whole]
+    turns = vector_from_rotation(nearest_rotation(R.mean(axis=0)).T @ R)
+    x, y, z = turns.T
+    basis = np.stack([x**0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z], axis=1)
+    errors = []
+    for first in range(n_leds):
+        half = (first + np.arange(4)) % n_leds
+        of_images = []
+        for i in whole:
+            seen = used[i, :, :n_leds, None]
+            weight = np.where(seen, 1 / noise[i, :, :n_leds, None], 0.0)
+            r = np.nan_to_num(residuals[i, :, :n_leds]) * weight
+            A = J[i, :, :n_leds] * weight[..., None]
+            P = np.linalg.inv(np.einsum("clik,clim->km", A[:, half], A[:, half]))
+            pose = P @ np.einsum("clik,cli->k", A[:, half], r[:, half])
+            spread = np.sqrt(1 + np.einsum("clik,km,clim->cli", A, P, A))
+            off = np.where(seen, (r - A @ pose) / spread, 0.0)
+            of_images.append(np.delete(off, half, axis=1).ravel())
+        errors.append(of_images)
+    flat = np.concatenate(errors, axis=1)
+    left = flat - basis @ np.linalg.lstsq(basis, flat, rcond=None)[0]
+    by_posture, rest = np.sum(flat**2) - np.sum(left**2), np.sum(left**2)
+    assert found is not None
+    assert found.value == pytest.approx(
+        np.sqrt(by_posture / 10 / (rest / (35 - 10))), rel=1e-4
+    )
+    # An image has 13 LEDs of both cameras, and a pose of six numbers.
+    n_free = 10 * (2 * 13 - 6)
+    spread_of_f = 2.3263 * np.sqrt(2 / n_free)
+    assert found.limit == pytest.approx(np.sqrt(1.3 * (1 + spread_of_f)), rel=1e-4)
