@@ -198,7 +198,7 @@ def test_the_value_is_the_ratio_of_what_the_posture_explains_to_the_rest() -> No
     turns = vector_from_rotation(nearest_rotation(R.mean(axis=0)).T @ R)
     x, y, z = turns.T
     basis = np.stack([x**0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z], axis=1)
-    errors = []
+    errors: list[list[FloatArray]] = []
     for first in range(n_leds):
         half = (first + np.arange(4)) % n_leds
         of_images = []
@@ -213,7 +213,7 @@ def test_the_value_is_the_ratio_of_what_the_posture_explains_to_the_rest() -> No
             off = np.where(seen, (r - A @ pose) / spread, 0.0)
             of_images.append(np.delete(off, half, axis=1).ravel())
         errors.append(of_images)
-    flat = np.concatenate(errors, axis=1)
+    flat = np.concatenate(np.array(errors), axis=1)
     left = flat - basis @ np.linalg.lstsq(basis, flat, rcond=None)[0]
     by_posture, rest = np.sum(flat**2) - np.sum(left**2), np.sum(left**2)
     assert found is not None

@@ -105,7 +105,9 @@ def test_an_instrument_of_files_is_as_uncertain_as_they_state() -> None:
         (3 * n_leds - 6) * 0.002**2 + (3e-5 * size) ** 2
     )
     parts = [TIP, *(each.covariance for each in rig.cameras), rig.covariance]
-    for place, part in zip(kinds, [*parts, [[0.03**2]], leds], strict=True):
+    parts += [np.array([[0.03**2]]), leds]
+    for place, part in zip(kinds, parts, strict=True):
+        assert part is not None
         np.testing.assert_allclose(found.covariance[place, place], part)
         others = np.delete(found.covariance[place], np.r_[place], axis=1)
         assert not others.any()
