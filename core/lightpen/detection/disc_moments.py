@@ -3,8 +3,7 @@
 Intensities are cut to ``f = clip((I - low) / (high - low), 0, 1)`` with `low` near
 the background and `high` near the plateau of the disc. The interior becomes constant,
 so its noise is gone, and the background zero; only the rim is grey. The centroid of f
-is then as precise as a fit of the rim, at the cost of one pass over a small window. The
-moments of f up to the third order also show whether the region is a whole ellipse.
+is then as precise as a fit of the rim, at the cost of one pass over a small window.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,30 +16,27 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import Image
-from lightpen.detection.edge_fit import EdgeFit, EdgeStart, fit_edges
+from lightpen.detection.edge_fit import EdgeStart, fit_edges
+from lightpen.detection.pixel_box import PixelBox, bounding_box
+from lightpen.detection.region_moments import (
+    GAUSSIAN_RISE,
+    HIGH,
+    LOW,
+    MIN_AREA,
+    DiscMoments,
+    is_ellipse,
+    moments_of_region,
+    moments_of_rim,
+)
 
-# Narrower than this samples the rim too coarsely: 20 to 80 % doubles the error.
-LOW = 0.1
-HIGH = 0.9
 LOW_SIGMAS = 3.5  # the noise of the background stays below `low`
 MAX_LOW = 0.3
 MAX_FLOOR = 0.85  # higher, the noise of the plateau makes the outline
 MIN_RAMP = 0.2  # least high - low, fraction of the contrast
-MIN_AREA = 12.0  # px^2; hot pixels are smaller
-MIN_VARIANCE = 0.1  # px^2, along each axis; a streak one pixel wide has none
 MIN_SIZE = 3  # px, of the box of a region
 MIN_SIGMAS = 6.0  # least contrast in terms of the noise
 MARGIN = 5  # px around a box: the foot of the rim and some background
 SAMPLES = 16  # per side of a window, to find background and plateau
-
-# Of a Gaussian edge with standard deviation 1, cut at LOW and HIGH: its rise from 10 to
-# 90 %, and the integral of f (1 - f) across it.
-GAUSSIAN_RISE = 2.563
-GAUSSIAN_GREY = 0.381
-# Blur pulls the half level of a convex rim inwards, and the ramp of f spreads the
-# variance: their sum to second order, in terms of pi sigma^2 and of sigma^2.
-AREA_LOSS = 0.56
-VARIANCE_GAIN = 0.30
 
 # The shading of a disc is measured where its radius is so many widths of its rim, and
 # on its inner pixels without those beside the rim.
@@ -60,66 +56,6 @@ HOLE = 1.05  # times the area that is lit, of a ring with its middle; noise has 
 FULLY = 250  # of 255, the crest of a ring
 MIN_OUTLINE = 0.97  # of the area of an ellipse with the same second moments
 
-# How far a whole ellipse strays from roundness 1 and skewness 0 by sampling, blur and
-# noise, found on rendered discs of 6 to 100 px at signal-to-noise ratios down to 12.
-ROUNDNESS_LOSS = 0.004
-ROUNDNESS_LOSS_BY_BLUR = 0.1
-SKEWNESS = 0.004
-SKEWNESS_BY_SAMPLING = 0.1
-SKEWNESS_BY_NOISE = 25.0
-
-
-class PixelBox(NamedTuple):
-    """A rectangle of pixels, ends excluded."""
-
-    left: int
-    top: int
-    right: int
-    bottom: int
-
-    @property
-    def size(self) -> int:
-        """The longer side, px."""
-        return max(self.right - self.left, self.bottom - self.top)
-
-    @property
-    def area(self) -> int:
-        """Number of pixels."""
-        return (self.right - self.left) * (self.bottom - self.top)
-
-    def grown(self, margin: int, shape: tuple[int, ...]) -> "PixelBox":
-        """Return the box with a margin, clipped to the image."""
-        return PixelBox(
-            max(self.left - margin, 0),
-            max(self.top - margin, 0),
-            min(self.right + margin, shape[1]),
-            min(self.bottom + margin, shape[0]),
-        )
-
-    def moved(self, right: int, down: int) -> "PixelBox":
-        """Return the box at another place."""
-        return PixelBox(
-            self.left + right, self.top + down, self.right + right, self.bottom + down
-        )
-
-    def holds_center_of(self, other: "PixelBox") -> bool:
-        """Return whether the centre of the other box is inside."""
-        return (
-            2 * self.left <= other.left + other.right <= 2 * self.right
-            and 2 * self.top <= other.top + other.bottom <= 2 * self.bottom
-        )
-
-    def is_close_to(self, other: "PixelBox") -> bool:
-        """Return whether no side differs by more than 2 px and a tenth of the size."""
-        tolerance = 2 + other.size // 10
-        return all(abs(a - b) <= tolerance for a, b in zip(self, other, strict=True))
-
-    def overlap(self, other: "PixelBox") -> int:
-        """Return the number of common pixels."""
-        width = min(self.right, other.right) - max(self.left, other.left)
-        height = min(self.bottom, other.bottom) - max(self.top, other.top)
-        return max(width, 0) * max(height, 0)
-
 
 class Levels(NamedTuple):
     """Intensities of a window that holds one bright region, digital numbers."""
@@ -132,44 +68,6 @@ class Levels(NamedTuple):
     def contrast(self) -> float:
         """Plateau above the background."""
         return self.plateau - self.background
-
-
-class DiscMoments(NamedTuple):
-    """Area, centroid and central moments of a region, px.
-
-    `roundness` is the area over that of the ellipse with the same second moments: 1 for
-    an ellipse, less for all else. `skewness` is the norm of the third moments of the
-    whitened region: 0 for an ellipse; a small piece missing at the rim of a disc, a
-    fraction e of its area, makes it 2 e.
-    """
-
-    area: float
-    x: float
-    y: float
-    var_x: float
-    cov_xy: float
-    var_y: float
-    roundness: float
-    skewness: float
-    edge_width: float
-
-    @property
-    def radius(self) -> float:
-        """Of the circle of the same area, px."""
-        return sqrt(self.area / pi)
-
-    @property
-    def rim_width(self) -> float:
-        """Width of the rim over its whole height, px."""
-        return self.edge_width / (HIGH - LOW)
-
-    @property
-    def axes(self) -> tuple[float, float]:
-        """Semi-axes of the ellipse with the same second moments, the longer first."""
-        half_trace = (self.var_x + self.var_y) / 2.0
-        half_span = hypot((self.var_x - self.var_y) / 2.0, self.cov_xy)
-        shorter = max(half_trace - half_span, 0.05)
-        return 2.0 * sqrt(half_trace + half_span), 2.0 * sqrt(shorter)
 
 
 class Disc(NamedTuple):
@@ -256,7 +154,7 @@ def _measure_window(
     soft = soft[near.top : near.bottom, near.left : near.right]
     window = window[near.top : near.bottom, near.left : near.right]
     around = near.moved(frame.left, frame.top)
-    moments = _moments(soft, around, (high - low) / contrast)
+    moments = moments_of_region(soft, around, (high - low) / contrast)
     if moments is None:
         return None
     moments = _unshaded(moments, window, soft, around, levels)
@@ -264,7 +162,7 @@ def _measure_window(
     reached = [there == of_image for here, there, of_image in sides if here == there]
     leaves_image, leaves_window = any(reached), not all(reached)
     relative_noise = noise / contrast
-    is_whole = not reached and _is_ellipse(moments, relative_noise)
+    is_whole = not reached and is_ellipse(moments, relative_noise)
     is_even = is_whole and _is_even(
         moments, window, soft, around, levels, relative_noise
     )
@@ -306,7 +204,7 @@ def with_rims(
         wide = disc.moments.edge_width if disc.is_even else float("inf")
         moments = None
         if rim and rim.is_whole and GAUSSIAN_RISE * rim.sigma < SHARPER * wide:
-            moments = _moments_of(rim)
+            moments = moments_of_rim(rim)
         elif disc.filled:
             moments = disc.filled()
         if moments:
@@ -344,18 +242,6 @@ def _separate(
     first = regions.pop(chosen)
     others = [r for r in regions if r.size >= MIN_SIZE and box.holds_center_of(r)]
     return [first, *others], cv2.bitwise_and(soft, alone)
-
-
-def _is_ellipse(moments: DiscMoments, relative_noise: float) -> bool:
-    radius = moments.radius
-    _, minor = moments.axes
-    loss = ROUNDNESS_LOSS + ROUNDNESS_LOSS_BY_BLUR * (moments.edge_width / minor) ** 2
-    skewness = (
-        SKEWNESS
-        + SKEWNESS_BY_SAMPLING / radius
-        + SKEWNESS_BY_NOISE * relative_noise / radius**1.5
-    )
-    return moments.roundness > 1.0 - loss and moments.skewness < skewness
 
 
 def _is_even(
@@ -404,10 +290,10 @@ def _filled(
     _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
     contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)
-    filled = _moments(cv2.max(soft, crest), frame, ramp)
+    filled = moments_of_region(cv2.max(soft, crest), frame, ramp)
     if filled is None or filled.area <= HOLE * moments.area:
         return None
-    return filled if _is_ellipse(filled, relative_noise) else None
+    return filled if is_ellipse(filled, relative_noise) else None
 
 
 def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
@@ -426,22 +312,6 @@ def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
     return EdgeStart(center, np.array([[xx, xy], [xy, yy]]))
 
 
-def _moments_of(rim: EdgeFit) -> DiscMoments:
-    (var_x, cov_xy), (_, var_y) = rim.shape.tolist()
-    area = 4.0 * pi * sqrt(var_x * var_y - cov_xy**2)
-    x, y = rim.center.tolist()
-    edge_width = GAUSSIAN_RISE * rim.sigma
-    return DiscMoments(area, x, y, var_x, cov_xy, var_y, 1.0, 0.0, edge_width)
-
-
-def bounding_box(contour: MatLike, step: int = 1) -> PixelBox:
-    """Return the box of a contour that was found on every `step`-th pixel."""
-    x, y, width, height = cv2.boundingRect(contour)
-    return PixelBox(
-        x * step, y * step, (x + width - 1) * step + 1, (y + height - 1) * step + 1
-    )
-
-
 def _window_levels(window: Image, level: float) -> Levels:
     """Split the intensities in two classes and return their medians."""
     step = max(1, min(window.shape) // SAMPLES)
@@ -456,38 +326,6 @@ def _window_levels(window: Image, level: float) -> Levels:
         split = (background + plateau) // 2
     top = int(samples[min((n_dark + 9 * n) // 10, n - 1)])
     return Levels(background, plateau, top)
-
-
-def _moments(soft: MatLike, frame: PixelBox, ramp: float) -> DiscMoments | None:
-    """Return the moments of a soft-thresholded region; None if small or narrow."""
-    m = cv2.moments(soft)
-    area = m["m00"] / 255.0
-    if area < MIN_AREA:
-        return None
-    var_x, cov_xy, var_y = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
-    if min(var_x, var_y) < MIN_VARIANCE:
-        return None
-
-    grey = area - cv2.norm(soft, cv2.NORM_L2SQR) / 255.0**2
-    perimeter = 2.0 * pi * sqrt(2.0 * (var_x + var_y))
-    sigma = grey / (perimeter * GAUSSIAN_GREY) * (HIGH - LOW) / ramp
-    # Blur must not make a small disc vanish.
-    spread = min(VARIANCE_GAIN * sigma**2, 0.2 * min(var_x, var_y))
-    var_x, var_y = var_x - spread, var_y - spread
-    area += min(AREA_LOSS * pi * sigma**2, 0.2 * area)
-
-    determinant = max(var_x * var_y - cov_xy**2, 1e-9 * var_x * var_y)
-    return DiscMoments(
-        area,
-        frame.left + m["m10"] / m["m00"],
-        frame.top + m["m01"] / m["m00"],
-        var_x,
-        cov_xy,
-        var_y,
-        area / (4.0 * pi * sqrt(determinant)),
-        _skewness(m, var_x, cov_xy, determinant),
-        GAUSSIAN_RISE * sigma,
-    )
 
 
 def _unshaded(
@@ -515,18 +353,3 @@ def _unshaded(
         for m in ("m10", "m01")
     )
     return moments._replace(x=moments.x - x, y=moments.y - y)
-
-
-def _skewness(
-    m: dict[str, float], var_x: float, cov_xy: float, determinant: float
-) -> float:
-    """Norm of the third moments after whitening, the root of Mardia's skewness."""
-    slope = cov_xy / var_x
-    sx = sqrt(var_x)
-    sy = sqrt(determinant / var_x)
-    m30, m21, m12, m03 = (m[k] / m["m00"] for k in ("mu30", "mu21", "mu12", "mu03"))
-    w30 = m30 / sx**3
-    w21 = (m21 - slope * m30) / (sx**2 * sy)
-    w12 = (m12 - 2 * slope * m21 + slope**2 * m30) / (sx * sy**2)
-    w03 = (m03 - 3 * slope * m12 + 3 * slope**2 * m21 - slope**3 * m30) / sy**3
-    return hypot(w30, sqrt(3) * w21, sqrt(3) * w12, w03)

@@ -12,7 +12,6 @@ from math import ceil, floor
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.disc_moments import PixelBox
 from lightpen.detection.following import follow_spots
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.hypotheses import MAX_SHIFT
@@ -22,6 +21,7 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
+from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
 from lightpen.detection.reasons import UNFORESEEN, Reason
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots

@@ -1,0 +1,266 @@
+"""The bright regions of an image that may be discs.
+
+Every fourth pixel of every fourth row shows where something is bright; only windows
+around that are read in full. A region that is no whole disc is examined again at
+higher levels, which parts discs that touch and finds LEDs in front of something bright.
+What never becomes a disc is dropped, or kept if it resembles one.
+"""
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil, sqrt
+
+import cv2
+import numpy as np
+from cv2.typing import MatLike
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.disc_moments import Disc, measure_disc, with_rims
+from lightpen.detection.edge_fit import EdgeStart
+from lightpen.detection.pixel_box import PixelBox, bounding_box
+from lightpen.model.quantiles import normal_quantile
+
+MAX_BOXES = 128  # the smallest of more are clutter
+MAX_REGIONS = 1024  # examined in one image
+MAX_CONTOURS = 4000
+NOISE_SAMPLES = 48  # per side of the image
+NOISE_QUANTILE = 0.84  # of differences of neighbours; texture may cover the rest
+BACKGROUND_QUANTILE = 0.2  # a bright window may fill most of the image
+MIN_NOISE = 0.5  # rounding, digital numbers
+LEVEL_SIGMAS = 8.0
+LEVEL_OF_PEAK = 0.03  # far below an LED at a tenth of the brightest lamp
+LEVEL_STEP = 0.2  # from level to level, fraction of the height above the background
+LEVEL_STEP_OF_PEAK = 0.06  # at most
+MAX_LEVELS_AT_ONCE = 3  # while a region hardly shrinks
+HIDDEN = 2.0  # times as high above the background is light that faint light hides
+CROWDED = 0.03  # fraction of bright samples above which single ones are ignored
+TEXTURED = 0.08  # changes from sample to sample; there is no use in listing regions
+SPECK = np.ones((2, 2), np.uint8)  # regions that do not hold it are ignored
+FINE_SIZE = 256  # px; smaller regions are parted at full resolution
+MAX_DIAMETER = 0.5  # of the shorter side of the image
+
+MIN_ROUNDNESS = 0.85  # half a disc has 0.95, a square 0.955, two touching discs 0.89
+MAX_AXIS_RATIO = 4.0
+MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """An image, every `stride`-th pixel of it, its background and noise."""
+
+    image: Image
+    thinned: MatLike
+    stride: int
+    background: float
+    noise: float
+    peak: float
+
+    def hides_light(self, box: PixelBox, level: float) -> bool:
+        """Return whether a region that is hardly brighter than a level holds more."""
+        window = self.image[box.top : box.bottom, box.left : box.right]
+        rise = level - self.background
+        return bool(window.max() > self.background + HIDDEN * rise)
+
+    def higher(self, level: float) -> float:
+        """Return the next level to search."""
+        step = LEVEL_STEP * (level - self.background)
+        longest = LEVEL_STEP_OF_PEAK * (self.peak - self.background)
+        return level + max(min(step, longest), 1.0)
+
+
+def survey(image: Image, mask: FloatArray | None, stride: int) -> Survey:
+    """Return what an image, but for its masked circles, shows at a glance."""
+    thinned = _thinned(image, stride)
+    step = max(min(thinned.shape) // NOISE_SAMPLES, 1)
+    few: MatLike = np.ascontiguousarray(thinned[::step, ::step])
+    background = _quantile(few, BACKGROUND_QUANTILE)
+
+    beside: MatLike = np.ascontiguousarray(image[:: step * stride, 1 :: step * stride])
+    n = min(few.shape[1], beside.shape[1])
+    difference = _quantile(cv2.absdiff(few[:, :n], beside[:, :n]), NOISE_QUANTILE)
+    deviation = sqrt(2) * normal_quantile((1 - NOISE_QUANTILE) / 2)
+    noise = max(difference / deviation, MIN_NOISE)
+
+    if mask is not None and len(mask):
+        thinned = thinned.copy()
+        for x, y, radius in np.asarray(mask) / stride:
+            center = (round(x), round(y))
+            cv2.circle(thinned, center, ceil(radius), background, cv2.FILLED)
+    return Survey(image, thinned, stride, background, noise, float(thinned.max()))
+
+
+def _quantile(values: MatLike, share: float) -> int:
+    """Return the value that is larger than that share of all."""
+    rank = int(share * values.size)
+    return int(np.partition(values, rank, axis=None)[rank])
+
+
+def flattened(image: Image, full_scale: int) -> Image:
+    """Return the image without its uneven background.
+
+    That is the median of the neighbourhood in a coarse grid, in which a disc is a few
+    points at the most. What reads full scale stays, to be reported as saturated.
+    """
+    step = max(min(image.shape) // NOISE_SAMPLES, 1)
+    coarse = cv2.medianBlur(np.ascontiguousarray(image[::step, ::step]), 5)
+    size = (image.shape[1], image.shape[0])
+    uneven = np.asarray(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
+    uneven -= coarse.min()
+    flat: Image = np.asarray(cv2.subtract(image, uneven, dst=uneven)).view(image.dtype)
+    np.copyto(flat, image, where=image >= full_scale)
+    return flat
+
+
+def _thinned(image: Image, stride: int) -> MatLike:
+    """Return every `stride`-th pixel of every `stride`-th row; stride 1, 2 or 4."""
+    pixels: MatLike
+    width = image.shape[1] // stride * stride
+    rows = image[::stride, :width]
+    if image.strides[1] != image.itemsize or sys.byteorder != "little":
+        pixels = np.ascontiguousarray(rows[:, ::stride])
+        return pixels
+    # The low bytes of `stride` pixels read as one number are the first pixel. Narrowing
+    # numbers is three times as fast as gathering pixels.
+    pixels = rows.view(f"u{image.itemsize * stride}").astype(image.dtype)
+    return pixels
+
+
+def find_discs(
+    scene: Survey, budget: Iterator[int], before: Sequence[EdgeStart] = ()
+) -> list[Disc]:
+    """Return whatever may be an LED, each once."""
+    rise = scene.peak - scene.background
+    level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
+    height, width = scene.image.shape
+    boxes = _regions(scene, PixelBox(0, 0, width, height), level)
+    if len(boxes) > MAX_BOXES:
+        boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
+
+    measured: list[Disc] = []
+    unclear: list[tuple[PixelBox, Disc | None]] = []
+    for box in boxes:
+        if _is_too_large(scene, box):
+            unclear.append((box, None))
+        else:
+            found = list(_measured(scene, box, level, 0.0, budget))
+            measured += found
+            if not found and scene.hides_light(box, level):
+                unclear.append((box, None))
+    measured = with_rims(scene.image, measured, before)
+    discs = [disc for disc in measured if disc.is_whole]
+    unclear += [(disc.box, disc) for disc in measured if not disc.is_whole]
+    for box, region in unclear:
+        discs += _parted(scene, box, level, region, budget)
+    return _unique(discs) if unclear or len(discs) != len(boxes) else discs
+
+
+def _parted(
+    scene: Survey, box: PixelBox, level: float, disc: Disc | None, budget: Iterator[int]
+) -> list[Disc]:
+    """Return the discs that a region parts into at higher levels, or itself."""
+    if disc is not None:
+        level = max(level, disc.cut_level)
+    parts: list[PixelBox] = []
+    for _ in range(MAX_LEVELS_AT_ONCE):
+        if next(budget, None) is None:
+            break
+        level = scene.higher(level)
+        parts = _regions(scene, box, level)
+        if len(parts) != 1 or not parts[0].is_close_to(box):
+            break
+    blocks: list[Disc] = []
+    for part in parts:
+        if _is_too_large(scene, part):
+            blocks += _parted(scene, part, level, None, budget)
+            continue
+        found = list(_measured(scene, part, level, level, budget))
+        if not found and scene.hides_light(part, level):
+            blocks += _parted(scene, part, level, None, budget)
+        for block in with_rims(scene.image, found):
+            if block.is_whole:
+                blocks.append(block)
+            else:
+                blocks += _parted(scene, block.box, level, block, budget)
+    is_parted = len(blocks) > 1 or any(block.is_whole for block in blocks)
+    if disc is None or is_parted or not _resembles_disc(disc):
+        return blocks
+    return [disc]
+
+
+def _unique(discs: list[Disc]) -> list[Disc]:
+    """Drop duplicates and spots inside a larger disc."""
+    kept: list[Disc] = []
+    for disc in sorted(discs, key=lambda disc: disc.moments.area, reverse=True):
+        if not any(larger.box.holds_center_of(disc.box) for larger in kept):
+            kept.append(disc)
+    return kept
+
+
+def _regions(scene: Survey, box: PixelBox, level: float) -> list[PixelBox]:
+    """Return the boxes of regions above a level inside a box."""
+    if level >= np.iinfo(scene.image.dtype).max:
+        return []
+    step = 1 if box.size <= FINE_SIZE else scene.stride
+    plane = scene.thinned if step == scene.stride else scene.image
+    frame = box.grown(step, scene.image.shape)
+    left, top = frame.left // step, frame.top // step
+    window = plane[top : -(-frame.bottom // step), left : -(-frame.right // step)]
+    bright: MatLike = (window > int(level)).view(np.uint8)
+    if step == 1 or cv2.countNonZero(bright) > CROWDED * bright.size:
+        # cv2.morphologyEx would shift the regions: it anchors both steps alike.
+        bright = cv2.dilate(cv2.erode(bright, SPECK), SPECK, anchor=(0, 0))
+        if box.size > FINE_SIZE and _is_textured(bright):
+            return [box]
+    # Every component, also one in the hole of another, is at the top of this hierarchy.
+    contours, hierarchy = cv2.findContours(
+        bright, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(left, top)
+    )
+    if not contours:
+        return []
+    parents = hierarchy[0, :MAX_CONTOURS, 3].tolist()
+    found = [
+        bounding_box(contour, step)
+        for contour, parent in zip(contours, parents, strict=False)
+        if parent < 0
+    ]
+    if frame == box:
+        return found
+    # What reaches out of the box belongs to a neighbour.
+    return [part for part in found if part.overlap(box) == part.area]
+
+
+def _is_textured(bright: MatLike) -> bool:
+    changes = np.count_nonzero(bright[:, 1:] != bright[:, :-1])
+    return bool(changes > TEXTURED * bright.size)
+
+
+def _is_too_large(scene: Survey, box: PixelBox) -> bool:
+    shorter_side: int = min(scene.image.shape)
+    return box.size > max(MAX_DIAMETER * shorter_side, FINE_SIZE)
+
+
+def _measured(
+    scene: Survey, box: PixelBox, level: float, floor: float, budget: Iterator[int]
+) -> Iterator[Disc]:
+    """Measure the region in a box, and others that coarse sampling took for one."""
+    boxes, seen = [box], {box}
+    while boxes and next(budget, None) is not None:
+        disc = measure_disc(scene.image, boxes.pop(), level, scene.noise, floor)
+        if disc is None:
+            continue
+        # Two regions of which each is another of the other would go round for ever.
+        new = [
+            each for each in disc.others if each.size < box.size and each not in seen
+        ]
+        boxes += new
+        seen |= {disc.box, *new}
+        height = disc.levels.plateau - scene.background
+        if disc.levels.contrast > MIN_RELATIVE_CONTRAST * height:
+            yield disc
+
+
+def _resembles_disc(disc: Disc) -> bool:
+    """Return whether a region may be a cut or merged LED."""
+    major, minor = disc.moments.axes
+    return disc.moments.roundness > MIN_ROUNDNESS and major < MAX_AXIS_RATIO * minor
