@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any
 
 from lightpen.cameras.protocol import Range
@@ -9,6 +10,7 @@ from lightpen.cameras.protocol import Range
 WRITE_ONLY, READ_WRITE = 2, 4  # of EAccessMode; a command is write-only
 
 
+@dataclass(frozen=True)
 class GenapiFeatures:
     """The features of an open camera.
 
@@ -24,23 +26,16 @@ class GenapiFeatures:
         Returns a context that converts errors.
     """
 
-    def __init__(
-        self,
-        find: Callable[[str], Any],
-        spell: Callable[[str], str],
-        access: Callable[[Any], int],
-        converting_errors: Callable[[], AbstractContextManager[None]],
-    ) -> None:
-        self._find = find
-        self._spell = spell
-        self._access = access
-        self._converting_errors = converting_errors
+    find: Callable[[str], Any]
+    spell: Callable[[str], str]
+    access: Callable[[Any], int]
+    converting_errors: Callable[[], AbstractContextManager[None]]
 
     def has(self, name: str) -> bool:
         """Return whether the camera has a feature that is available now."""
-        with self._converting_errors():
-            node = self._find(name)
-            return node is not None and self._access(node) in (WRITE_ONLY, READ_WRITE)
+        with self.converting_errors():
+            node = self.find(name)
+            return node is not None and self.access(node) in (WRITE_ONLY, READ_WRITE)
 
     def number(self, name: str) -> float:
         """Return the value of a number."""
@@ -76,16 +71,16 @@ class GenapiFeatures:
 
     def execute(self, name: str) -> None:
         """Execute a command."""
-        with self._converting_errors():
-            getattr(self._find(name), self._spell("execute"))()
+        with self.converting_errors():
+            getattr(self.find(name), self.spell("execute"))()
 
     def _read(self, name: str, what: str) -> Any:
-        with self._converting_errors():
-            return getattr(self._find(name), self._spell(what))
+        with self.converting_errors():
+            return getattr(self.find(name), self.spell(what))
 
     def _write(self, name: str, value: float | str | bool) -> None:
-        with self._converting_errors():
-            setattr(self._find(name), self._spell("value"), value)
+        with self.converting_errors():
+            setattr(self.find(name), self.spell("value"), value)
 
 
 def refusals(genapi: Any) -> tuple[type[Exception], ...]:

@@ -165,15 +165,10 @@ class _Times:
     """Exposure and arrival times of the frames of one camera."""
 
     def __init__(self) -> None:
-        self._last: Frame | None = None
+        self.last: Frame | None = None
         self._offsets_ns: deque[int] = deque(maxlen=CLOCK_WINDOW)
         self._gaps_ns: deque[float] = deque(maxlen=WINDOW)
         self._n_no_faster = 0
-
-    @property
-    def last(self) -> Frame | None:
-        """The last frame."""
-        return self._last
 
     @property
     def has_clock(self) -> bool:
@@ -188,7 +183,7 @@ class _Times:
     @property
     def is_settled(self) -> bool:
         """Whether the estimate of the clock offset has settled."""
-        has_no_clock = self._last is not None and self._last.device_ts_ns is None
+        has_no_clock = self.last is not None and self.last.device_ts_ns is None
         return has_no_clock or self._n_no_faster >= SETTLED
 
     @property
@@ -198,7 +193,7 @@ class _Times:
 
     def note(self, frame: Frame) -> None:
         """Add the times of a frame."""
-        last, self._last = self._last, frame
+        last, self.last = self.last, frame
         if last is not None and _is_set(last, frame):  # as after a power failure
             self._offsets_ns.clear()
             self._n_no_faster = 0

@@ -1,20 +1,16 @@
 """``lightpen archive``: check, list, deliver, fetch, exchange and timestamp entries."""
 
 import argparse
-from collections.abc import Callable
 from datetime import date
 from pathlib import Path
-from typing import TypeAlias
 
 import platformdirs
 
-from lightpen.commands.arguments import add_file, whole_number
+from lightpen.commands.arguments import DataFolder, add_data, whole_number
 from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
 SAMPLE = 3  # tips that a check recomputes
 USUAL_LENGTH = 50  # entries that are listed
-
-DataFolder: TypeAlias = Callable[[], Path]
 
 
 def usual_data_folder() -> Path:
@@ -92,10 +88,7 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         "password; the password is requested, or read from LIGHTPEN_PASSWORD",
     )
     for action in (check, listed, export, taken, delivered, fetched, stamped, renewed):
-        add_file(
-            action, "--data", "FOLDER", "data folder (default: that of the program)"
-        )
-        action.set_defaults(data_folder=data_folder)
+        add_data(action, data_folder)
     for action in (export, taken):
         action.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
     for name in ("pen", "tip", "station"):

@@ -31,6 +31,7 @@ from lightpen.archive.replication.fetching import fetch
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.replication.server_setup import server_sql
 from lightpen.archive.store.database import Database, look_into, open_file
+from lightpen.commands.arguments import data_of
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
@@ -48,7 +49,7 @@ def _check(options: argparse.Namespace) -> int:
     @printing
     def run(options: argparse.Namespace) -> None:
         nonlocal has_findings
-        data = _data(options)
+        data = data_of(options)
         with progress("Checking") as report:
             checked = check_file(data / ARCHIVE, data, report)
         with progress("Recomputing") as report, _looked_into(data) as database:
@@ -89,7 +90,7 @@ def _list(options: argparse.Namespace) -> None:
         begin=_midnight(options.since),
         end=_midnight(options.until and options.until + timedelta(days=1)),
     )
-    with _looked_into(_data(options)) as database:
+    with _looked_into(data_of(options)) as database:
         if options.csv:
             home = chain_at_home(database)
             text = entries_csv(newest(database, wanted, options.most), home)
@@ -101,21 +102,21 @@ def _list(options: argparse.Namespace) -> None:
 
 @printing
 def _export(options: argparse.Namespace) -> None:
-    with _looked_into(_data(options)) as database:
+    with _looked_into(data_of(options)) as database:
         n_entries = export_entries(database, options.file)
     print(shown(f"{n_entries} entries are in {options.file}."))
 
 
 @printing
 def _import(options: argparse.Namespace) -> None:
-    with _opened(_data(options)) as database:
+    with _opened(data_of(options)) as database:
         copied = import_entries(database, options.file)
     print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
 
 
 @printing
 def _deliver(options: argparse.Namespace) -> None:
-    with closing(Logbook(_data(options))) as logbook, _server() as server:
+    with closing(Logbook(data_of(options))) as logbook, _server() as server:
         database, chain = logbook.database, logbook.chain
         if options.again:
             note_delivered(database, chain, chain_head(server, chain).number)
@@ -133,7 +134,7 @@ def _deliver(options: argparse.Namespace) -> None:
 
 @printing
 def _fetch(options: argparse.Namespace) -> None:
-    data = _data(options)
+    data = data_of(options)
     with _opened(data) as database, _server() as server:
         fetched = fetch(database, data, server, options.chain)
     print(f"{fetched.n_entries} entries and {fetched.n_files} files were restored.")
@@ -148,7 +149,7 @@ def _server_sql(options: argparse.Namespace) -> None:
 
 @printing
 def _timestamp(options: argparse.Namespace) -> None:
-    by, data = authority(options.tsa, options.certificate), _data(options)
+    by, data = authority(options.tsa, options.certificate), data_of(options)
     if not by.address or by.certificate is None:
         raise UsageError("timestamp.no-authority")
     with _looked_into(data) as database:
@@ -158,7 +159,7 @@ def _timestamp(options: argparse.Namespace) -> None:
 
 @printing
 def _new_key(options: argparse.Namespace) -> None:
-    data = _data(options)
+    data = data_of(options)
     with closing(Logbook(data)) as logbook:
         signature = supervisor_signature(options.supervisor)
         logbook.confirm(read_supervision(data))
@@ -179,11 +180,6 @@ ACTIONS: dict[str, Command] = {
     "timestamp": _timestamp,
     "server-sql": _server_sql,
 }
-
-
-def _data(options: argparse.Namespace) -> Path:
-    folder: Path = options.data_folder() if options.data is None else options.data
-    return folder
 
 
 @contextmanager

@@ -5,12 +5,14 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from lightpen.formats.pen_content import UNITS
 from lightpen.model.assumptions import COLDEST, WARMEST
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import LIMITS, VerificationLimits
+
+DataFolder: TypeAlias = Callable[[], Path]
 
 # Of any number, whatever it counts: beyond, its square may be none.
 SMALLEST, LARGEST = 1e-9, 1e6
@@ -80,6 +82,18 @@ def add_file(
 ) -> None:
     """Add an option or argument that is a path."""
     parser.add_argument(name, type=Path, metavar=metavar, help=meaning)
+
+
+def add_data(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
+    """Add ``--data``, a data folder; `data_of` reads it."""
+    add_file(parser, "--data", "FOLDER", "data folder (default: that of the program)")
+    parser.set_defaults(data_folder=data_folder)
+
+
+def data_of(options: argparse.Namespace) -> Path:
+    """Return the data folder that was chosen, or that of the program."""
+    folder: Path = options.data_folder() if options.data is None else options.data
+    return folder
 
 
 def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from lightpen.commands.archive import DataFolder, parse_date
+from lightpen.commands.archive import parse_date
 from lightpen.commands.arguments import (
+    DataFolder,
     add_camera_and_pen,
-    add_file,
+    add_data,
     finite,
     whole_number,
 )
@@ -43,11 +44,8 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         "cone",
     )
     for action in (listed, added, changed, retired, returned, shared, spun):
-        add_file(
-            action, "--data", "FOLDER", "data folder (default: that of the program)"
-        )
+        add_data(action, data_folder)
         action.add_argument("--json", action="store_true", help="print JSON")
-        action.set_defaults(data_folder=data_folder)
     listed.add_argument("--all", action="store_true", help="include retired items")
     listed.add_argument(
         "--max-days",

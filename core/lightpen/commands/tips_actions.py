@@ -17,6 +17,7 @@ from lightpen.archive.logbook.tip_status import folder_statuses
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
+from lightpen.commands.arguments import data_of
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.commands.tips import FORGOTTEN
@@ -63,7 +64,7 @@ POINTS = ("nominal", "axis")
 
 @printing
 def _list(options: argparse.Namespace) -> None:
-    data = _data(options)
+    data = data_of(options)
     library = read_library(data)
     found = _statuses(data, library, options.max_days)
     records = [
@@ -85,13 +86,13 @@ def _list(options: argparse.Namespace) -> None:
 def _add(options: argparse.Namespace) -> None:
     item = _with_entries(MADE[ItemKind(options.kind)](id=options.id), options)
     _enter_and_print(
-        options, item, add_item(_data(options), item, _author(options), local_now())
+        options, item, add_item(data_of(options), item, _author(options), local_now())
     )
 
 
 @printing
 def _change(options: argparse.Namespace) -> None:
-    data = _data(options)
+    data = data_of(options)
     there = known_item(read_library(data), ItemKind(options.kind), options.id)
     item = _with_entries(there, options)
     library = change_item(data, item, _author(options), local_now(), there)
@@ -100,7 +101,7 @@ def _change(options: argparse.Namespace) -> None:
 
 @printing
 def _set_retired(options: argparse.Namespace) -> None:
-    data, kind = _data(options), ItemKind(options.kind)
+    data, kind = data_of(options), ItemKind(options.kind)
     is_retired = options.action == "retire"
     by, now = _author(options), local_now()
     library = retire_item(data, kind, options.id, by, now, is_retired=is_retired)
@@ -109,7 +110,7 @@ def _set_retired(options: argparse.Namespace) -> None:
 
 @printing
 def _share(options: argparse.Namespace) -> None:
-    data, address = _data(options), server_address()
+    data, address = data_of(options), server_address()
     signature = supervisor_signature(options.supervisor)
     with closing(Logbook(data)) as logbook, ExitStack() as stack:
         logbook.confirm(read_supervision(data))
@@ -131,7 +132,7 @@ def _share(options: argparse.Namespace) -> None:
 
 @printing
 def _spin(options: argparse.Namespace) -> None:
-    data = _data(options)
+    data = data_of(options)
     tip = known_item(read_library(data), ItemKind.TIP, options.id)
     assert isinstance(tip, ListedTip)
     found = _spun(options)
@@ -191,7 +192,7 @@ def _entries_of_tip(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
         if option in POINTS:
             value = _point(option, value)
         elif option == "picture" and value is not FORGOTTEN:
-            value = keep_picture(_data(options), value)
+            value = keep_picture(data_of(options), value)
         yield entry, _or_none(value)
         if option == "axis":
             yield "axis_origin", None if value is FORGOTTEN else AxisOrigin.GIVEN
@@ -211,7 +212,7 @@ def _point(option: str, words: list[Any]) -> Any:
 
 def _author(options: argparse.Namespace) -> Author:
     """Return the author of a change, once the archive has confirmed the guard."""
-    data = _data(options)
+    data = data_of(options)
     with suppress(NoArchiveError), closing(look_into(data / ARCHIVE)) as database:
         confirm_limits(database, chain_at_home(database), read_supervision(data))
     signature = supervisor_signature(options.supervisor)
@@ -222,7 +223,7 @@ def _enter_and_print(
     options: argparse.Namespace, item: AnyItem, library: Library
 ) -> None:
     """Enter a change in the archive and print the new state."""
-    data = _data(options)
+    data = data_of(options)
     try:
         with closing(Logbook(data)) as logbook:
             faults = logbook.enter_owed()
@@ -277,8 +278,3 @@ def _line(record: dict[str, Any]) -> str:
 
 def _degrees(angle: float) -> str:
     return f"{angle * 57.29577951308232:.2f} degrees"
-
-
-def _data(options: argparse.Namespace) -> Path:
-    folder: Path = options.data_folder() if options.data is None else options.data
-    return folder
