@@ -23,6 +23,7 @@ from tests.verifying import BAR, CHOICES, FRAME, NOON, TABLE
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
 from lightpen.formats.decoding import encode_png
+from lightpen.formats.opened_files import CameraFile
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
@@ -362,6 +363,29 @@ def test_a_verification_that_is_resumed(
     assert find_interrupted(copy) == ()
 
     again.assert_as_before(f"resumed-{n_acts}")
+
+
+def test_a_verification_with_another_camera_file_is_not_resumed(
+    trace: Trace, tmp_path: Path
+) -> None:
+    trace.come()
+    trace.pick_up()
+    trace.touch(*leant(2))
+    copy = tmp_path / "killed"
+    shutil.copytree(trace.folder / SIMULATED, copy / SIMULATED)
+    trace.workflow.shut_down()
+    assert trace.prepared.camera_file is not None
+    renewed = copy / "camera.yaml"
+    content = trace.prepared.camera_file.path.read_text(encoding="utf-8")
+    renewed.write_text(f"{content}# renewed\n", encoding="utf-8")
+
+    again = Trace(copy, replace(trace.prepared, camera_file=CameraFile.read(renewed)))
+    (interrupted,) = find_interrupted(copy)
+    again.come()
+    again.workflow.go_on(interrupted)
+    again.settle()
+    assert again.told[-2]["fault"].code == "under-way.other-files"
+    assert find_interrupted(copy) == (interrupted,)
 
 
 def test_a_verification_that_is_closed(trace: Trace) -> None:
