@@ -36,7 +36,7 @@ SETTLING = 3  # images, after which the hand is at rest
 RESTING = 0.01  # mm, by which a tip at rest may move
 STILL_TURN = np.radians(1.0)
 MAX_LOST = 5  # images in a row without the pen; more end a touch
-HELD_ENOUGH = 3  # images, from which on a discarded point is reported
+WORTH_TELLING = 0.5  # of its images, that were held before a point was broken off
 MAX_PATH = 20  # images
 FAR_ENOUGH = (
     2.0  # mm, that show the direction of approach, or that the pen was taken up
@@ -134,7 +134,7 @@ def advance_touch(
     """Take one more image, of several cameras what they saw together."""
     if not detection.has_pose or detection.is_blurred:
         reason = detection.reason or Reason.BLURRED
-        return _without_pose(state, RejectedFrame(name, reason))
+        return _without_pose(rules, state, RejectedFrame(name, reason))
     seen = _seen(instrument, name, detection)
     state = replace(state, n_lost=0)
     if state.phase is ProbingPhase.AT_REST and not _has_left(state.held, seen):
@@ -163,8 +163,8 @@ def advance_touch(
 
 def at_rest(state: ProbingState) -> ProbingState:
     """Return the touches so far; the pen must leave its place before the next."""
-    state = replace(_let_go(state).state, phase=ProbingPhase.AT_REST, path=())
-    return replace(state, is_sliding=False)
+    let_go = _let_go(state)
+    return replace(let_go, phase=ProbingPhase.AT_REST, path=(), is_sliding=False)
 
 
 def take_all(
@@ -250,43 +250,47 @@ def _differs(
     return bool(angles_between(*rotations)[0, 0] >= turn or way >= distance)
 
 
-def _without_pose(state: ProbingState, rejected: RejectedFrame) -> ProbingTransition:
+def _without_pose(
+    rules: ProbingRules, state: ProbingState, rejected: RejectedFrame
+) -> ProbingTransition:
     state = replace(state, n_lost=state.n_lost + 1)
     if state.n_lost > MAX_LOST and state.phase is ProbingPhase.AT_REST:
         return ProbingTransition(replace(state, held=()))
     if state.n_lost > MAX_LOST:
-        return _let_go(replace(state, is_sliding=False))
+        let_go = replace(_let_go(state), is_sliding=False)
+        return ProbingTransition(let_go, _broken_off(rules, state))
     if state.phase is ProbingPhase.HOLDING:
         state = replace(state, rejected=(*state.rejected, rejected))
     return ProbingTransition(state)
 
 
-def _let_go(state: ProbingState) -> ProbingTransition:
-    """Return to a moving pen; report an incomplete touch."""
-    events: tuple[ProbingEvent, ...] = ()
-    if state.phase is ProbingPhase.HOLDING and len(state.held) >= HELD_ENOUGH:
-        names = tuple(map(_name, state.held))
-        events = (ProbingEvent(ProbingEventKind.BROKEN_OFF, names),)
+def _let_go(state: ProbingState) -> ProbingState:
+    """Return to a moving pen."""
     path = (*state.path, *(each.tip_cam for each in state.held[-1:]))[-MAX_PATH:]
-    return ProbingTransition(
-        replace(
-            state,
-            phase=ProbingPhase.MOVING,
-            held=(),
-            deviating=None,
-            rejected=(),
-            path=path,
-        ),
-        events,
+    return replace(
+        state,
+        phase=ProbingPhase.MOVING,
+        held=(),
+        deviating=None,
+        rejected=(),
+        path=path,
     )
+
+
+def _broken_off(rules: ProbingRules, state: ProbingState) -> tuple[ProbingEvent, ...]:
+    """Report an incomplete touch, but not small motions of a resting hand."""
+    needed = rules.n_settling + WORTH_TELLING * rules.n_frames
+    if state.phase is not ProbingPhase.HOLDING or len(state.held) < needed:
+        return ()
+    return (ProbingEvent(ProbingEventKind.BROKEN_OFF, tuple(map(_name, state.held))),)
 
 
 def _moved_to(
     rules: ProbingRules, state: ProbingState, held: tuple[TipObservation, ...]
 ) -> ProbingTransition:
-    gone = _let_go(state)
-    again = _held(rules, replace(gone.state, phase=ProbingPhase.HOLDING, held=held))
-    return ProbingTransition(again.state, (*gone.events, *again.events))
+    holding = replace(_let_go(state), phase=ProbingPhase.HOLDING, held=held)
+    again = _held(rules, holding)
+    return ProbingTransition(again.state, (*_broken_off(rules, state), *again.events))
 
 
 def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
@@ -296,7 +300,7 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
     used = state.held[rules.n_settling :]
     if not _is_new(rules, state, used[0]):
         if rules.n_frames == 1:  # the pen slides on
-            return ProbingTransition(replace(_let_go(state).state, path=()))
+            return ProbingTransition(replace(_let_go(state), path=()))
         return ProbingTransition(replace(state, phase=ProbingPhase.KNOWN))
     still = StillFrames(
         frames=tuple(each.frame for each in used),

@@ -44,7 +44,6 @@ from lightpen.verification.tasks.task import (
     without_last,
 )
 
-WORTH_TELLING = 0.5  # of its images, that were held before a point was broken off
 BROKEN_OFF = message("session.broken-off")
 
 
@@ -73,7 +72,7 @@ def advance_session(
         return SessionTransition(state)
     rules = rules_of(setup, state, task)
     touched = advance_touch(setup.instrument, rules, state.touching, name, detection)
-    events = tuple(each for each in touched.events if _is_reported(rules, each))
+    events = touched.events
     happened = {event.what for event in events}
     state = replace(state, touching=touched.state)
     if ProbingEventKind.BROKEN_OFF in happened:
@@ -312,12 +311,6 @@ def _screened(setup: SessionSetup, state: SessionState, task: AnyTask) -> Screen
         return without_last(len(state.touches), error.message)
     options = setup.choices.options_of(task)
     return task.screen(options, setup.conditions, state.progress(setup, task))
-
-
-def _is_reported(rules: ProbingRules, event: ProbingEvent) -> bool:
-    """Return whether an event is reported: small motions of a resting hand are not."""
-    needed = rules.n_settling + WORTH_TELLING * rules.n_frames
-    return event.what is ProbingEventKind.RECORDED or len(event.names) >= needed
 
 
 def _suffices(setup: SessionSetup, state: SessionState, task: AnyTask) -> bool:
