@@ -5,13 +5,19 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits
+from lightpen.simulator.swings import paper_camera
 from lightpen.verification.probing.drift_reference import (
     BLOCK,
     LampImages,
+    LampObservations,
     drift_of_images,
     drift_of_lamps,
+    judged_with,
+    lamp_drift_entries,
 )
+from lightpen.verification.tasks.assessment import VERIFY_AGAIN, check
 
 SCALE = 0.2  # mm a pixel
 NOISE = 0.02  # px
@@ -95,3 +101,80 @@ def test_a_camera_that_moved_counts_as_if_it_had_been_anywhere_between() -> None
     assert found is not None
     # GUM 4.3.7: the half-width over the square root of three.
     assert found.share[0] == pytest.approx(0.1 / np.sqrt(3), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("n_images", "n_blocks"), [(23, 0), (24, 3), (79, 9), (80, 10), (200, 10)]
+)
+def test_moves_and_noise_are_those_of_blocks_of_eight_images_or_more(
+    n_images: int, n_blocks: int
+) -> None:
+    rng = np.random.default_rng(2)
+    shifts = rng.normal(0, 0.03, (n_images, 2)) + 0.01 * np.arange(n_images)[:, None]
+    places = np.array([[100.0, 200.0], [700.0, 50.0]])
+    found = drift_of_lamps(places + shifts[:, None], SCALE, LIMITS)
+    if not n_blocks:
+        assert found is None
+        return
+
+    assert found is not None
+    blocks = np.array_split(shifts, n_blocks)
+    means = np.array([block.mean(axis=0) for block in blocks])
+    within = np.concatenate([block - block.mean(axis=0) for block in blocks])
+    n = n_images / n_blocks
+    deviation = np.sqrt(np.mean(within**2) * n / (n - 1))  # with a mean of each block
+    moves = SCALE * (means - means[0])
+    np.testing.assert_allclose(found.moves, moves, atol=1e-12)
+    assert found.uncertainty == pytest.approx(2 * SCALE * deviation * np.sqrt(2 / n))
+    np.testing.assert_allclose(found.lamps, places + shifts.mean(axis=0))
+    assert found.moved == pytest.approx(np.hypot(*moves.T).max())
+    farthest = np.abs(moves).max(axis=0)
+    np.testing.assert_allclose(found.share, [*farthest / np.sqrt(3), 0.0])
+    assert lamp_drift_entries(None) is None
+    entries = lamp_drift_entries(found)
+    assert entries is not None
+    assert entries["moved_mm"] == found.moved
+    assert entries["expanded_uncertainty_mm"] == found.uncertainty
+    assert entries["grade"] == found.assessment.grade.value
+
+
+@pytest.mark.parametrize(("by", "grade"), [(1.001, Grade.PASS), (0.999, Grade.REPEAT)])
+def test_lamps_are_judged_by_the_limit_of_a_drift_alone(
+    by: float, grade: Grade
+) -> None:
+    usual = drift_of_lamps(lamps(shift=0.5), SCALE, LIMITS)
+    assert usual is not None
+    limits = VerificationLimits(drift=by * usual.moved)
+    found = drift_of_lamps(lamps(shift=0.5), SCALE, limits)
+
+    assert found is not None
+    assert found.assessment.grade is grade
+    said = found.assessment.reason.values
+    assert said["limit"] == limits.drift
+    assert (said["moved"], said["uncertainty"]) == (usual.moved, usual.uncertainty)
+    if grade is Grade.REPEAT:
+        assert said["shift"] == pytest.approx(usual.moved / SCALE)
+    other = check(message("drift.too-few"), VERIFY_AGAIN)
+    judged = other if grade is Grade.PASS else found.assessment
+    assert judged_with(other, found) is judged
+    assert judged_with(other, None) is other
+
+
+def test_of_several_cameras_the_one_counts_that_moved_farthest() -> None:
+    camera = paper_camera()
+    still, moved = (
+        LampImages(tuple(lamps(shift=shift)), (1000.0,) * 48) for shift in (0.0, 0.5)
+    )
+    none = LampObservations()
+    seen = none.then(LampObservations((still, moved))).then(none)
+
+    assert len(seen.cameras) == 2
+    found = seen.lamp_drift((camera, camera), LIMITS)
+    alone = drift_of_images(moved, camera.fx, LIMITS)
+    assert found is not None
+    assert alone is not None
+    assert found.moved == alone.moved
+    assert none.lamp_drift((camera,), LIMITS) is None
+    twice = still.then(moved)
+    assert twice.lights == still.lights + moved.lights
+    assert twice.distances == still.distances + moved.distances

@@ -9,20 +9,30 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.pivot.pivot import outlier_distance
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.posture import rotations_of
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, simulate_centers
 from lightpen.verification.probing.probing import (
     ONE_IMAGE,
+    PRECISE,
     ProbingEvent,
     ProbingEventKind,
     ProbingPhase,
     ProbingRules,
     ProbingState,
+    TipObservation,
+    _agrees,
+    _has_left,
     _seen,
     advance_touch,
+    approach_of,
     at_rest,
+    read_rules,
+    taken_again,
 )
+from lightpen.verification.tasks.probed_point import ProbingFrame, StillFrames
 
 RULES = ProbingRules(n_frames=5, n_settling=2)
 STILL = 7  # images of one touch by these rules
@@ -230,3 +240,163 @@ def test_the_noise_of_a_point_is_that_of_its_image(instrument: Instrument) -> No
 
     assert noise[1] == pytest.approx(4 * noise[0])  # never below that of the swing
     assert noise[2] == pytest.approx(16 * noise[0])
+
+
+def test_the_usual_touch_and_the_precise_one_have_so_many_images() -> None:
+    usual = ProbingRules()
+    assert (usual.n_frames, usual.n_settling, PRECISE) == (5, 3, 30)
+    assert (usual.min_turn, usual.min_distance) == (0.0, 0.0)
+    assert ProbingRules(1, 0) == ONE_IMAGE
+    assert read_rules(True, 7) == ProbingRules(7)
+    assert read_rules(False, 7) == ONE_IMAGE
+    with pytest.raises(ValueError, match="Nothing can be touched"):
+        ProbingRules(n_settling=-1)
+
+
+def observation(
+    instrument: Instrument, off: float = 0.0, degrees: float = 0.0, noise: float = 0.0
+) -> TipObservation:
+    """What one image shows of a tip, exact or with noise in each coordinate, mm."""
+    R = rotation_from_vector(np.radians([0.0, 0.0, degrees]))
+    tip_cam = PAPER_CONE + np.array([0.0, off, 0.0])
+    pixels = np.zeros((1, instrument.pen.n_leds, 2))
+    frame = ProbingFrame("image", pixels, R, tip_cam - R @ instrument.tip_pen)
+    return TipObservation(frame, tip_cam, noise**2 * np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("noise", "n_held", "sigma"),
+    # Of the image, of the mean of what is held, and of a tip at rest.
+    [
+        (0.0, 1, 0.01),
+        (0.02, 1, np.sqrt(2 * 0.02**2 + 0.01**2)),
+        (0.02, 4, np.sqrt(1.25 * 0.02**2 + 0.01**2)),
+    ],
+)
+@pytest.mark.parametrize(
+    ("by", "degrees", "is_still"),
+    [(0.99, 0.0, True), (1.01, 0.0, False), (0.0, 0.99, True), (0.0, 1.01, False)],
+)
+def test_a_pen_is_still_within_its_noise_and_a_degree(
+    instrument: Instrument,
+    noise: float,
+    n_held: int,
+    sigma: float,
+    by: float,
+    degrees: float,
+    is_still: bool,
+) -> None:
+    held = (observation(instrument, noise=noise),) * n_held
+    off = by * outlier_distance() * sigma
+    seen = observation(instrument, off, degrees, noise)
+    assert _agrees(held, seen) == is_still
+
+
+@pytest.mark.parametrize(
+    ("off", "degrees", "has_left"),
+    [(1.99, 0.0, False), (2.01, 0.0, True), (0.0, 2.99, False), (0.0, 3.01, True)],
+)
+def test_a_pen_was_taken_up_once_it_moved_two_millimetres_or_turned_three_degrees(
+    instrument: Instrument, off: float, degrees: float, has_left: bool
+) -> None:
+    rest = observation(instrument)
+    assert _has_left((rest,), observation(instrument, off, degrees)) == has_left
+    assert not _has_left((), rest)
+
+
+@pytest.mark.parametrize(
+    ("offs", "direction"),
+    [
+        ([5.0, 1.9], 1.0),  # the last place that is far enough
+        ([-5.0, 2.1], 1.0),
+        ([3.0, -2.1, 1.0], -1.0),
+        ([1.9, -1.9], None),
+        ([], None),
+    ],
+)
+def test_the_approach_is_from_the_last_place_that_is_far_enough(
+    offs: list[float], direction: float | None
+) -> None:
+    path = tuple(PAPER_CONE - np.array([0.0, off, 0.0]) for off in offs)
+    found = approach_of(RULES, ProbingState(path=path), PAPER_CONE)
+
+    assert (found is None) == (direction is None)
+    if found is not None:
+        np.testing.assert_allclose(found, [0.0, direction, 0.0], atol=1e-12)
+    assert approach_of(ONE_IMAGE, ProbingState(path=path), PAPER_CONE) is None
+
+
+def test_only_the_newest_places_of_the_tip_are_kept(instrument: Instrument) -> None:
+    wandering = [
+        (PAPER_CONE + np.array([10.0 * (i % 3), 0.0, 0.0]), 0.1) for i in range(60)
+    ]
+    state, _ = run(instrument, wandering)
+
+    assert len(state.path) == 20
+
+
+@pytest.mark.parametrize(
+    ("off", "degrees", "counts"),
+    [(2.9, 5.9, False), (3.1, 0.0, True), (0.0, 6.1, True)],
+)
+def test_an_earlier_touch_counts_again_unless_its_place_is_known(
+    instrument: Instrument, off: float, degrees: float, counts: bool
+) -> None:
+    rules = ProbingRules(min_turn=np.radians(6.0), min_distance=3.0)
+    known = observation(instrument)
+    before = ProbingState(places=(known,))
+    again = observation(instrument, off, degrees)
+    after = taken_again(instrument, rules, before, StillFrames((again.frame,)))
+
+    assert (after is not before) == counts
+    assert len(after.taken) == counts
+    if counts:
+        np.testing.assert_allclose(after.places[-1].tip_cam, again.tip_cam)
+        assert not after.places[-1].noise.any()
+
+
+def test_at_rest_nothing_is_held_and_the_way_there_is_forgotten(
+    instrument: Instrument,
+) -> None:
+    state, _ = run(instrument, [*moving(), *[HELD] * STILL])
+    assert state.is_sliding
+    assert state.n_lost == 0
+    rest = at_rest(state)
+
+    assert (rest.phase, rest.held, rest.path) == (ProbingPhase.AT_REST, (), ())
+    assert not rest.is_sliding
+    assert rest.taken == state.taken
+
+
+@pytest.mark.parametrize(("n_lost", "is_sliding"), [(5, True), (6, False)])
+def test_a_pen_slides_on_as_long_as_it_is_seen(
+    instrument: Instrument, n_lost: int, is_sliding: bool
+) -> None:
+    state, events = run(instrument, [*moving(), *[HELD] * STILL, *[None] * n_lost])
+    assert state.is_sliding == is_sliding
+    assert [event.what for event in events] == [ProbingEventKind.RECORDED]
+    assert state.n_lost == n_lost
+    seen, _ = run(instrument, [HELD], state=state)
+    assert seen.n_lost == 0
+
+
+@pytest.mark.parametrize(("n_held", "is_told"), [(4, False), (5, True)])
+def test_a_touch_breaks_off_once_half_of_its_images_were_held(
+    instrument: Instrument, n_held: int, is_told: bool
+) -> None:
+    """Of two that settle and five that count, whether the pen moves or is lost."""
+    away = [(PAPER_CONE + np.array([0.0, -9.0 - i, 0.0]), 0.1) for i in range(3)]
+    for after in (away, [None] * 6):
+        _, events = run(instrument, [*moving(), *[HELD] * n_held, *after])
+        assert bool(events) == is_told
+
+
+def test_an_image_between_two_places_is_neither(instrument: Instrument) -> None:
+    """The second place has two images where they agree, and only the last if not."""
+    there, beyond = (
+        (PAPER_CONE + np.array([by, 0.0, 0.0]), 0.1) for by in (20.0, 40.0)
+    )
+    same, _ = run(instrument, [HELD, HELD, there, there])
+    other, _ = run(instrument, [HELD, HELD, there, beyond])
+
+    assert [len(state.held) for state in (same, other)] == [2, 1]
