@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
 
 from lightpen.detection.observations import observe_centers
+from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.disc_diameter import DiameterReading
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.monte_carlo import (
@@ -168,3 +169,56 @@ def test_a_difference_from_the_budget_is_explained_if_it_is_real_and_matters(
     assert reported.code == code
     assert reported.values["percent"] == pytest.approx(100 * abs(ratio - 1))
     assert reported.values["axis"] == "y"
+
+
+def test_errors_of_trials_are_summed_up() -> None:
+    errors = np.linspace(-1.0, 1.0, 41)[:, None] * [0.001, 0.002, 0.003]
+    found = MonteCarlo(errors, np.array([0.001, 0.001, 0.002]), 2)
+
+    deviation = (
+        np.sqrt(np.mean(np.linspace(-1, 1, 41) ** 2)) * np.array([1, 2, 3]) / 1e3
+    )
+    np.testing.assert_allclose(found.deviation, deviation)
+    np.testing.assert_allclose(found.precision, deviation / np.sqrt(82))
+    np.testing.assert_allclose(
+        found.interval, np.outer([-0.95, 0.95], [0.001, 0.002, 0.003])
+    )
+    difference = (found.linear - deviation) * np.sqrt(82) / deviation
+    np.testing.assert_allclose(found.difference, difference)
+    assert found.explanation.code == "monte-carlo.less"
+    assert found.explanation.values == {
+        "percent": pytest.approx(100 * (0.001 / deviation[0] - 1)),
+        "axis": "x",
+        "own": pytest.approx(100 / np.sqrt(82)),
+    }
+
+
+@pytest.mark.parametrize("n_failed", [0, 10, 11])
+def test_trials_that_fail_are_counted_and_half_of_them_may(
+    calibration: Calibration, n_failed: int
+) -> None:
+    def mapped(
+        function: Callable[[S], T], items: Sequence[S], report: Callable[[float], None]
+    ) -> list[T]:
+        assert list(items) == list(range(20))
+        report(0.5)
+        errors: list[Any] = [
+            None if n < n_failed else np.full(3, float(n)) for n in range(len(items))
+        ]
+        return errors
+
+    if n_failed > 10:
+        with pytest.raises(CalibrationError) as info:
+            run_monte_carlo(calibration, 20, mapped)
+        assert info.value.message.values == {"n_failed": 11, "n_trials": 20}
+        return
+    found = run_monte_carlo(calibration, 20, mapped)
+
+    assert (found.n_failed, len(found.errors)) == (n_failed, 20 - n_failed)
+    not_drawn = {"cone distance", "rig", "lens", "timing"}
+    squares = sum(
+        share.standard_uncertainty**2
+        for share in calibration.budget.shares
+        if share.name.value not in not_drawn
+    )
+    np.testing.assert_allclose(found.linear**2, squares)

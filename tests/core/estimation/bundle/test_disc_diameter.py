@@ -108,12 +108,37 @@ def test_areas_that_scatter_make_the_diameter_less_certain() -> None:
     assert reading.sigma > 0.1 * PEN.diameter
 
 
-def test_few_areas_tell_nothing() -> None:
+@pytest.mark.parametrize("n_known", [MIN_READINGS - 1, MIN_READINGS])
+def test_few_areas_tell_nothing(n_known: int) -> None:
     areas = np.full((len(SWING), 1, PEN.n_leds), np.nan)
-    areas.flat[: MIN_READINGS - 1] = 1000.0
+    areas.flat[:n_known] = 1000.0
     widths = np.full((len(SWING), 1), RIM)
 
-    assert read_diameter(state_with(10.0), areas, widths) is None
+    reading = read_diameter(state_with(10.0), areas, widths)
+    assert (reading is None) == (n_known < 20)
+
+
+def test_the_uncertainty_of_the_diameter_is_made_of_edge_scatter_and_dome() -> None:
+    """One of two edges is sharp, and tells nothing of a dome."""
+    swing = np.arange(len(SWING))
+    areas = true_areas() * np.where(swing % 4 < 2, 1.01, 0.99)[:, None] ** 2
+    widths = np.where(swing % 2, 6.0, 1.2)
+    areas[2, 0], widths[0] = np.nan, np.nan
+    reading = read_diameter(state_with(10.0), areas[:, None], widths[:, None])
+
+    known = np.isfinite(areas) & np.isfinite(widths)[:, None]
+    width = np.broadcast_to(widths[:, None], areas.shape)[known]
+    diameter = 2 * np.sqrt(areas[known] / np.pi)  # px
+    value = np.median(10.0 * np.sqrt(areas[known] / true_areas()[known]))
+    read = 10.0 * np.sqrt(areas[known] / true_areas()[known])
+    scatter = np.median(np.abs(read - value)) / 0.674490  # of a normal variable
+    edge = 0.05 * value * np.median(2 * width / diameter)
+    domes = np.where(width > 1.35, (width - 1.35) / diameter**2, 0.0)
+    assert reading is not None
+    assert reading.value == pytest.approx(value)
+    assert reading.sigma == pytest.approx(np.hypot(edge, scatter), rel=1e-5)
+    shift = 0.17 * value * np.median(domes) / np.sqrt(3)
+    assert reading.shift == pytest.approx(shift)
 
 
 @pytest.mark.parametrize("said", [9.0, 11.0, 13.0])

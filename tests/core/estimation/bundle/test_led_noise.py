@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -78,6 +78,75 @@ def test_degrees_of_freedom_that_the_fit_took_tell_nothing_of_an_led(
     assert noise is not None
     assert (noise[0, 9] > 2.0) == is_told
     assert noise[0, 8] > 4.0
+
+
+def exact_residuals(
+    sigmas: FloatArray, counts: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return residuals, (N, 1, L, 2), all of one length, and which are used."""
+    used = np.arange(100)[:, None, None] < counts
+    return np.tile(sigmas[:, None], (100, 1, 1, 2)), used
+
+
+@pytest.mark.parametrize("lost", [1.0, 0.5])
+def test_the_noise_of_an_led_is_shrunk_by_what_is_not_known_of_it(lost: float) -> None:
+    """The fit took a share of the degrees of freedom, and weighed by other noise."""
+    sigmas = np.array([0.03, 0.03, 0.03, 0.033, 0.04, 0.06, 0.2, 0.0])
+    counts = np.array([100, 60, 80, 90, 100, 40, 5 / lost - 1, 50])
+    residuals, used = exact_residuals(sigmas, counts)
+    weights = np.linspace(0.5, 2.0, 8)[None]
+    weighed = 2 * np.sum(counts.astype(int) * (sigmas / weights[0]) ** 2)
+    sigma = np.sqrt(weighed / (2 * np.sum(counts.astype(int)) * lost))
+
+    noise = find_led_noise(residuals, used, float(sigma), weights)
+
+    free = 2 * counts.astype(int) * lost
+    known = free >= 10
+    assert known.tolist() == 6 * [True] + [False, True]
+    logs = np.log(np.maximum(2 * counts * sigmas**2, 1e-12)[known] / free[known])
+    logs[-1] = np.log(1e-12)
+    scatter = 2 / free[known]
+    off = logs - np.median(logs)
+    spread = np.mean(off**2 - scatter)
+    expected = np.exp(0.5 * off * spread / (spread + scatter))
+    assert noise is not None
+    np.testing.assert_allclose(noise[0, known], expected, rtol=1e-9)
+    assert noise[0, 6] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("noisy", "n_leds", "n_images", "is_told"),
+    [
+        (1.66, 2, 20, False),  # two LEDs differ so by chance
+        (1.71, 2, 20, True),
+        (1.25, 10, 1000, False),  # certain, but not worth it
+        (1.27, 10, 1000, True),
+        (3.0, 1, 100, False),  # an LED alone
+    ],
+)
+def test_noise_is_told_where_it_is_certain_and_worth_a_new_fit(
+    noisy: float, n_leds: int, n_images: int, is_told: bool
+) -> None:
+    sigmas = np.append(noisy, np.ones(n_leds - 1))
+    residuals = np.tile(sigmas[:, None], (n_images, 1, 1, 2))
+    used = np.ones((n_images, 1, n_leds), bool)
+
+    found = find_led_noise(residuals, used, 1.0, np.ones((1, n_leds)))
+    assert (found is not None) == is_told
+
+
+@pytest.mark.parametrize(("n_centers", "is_told"), [(30, False), (50, True)])
+def test_sigmas_of_few_centers_tell_nothing(n_centers: int, is_told: bool) -> None:
+    """Two halves that differ by a factor 2: twice n (log cosh log 2) is the gain."""
+    factor = np.where(np.arange(n_centers) % 2, 2.0, 0.5)
+    gain = 2 * n_centers * np.log(np.cosh(2 * np.log(1.3)))
+    assert (gain > 10.83) == is_told
+    actual = np.where(np.arange(n_centers) % 2, 1.3, 1 / 1.3)
+    used = np.ones((n_centers, 1, 1), bool)
+    residuals = np.tile(actual[:, None, None, None], (1, 1, 1, 2))
+
+    found = find_center_noise(residuals, used, factor[:, None, None])
+    assert (found is not None) == is_told
 
 
 def calibrated(sigmas: FloatArray, seed: int) -> tuple[Calibration, FloatArray]:
