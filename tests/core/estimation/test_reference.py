@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from benchmarks.small_records import entries_of
 from tests.reference import assert_as_before, text_figures
-from tests.simulated_centers import simulate_rig_centers
+from tests.simulated_centers import correlated_noise, simulate_rig_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_centers
@@ -20,7 +20,10 @@ from lightpen.detection.rig_observations import observe_rig_centers
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
+from lightpen.estimation.contact.camera_motion import follow_lamps
 from lightpen.estimation.monte_carlo import run_trial, trials_of
+from lightpen.estimation.pivot.pivot import contact_matrix, fit_pivot
+from lightpen.estimation.pivot.pivot_groups import find_groups
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.estimation.reports.methods import METHODS
 from lightpen.estimation.reports.pivot_report import pivot_record
@@ -30,6 +33,7 @@ from lightpen.estimation.reports.summary import calibration_text, pivot_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.running_tip import fit_running_tip
 from lightpen.estimation.spin import fit_spin
+from lightpen.estimation.statistics.correlation import correlated_covariance
 from lightpen.estimation.uncertainty.prediction import predict_uncertainty
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.hashes import InputFile, Inputs
@@ -424,14 +428,110 @@ def test_the_running_tip_is_as_before() -> None:
     assert_as_before("running-tip", vars(running))
 
 
-def test_the_spin_of_a_swing_is_as_before() -> None:
-    rng = np.random.default_rng(10)
+def spun(n: int, turn: float, wobble: float, lasting: float, seed: int) -> FloatArray:
+    """Return rotations about an axis that is tilted as by a hand."""
+    rng = np.random.default_rng(seed)
     axis = np.array([0.1, -0.98, -0.17])
-    turns = rotation_from_vector(np.linspace(0, 1.8, N_IMAGES)[:, None] * axis)
-    wobble = rotation_from_vector(0.01 * rng.standard_normal((N_IMAGES, 3)))
-    first = rotation_from_vector(np.array([0.3, 0.2, -0.1]))
+    turns = rotation_from_vector(np.linspace(0, turn, n)[:, None] * axis)
+    tilts = rotation_from_vector(wobble * correlated_noise(n, lasting, rng))
+    return np.asarray(tilts @ rotation_from_vector(np.array([0.3, 0.2, -0.1])) @ turns)
 
-    assert_as_before("spin", vars(fit_spin(wobble @ first @ turns)))
+
+def test_spins_are_as_before() -> None:
+    found = [
+        vars(fit_spin(spun(*each)))
+        for each in (
+            *((40, 1.8, 0.01, 0.0, 10), (10, 6.2, 0.003, 0.0, 1)),
+            *((25, 0.8, 0.002, 0.9, 2), (60, 9.0, 0.01, 0.7, 3)),
+        )
+    ]
+
+    assert_as_before("spins", found)
+
+
+def test_lamps_are_followed_as_before() -> None:
+    rng, time = np.random.default_rng(11), np.linspace(0, 1, 30)
+    ways = [
+        0 * time,
+        time,
+        np.sin(7 * time),
+        1.0 * (time > 0.4),
+        rng.normal(0, 0.1, 30),
+    ]
+    found = []
+    for n_lamps, way in enumerate(ways, 1):
+        lamps = rng.uniform(500, 900, (n_lamps, 2)) + np.outer(way, [1.0, 0.4])[:, None]
+        lamps += 0.02 * rng.standard_normal(lamps.shape)
+        lamps[::7] = np.nan
+        lamps[3:9, 0] = np.nan
+        path = follow_lamps(lamps)
+        assert path is not None
+        found.append({**vars(path), "moved": path.moved})
+
+    assert_as_before("lamps", found)
+
+
+def test_covariances_of_residuals_that_hang_together_are_as_before() -> None:
+    found = []
+    for n, lasts in ((6, 0.0), (40, 0.0), (40, 0.7), (120, 0.3), (120, 0.97)):
+        rng = np.random.default_rng(n)
+        design = contact_matrix(swing_poses(n, rng, "operator").rotations)
+        noise = correlated_noise(n, lasts, rng) * [1.0, 0.3, 2.0]
+        flat = design.reshape(-1, 6)
+        off = noise.ravel() - flat @ np.linalg.lstsq(flat, noise.ravel(), rcond=None)[0]
+        residuals = off.reshape(n, 3)
+        found += [correlated_covariance(design, residuals, x) for x in (0.0, 0.5)]
+
+    assert_as_before("correlated", found)
+
+
+# Number of poses, share of another tip or pivot and how far off these are, mm.
+GROUPS = [
+    *((60, 0.5, 4.0, 0.0), (60, 0.3, 0.0, 3.0), (60, 0.12, 0.0, 8.0)),
+    *((60, 0.5, 0.6, 0.5), (60, 0.2, 1.0, 0.3), (13, 0.5, 5.0, 0.0)),
+    *((60, 0.08, 9.0, 0.0), (60, 0.5, 0.0, 0.4), (700, 0.4, 2.0, 1.0)),
+]
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_groups_of_poses_are_as_before(mixed: bool) -> None:
+    """The others are in between, or the last."""
+    found: list[Any] = []
+    for seed, (n, share, tip, pivot) in enumerate(GROUPS):
+        rng = np.random.default_rng(seed)
+        rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (n, 3)))
+        others = np.arange(n) >= (1 - share) * n
+        others = rng.permutation(others) if mixed else others
+        translations = np.array([10.0, 20.0, 800.0]) - rotations @ [2.0, -1.0, 150.0]
+        moves = rotations @ [0.0, tip, 0.0] + [pivot, 0.0, 0.0]
+        translations += others[:, None] * moves
+        translations += 0.3 * correlated_noise(n, 0.3, rng)
+        translations[n // 2] += 40.0
+        used = fit_pivot(rotations, translations).used
+        groups = find_groups(rotations, translations, used)
+        found.append({"found": groups is not None, **(vars(groups) if groups else {})})
+
+    assert_as_before(f"groups-{mixed}", dict(enumerate(found)))
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 3.0])
+def test_a_tip_by_poses_of_known_covariance_is_as_before(times: float) -> None:
+    """The noise is a multiple of what is stated."""
+    rng = np.random.default_rng(13)
+    rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (40, 3)))
+    translations = np.array([10.0, 20.0, 800.0]) - rotations @ [2.0, -1.0, 150.0]
+    roots = rng.standard_normal((40, 6, 6)) * ([2e-4] * 3 + [0.03] * 3)
+    covariances = np.swapaxes(roots, 1, 2) @ roots
+    off = times * np.einsum("nji,nj->ni", roots, rng.standard_normal((40, 6)))
+    turned = rotation_from_vector(off[:, :3]) @ rotations
+    translations += off[:, 3:]
+    translations[7] += 1.0
+    found = calibrate_pivot(turned, translations, covariances)
+
+    assert_as_before(
+        f"pivot-stated-{times}",
+        {**vars(found.fit), "correlated": found.covariance, "w": list(found.warnings)},
+    )
 
 
 @pytest.mark.parametrize("robust", [True, False])

@@ -40,7 +40,7 @@ from lightpen.estimation.bundle.noise_correlation import (
     Correlation,
     measure_correlation,
 )
-from lightpen.estimation.bundle.priors import Prior, Priors
+from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
 from lightpen.estimation.statistics.variance_components import ALLOWED, find_component
 from lightpen.model.information import inverse
@@ -302,7 +302,8 @@ def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:
         found = find_component(root.T @ own @ root, root.T @ right)
         ratio = max(found.sigma if found.exceeds(ALLOWED) else 0.0, MOST_SHRUNK)
         if ratio < 1:
-            cameras[c] = Prior(ratio**2 * cameras[c].covariance, assumed=True)
+            shrunk = ratio**2 * cameras[c].covariance
+            cameras[c] = replace(cameras[c], covariance=shrunk)
     if all(new is old for new, old in zip(cameras, priors.cameras, strict=True)):
         return priors
     return replace(priors, cameras=tuple(cameras))

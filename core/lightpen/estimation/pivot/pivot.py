@@ -285,7 +285,7 @@ def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
     n_poses = len(equations.rotations)
     rng = default_rng(0)  # the same poses give the same tip
     size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))
-    order = np.argpartition(rng.random((N_SAMPLES, n_poses)), size - 1, axis=1)
+    order = np.argpartition(rng.random((N_SAMPLES, n_poses)), size, axis=1)
     members = np.zeros((N_SAMPLES, n_poses), dtype=bool)
     np.put_along_axis(members, order[:, :size], True, axis=1)
     solutions = equations.solve(members)

@@ -9,12 +9,23 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.effect_findings import FoundEffect
-from lightpen.estimation.bundle.effects import Effect, EffectName, gain_of, size_of
+from lightpen.estimation.bundle.effects import (
+    Effect,
+    EffectName,
+    cone_moves,
+    gain_of,
+    mechanics_of,
+    size_of,
+)
+from lightpen.estimation.bundle.linearised import BundleState, views_at
+from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
+from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
@@ -211,6 +222,96 @@ def test_play_and_sag_are_expected_downward_with_their_usual_mean_square() -> No
     assert (play.mean[1:] == 0).all()
     assert np.diag(play.prior)[1:] == pytest.approx(0.005**2 / 3)
     assert (play.at_zero.mean == 0).all()
+
+
+LARGEST = {  # mm, px or image intervals
+    EffectName.LENS: 0.08, EffectName.COMPLIANCE: 0.03, EffectName.LOOSE: 0.01,
+    EffectName.SAG: 0.03, EffectName.TILT: 0.1, EffectName.DELAY: 0.5,
+    EffectName.SHUTTER: 1.0, EffectName.STROBE: 0.1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EffectName)
+@pytest.mark.parametrize("times", [0.1, 2.0, 5.0, 1e6])
+def test_the_size_of_one_unknown_is_that_of_its_likelihood(
+    name: EffectName, times: float
+) -> None:
+    """It is seen ``times`` its uncertainty off, which is a hundredth of the largest."""
+    largest, stated = LARGEST[name], 0.3 * LARGEST[name]
+    effect = Effect(name, 0, np.zeros((1, 1)), (4 * np.eye(1),), stated)
+    noise = 0.01 * largest
+    found = size_of(effect, np.eye(1) / noise**2, np.array([times / noise]))
+
+    sizes = largest * 1000.0 ** (np.arange(60) / 59 - 1)
+    both = noise**2 + 4 * sizes**2
+    seen = times * noise
+    costs = np.log(both / noise**2) + seen**2 / both - seen**2 / noise**2
+    best = int(np.argmin(costs))
+    assert found.sigma == pytest.approx(sizes[best])
+    assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
+    assert found.covariance[0, 0] == pytest.approx(4 * sizes[best] ** 2)
+    assert found.is_supported == (-costs[best] > 6.6349)
+    if effect.is_mechanical:
+        mean_square = 4 * stated**2
+        half = name in (EffectName.LOOSE, EffectName.SAG)
+        known = mean_square * (1 - 2 / np.pi) if half else mean_square
+        assert found.expected[0, 0] == pytest.approx(known)
+        return
+    likely = 0.3 / 60 * np.exp(-0.5 * (costs - costs.min()))
+    likely /= likely.sum() + 0.7 * np.exp(0.5 * costs.min())
+    squares = 4 * sizes**2
+    if name is not EffectName.LENS:  # of timing, given the images
+        share = squares / both
+        squares = share * noise**2 + (share * seen) ** 2
+    assert found.expected[0, 0] == pytest.approx(np.sum(likely * squares))
+
+
+def test_usual_mechanics_have_their_usual_sizes() -> None:
+    true, _ = swing()
+    state = BundleState(
+        rig_of(CAMERA), PEN, true.tip_pen, true.cone_cam, true.rotations
+    )
+    views = views_at(state, np.zeros((N_IMAGES, 1, 10, 2)))
+    mechanics = mechanics_of(
+        views, true.rotations, axes_of_cone(true.rotations), PEN.leds, 0.004
+    )
+    usual = {each.name: each.stated for each in mechanics}
+    shapes = {each.name: np.array(each.shapes) for each in mechanics}
+
+    assert usual == {
+        EffectName.COMPLIANCE: 0.004,
+        EffectName.LOOSE: 0.005,
+        EffectName.SAG: 0.012,
+        EffectName.TILT: 0.01,
+    }
+    np.testing.assert_array_equal(shapes[EffectName.COMPLIANCE], [0.5 * np.eye(2)])
+    loose = [np.diag(one) for one in np.eye(3)]
+    np.testing.assert_array_equal(shapes[EffectName.LOOSE], loose)
+    np.testing.assert_array_equal(shapes[EffectName.SAG], [np.eye(1)])
+    np.testing.assert_array_equal(shapes[EffectName.TILT], [np.eye(4)])
+    assert not any(each.is_exact or each.camera for each in mechanics)
+
+
+def test_moves_of_the_tip_are_those_of_a_lean_in_one_plane() -> None:
+    """The pen leans by an angle to the right; its y axis is that of the cone."""
+    angles = np.array([0.3, 0.1, 0.005, -0.2])
+    turns = rotation_from_vector(np.outer(-angles, [0.0, 0.0, 1.0]))
+    axes = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])
+    found = cone_moves(turns, axes)
+
+    sine, cosine = np.sin(angles), np.cos(angles)
+    nothing = np.zeros(4)
+    np.testing.assert_allclose(found.lean, np.stack([sine, nothing], 1), atol=1e-15)
+    # Across the pen, of its axis and that of the cone; and across the cone.
+    across = np.stack([-sine * cosine, sine**2, nothing], axis=1)
+    np.testing.assert_allclose(found.compliance[..., 0], across, atol=1e-15)
+    side = np.stack([sine, nothing, nothing], axis=1)
+    np.testing.assert_allclose(found.compliance[..., 1], side, atol=1e-15)
+    size = np.maximum(np.abs(sine), 0.02)[:, None]
+    np.testing.assert_allclose(found.loose[..., 0], across / size, atol=1e-15)
+    jump = np.tanh(sine / 0.02)[:, None] * turns[:, :, 0]
+    np.testing.assert_allclose(found.loose[..., 1], jump, atol=1e-15)
+    np.testing.assert_allclose(found.loose[..., 2], 0.0, atol=1e-15)
 
 
 def test_the_likelier_of_two_shapes_is_taken() -> None:
