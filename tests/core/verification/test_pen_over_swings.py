@@ -310,8 +310,9 @@ def test_the_figures_of_a_pen_over_its_swings_are_as_before(swing: Swing) -> Non
     twice = replace(knocked, leds=knocked.leds + 0.06 * (np.arange(10) == 2)[:, None])
     first, second, third = swing(pen, 1), swing(pen, 2), swing(knocked, 3)
     warm = swing(pen, 5, growth=WARMTH)
-    inputs = structs.replace(first.calibration.inputs, camera=FileRecord("c", "2" * 64))
-    record = structs.replace(first.calibration, inputs=inputs)
+    inputs = structs.replace(warm.calibration.inputs, camera=FileRecord("c", "2" * 64))
+    record = structs.replace(warm.calibration, inputs=inputs)
+    other_camera = replace(warm, calibration=record)
     found = [
         examine_pen(swings, paper_camera(), PEN_FILE.leds)
         for swings in (
@@ -319,7 +320,7 @@ def test_the_figures_of_a_pen_over_its_swings_are_as_before(swing: Swing) -> Non
             [first, second, swing(twice, 4), third],
             [first, second, warm],
             [first, warm, swing(pen, 6, growth=2 * WARMTH)],
-            [first, replace(warm, calibration=record)],
+            [first, other_camera],
         )
     ]
 
