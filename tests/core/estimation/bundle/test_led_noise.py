@@ -231,3 +231,87 @@ def test_sigmas_of_centers_sharpen_the_tip_and_are_recorded() -> None:
     np.testing.assert_array_equal(shown_images(record).sigmas, own.sigmas)
     off = by_own.joint.tip_pen - swing.tip_pen
     assert (np.abs(off) < by_own.budget.expanded_uncertainty[:3]).all()
+
+
+def of_variances(variances: FloatArray, n_images: int) -> FloatArray:
+    """Return residuals whose mean squares are exact, (N, 1, L, 2)."""
+    signs = np.where(np.arange(n_images) % 2 == 0, 1.0, -1.0)[:, None, None, None]
+    return np.asarray(signs * np.sqrt(variances)[:, None] * np.ones(2))
+
+
+def test_logarithms_of_variances_are_shrunk_by_what_chance_scatters_them() -> None:
+    """An LED in fewer images is shrunk more; the freedom of the fit is 0.9."""
+    variances = np.array([1.0, 1.0, 1.0, 1.2, 0.9, 4.0, 6.0])
+    counts = 2 * np.array([100, 100, 100, 100, 100, 100, 20])
+    used = np.arange(100)[:, None, None] < (counts / 2)[None, None]
+    weights = np.array([[1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0]])
+    weighed = np.sum(variances * counts / weights[0] ** 2)
+    sigma = float(np.sqrt(weighed / counts.sum() / 0.9))
+
+    noise = find_led_noise(of_variances(variances, 100), used, sigma, weights)
+
+    by_chance = 2 / (0.9 * counts)
+    logs = np.log(variances / 0.9) - np.median(np.log(variances / 0.9))
+    spread = np.mean(logs**2 - by_chance)
+    expected = np.exp(0.5 * logs * spread / (spread + by_chance))
+    assert noise is not None
+    np.testing.assert_allclose(noise[0], expected)
+
+
+@pytest.mark.parametrize(
+    ("one", "is_told"), [(1.0, False), (3.45, False), (3.5, True), (1 / 3.5, True)]
+)
+def test_an_led_is_told_from_the_others_where_chance_alone_seldom_makes_it(
+    one: float, is_told: bool
+) -> None:
+    """Logarithms of variances scatter by sqrt(2 / 40): the misfit has to be 27.9."""
+    variances = np.where(np.arange(10) == 4, one, 1.0)
+    used = np.ones((20, 1, 10), bool)
+    sigma = float(np.sqrt(variances.mean()))
+
+    noise = find_led_noise(of_variances(variances, 20), used, sigma, EVEN)
+
+    logs = np.log(variances)
+    assert (np.sum((logs - logs.mean()) ** 2) * 20 > 27.88) == is_told
+    assert (noise is not None) == is_told
+
+
+def test_an_led_that_is_hardly_noisier_is_not_worth_a_new_fit() -> None:
+    """However sure it is: the noise has to be 1.25 times that of another."""
+    used = np.ones((10_000, 1, 10), bool)
+    for ratio, is_worth in ((1.24, False), (1.26, True)):
+        variances = np.where(np.arange(10) == 4, ratio**2, 1.0)
+        sigma = float(np.sqrt(variances.mean()))
+        noise = find_led_noise(of_variances(variances, 10_000), used, sigma, EVEN)
+        assert (noise is not None) == is_worth
+
+
+def test_two_leds_at_least_have_to_be_seen_often_enough() -> None:
+    """Ten degrees of freedom, of five images."""
+    for n_seen, is_told in ((4, False), (5, True)):
+        used = np.zeros((100, 1, 3), bool)
+        used[:, 0, 0] = used[:n_seen, 0, 1] = True
+        residuals = of_variances(np.array([1.0, 400.0, 1.0]), 100)
+        squares = np.sum(residuals[used] ** 2)
+        sigma = 0.999 * float(np.sqrt(squares / (2 * used.sum())))
+        noise = find_led_noise(residuals, used, sigma, np.ones((1, 3)))
+        assert (noise is not None) == is_told
+        if noise is not None:
+            assert noise[0, 2] == 1.0
+
+
+def test_the_power_of_centres_is_that_of_maximum_likelihood() -> None:
+    """Two kinds of centres: the ratio of noise is between two powers of that stated."""
+    used = np.ones((60, 1, 10), bool)
+    used[:, 0, 9] = False
+    stated = np.where(np.arange(10) < 5, 1.0, 4.0) * np.ones(used.shape)
+    for ratio, power in (
+        (4**0.6, 0.5),
+        (4**0.65, 0.75),
+        (4**0.9, 1.0),
+        (4**0.15, 0.25),
+    ):
+        variances = np.where(np.arange(10) < 5, 1.0, ratio**2)
+        noise = find_center_noise(of_variances(variances, 60), used, stated)
+        assert noise is not None
+        np.testing.assert_allclose(noise, stated**power)
