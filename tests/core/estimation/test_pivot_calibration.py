@@ -10,6 +10,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import read_poses
+from lightpen.messages import message
 from lightpen.simulator.swings import swing_poses
 
 N_POSES = 200
@@ -119,3 +120,43 @@ def test_stated_covariances_are_a_floor_to_the_uncertainty() -> None:
     ratio = cautious.expanded_uncertainty / honest.expanded_uncertainty
     # Those of the honest one are raised a little by what its scatter leaves open.
     assert np.all((ratio > 7) & (ratio < 11))
+
+
+@pytest.mark.parametrize(("n_wrong", "is_warned"), [(20, False), (21, True)])
+def test_more_than_a_tenth_of_the_poses_left_out_is_warned_of(
+    n_wrong: int, is_warned: bool
+) -> None:
+    R, t = poses()
+    wrong = 3 * np.arange(n_wrong) + 1
+    rng = np.random.default_rng(1)
+    ways = rng.standard_normal((n_wrong, 3))
+    t[wrong] += 150 * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    found = calibrate_pivot(R, t)
+
+    np.testing.assert_array_equal(np.flatnonzero(~found.fit.used), wrong)
+    assert bool(found.warnings) == is_warned
+    if is_warned:
+        (warning,) = found.warnings
+        named = ", ".join(str(place + 1) for place in wrong[:10])
+        assert warning == message(
+            *("pivot.many-left-out",),
+            n_left_out=21,
+            n_poses=N_POSES,
+            poses=f"{named}, ...",
+        )
+
+
+@pytest.mark.parametrize(("n_others", "is_refused"), [(78, False), (82, True)])
+def test_two_fifths_of_the_poses_may_be_a_minority(
+    n_others: int, is_refused: bool
+) -> None:
+    others = np.arange(N_POSES) >= N_POSES - n_others
+    if is_refused:
+        with pytest.raises(CalibrationError) as info:
+            calibrate_pivot(*with_other_pivot(others))
+        assert info.value.message.code == "pivot.two-pivots"
+        return
+    found = calibrate_pivot(*with_other_pivot(others))
+    (warning,) = found.warnings
+    assert warning.code == "pivot.two-pivots"
+    assert warning.values["distance"] == pytest.approx(5.0, abs=0.6)

@@ -194,3 +194,58 @@ def test_a_lamp_that_moves_by_itself_changes_nothing() -> None:
     )
     codes = [str(each.code) for each in warnings_of(calibration)]
     assert codes == ["warning.lamp-moved"]
+
+
+@pytest.mark.parametrize(("share", "is_followed"), [(0.46, False), (0.54, True)])
+def test_a_camera_moved_if_the_pen_shifts_by_half_as_much_as_the_lamps(
+    share: float, is_followed: bool
+) -> None:
+    seen = replace(seen_along(share * EVEN), lamps=lamps_along(EVEN))
+    path = pose_steadily(CAMERA, PEN, seen).path
+
+    assert path is not None
+    assert path.is_followed == is_followed
+
+
+def test_ten_images_are_needed_to_follow_a_lamp() -> None:
+    assert follow_lamps(lamps_along(EVEN)[:9]) is None
+    assert follow_lamps(lamps_along(EVEN)[:10]) is not None
+
+
+def test_exact_lamps_that_stand_still_have_no_noise() -> None:
+    path = follow_lamps(lamps_along(STILL, 0.0))
+
+    assert path is not None
+    assert path.moved == 0
+    assert path.noise == pytest.approx(1e-6)
+
+
+def test_the_motion_of_a_camera_is_taken_out_as_its_turn() -> None:
+    """Images of a camera that turns show what one that stands still would."""
+    turns = rotation_from_vector(np.outer(np.sin(3 * TIME), [2e-3, -3e-3, 0.0]))
+    poses = turns @ SWING.rotations, np.einsum("nij,nj->ni", turns, SWING.translations)
+    rng = np.random.default_rng(7)
+    pixels = simulate_centers(CAMERA, PEN, *poses, 0.0, rng)
+    lamps = np.stack(
+        [
+            CAMERA.project(np.einsum("nij,j->ni", turns, np.append(ray, 1.0)))
+            for ray in CAMERA.unproject(LAMPS)
+        ],
+        axis=1,
+    )
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    seen = replace(observe_centers(centers, CAMERA, PEN), lamps=lamps)
+    steady = pose_steadily(CAMERA, PEN, seen)
+
+    still = simulate_centers(CAMERA, PEN, SWING.rotations, SWING.translations, 0.0, rng)
+    assert steady.path is not None
+    assert steady.path.is_followed
+    # But for a turn that all images share; a turn moves the edges a little more.
+    off = steady.observations.pixels - still
+    off -= off.mean(axis=0)
+    moved = np.abs(pixels - pixels.mean(axis=0) - still + still.mean(axis=0)).max()
+    assert moved > 5.0
+    assert np.abs(off).max() < 0.15
+    np.testing.assert_array_equal(
+        steady.observations.pixels, steady.observations.seen_pixels
+    )

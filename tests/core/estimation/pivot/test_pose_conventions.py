@@ -95,3 +95,86 @@ def test_poses_without_a_tip_are_refused(n_poses: int) -> None:
 def test_a_tip_nearer_to_the_camera_than_to_its_pen_looks_inverted() -> None:
     assert not is_likely_inverted(SWING.tip_pen, SWING.cone_cam)
     assert is_likely_inverted(SWING.cone_cam, SWING.tip_pen)
+
+
+def pivoting(n: int, tip: FloatArray, seed: int = 4) -> tuple[FloatArray, FloatArray]:
+    """Return exact poses about a pivot 800 mm away."""
+    rng = np.random.default_rng(seed)
+    rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (n, 3)))
+    return rotations, np.array([10.0, 20.0, 800.0]) - rotations @ tip
+
+
+def code_of(rotations: FloatArray, translations: FloatArray) -> str:
+    """Return the code of what is refused; empty if the poses pass."""
+    try:
+        require_usual_reading(rotations, translations)
+    except CalibrationError as error:
+        return error.message.code
+    return ""
+
+
+TIP = np.array([2.0, -1.0, 150.0])
+
+
+@pytest.mark.parametrize(
+    ("n_poses", "n_wrong", "code"),
+    [(20, 2, ""), (20, 6, "poses.no-tip"), (21, 9, ""), (21, 12, "poses.no-tip")],
+)
+def test_half_of_the_poses_must_agree_and_most_of_a_few(
+    n_poses: int, n_wrong: int, code: str
+) -> None:
+    """The median is of all: with 12 of 21 it is of those that do not agree."""
+    R, t = pivoting(n_poses, TIP)
+    t[:n_wrong] += np.random.default_rng(5).uniform(-400, 400, (n_wrong, 3))
+    assert code_of(R, t) == code
+
+
+@pytest.mark.parametrize(("size", "code"), [(9.9, "poses.in-metres"), (10.1, "")])
+def test_translations_of_a_centimetre_are_in_metres(size: float, code: str) -> None:
+    R, t = pivoting(30, TIP)
+    t *= size / np.median(np.linalg.norm(t, axis=1))
+    assert code_of(R, t) == code
+
+
+@pytest.mark.parametrize(
+    ("length", "code"), [(9900.0, ""), (10_100.0, "poses.in-micrometres")]
+)
+def test_a_tip_ten_metres_away_is_in_micrometres(length: float, code: str) -> None:
+    R, t = pivoting(30, np.array([0.0, 0.0, -length]))
+    assert code_of(R, t) == code
+    if code:
+        with pytest.raises(CalibrationError) as info:
+            require_usual_reading(R, t)
+        assert info.value.message.values["length"] == pytest.approx(length / 1000)
+
+
+def scattered(R: FloatArray, t: FloatArray, size: float) -> FloatArray:
+    """Return translations all of which miss the pivot by the same distance."""
+    ways = np.random.default_rng(6).standard_normal(t.shape)
+    return np.asarray(t + size * ways / np.linalg.norm(ways, axis=1, keepdims=True))
+
+
+@pytest.mark.parametrize(
+    ("length", "size", "code"),
+    [
+        (150.0, 18.0, ""),
+        (150.0, 23.0, "poses.no-tip"),
+        (20.0, 4.0, ""),  # the poses move by little more, but so may noise
+        (12.0, 6.5, "poses.no-tip"),
+        (60.0, 6.5, ""),
+    ],
+)
+def test_a_tip_may_scatter_by_20_mm_unless_that_is_all_that_moves(
+    length: float, size: float, code: str
+) -> None:
+    R, t = pivoting(200, np.array([0.0, 0.0, length]))
+    assert code_of(R, scattered(R, t, size)) == code
+
+
+def test_many_poses_are_judged_by_some_of_them() -> None:
+    """Of 2000 poses 200 are looked at, from the first to the last."""
+    R, t = pivoting(2000, TIP)
+    some = np.unique(np.linspace(0, 1999, 200).round().astype(int))
+    spoilt = t + 500.0 * np.random.default_rng(7).standard_normal(t.shape)
+    spoilt[some] = t[some]
+    assert code_of(R, spoilt) == ""
