@@ -66,11 +66,6 @@ class Inspection:
     edge_width: float
     chosen: IntArray  # (N,), which of the spots these are
 
-    @property
-    def is_sharp(self) -> bool:
-        """Whether the rims are as sharp as good centres need."""
-        return is_sharp(self.edge_width)
-
 
 def is_sharp(edge_width: float) -> bool:
     """Return whether rims of this width, px, are as sharp as good centres need."""

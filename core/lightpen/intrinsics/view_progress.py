@@ -28,18 +28,13 @@ class ViewProgress:
     size: float = 0.0
     skew: float = 0.0
 
-    @property
-    def is_enough(self) -> bool:
-        """Whether each varies enough."""
-        return min(self.x, self.y, self.size, self.skew) >= 1.0
 
-
-def view_progress(views: Views, camera: int = 0) -> ViewProgress:
-    """Return the variation of the views of a camera."""
-    size = views.image_sizes[camera]
+def view_progress(views: Views) -> ViewProgress:
+    """Return the variation of the views of the first camera."""
+    size = views.image_sizes[0]
     found = [
         _measures(_outline(views, seen), size)
-        for seen in views.pixels[:, camera]
+        for seen in views.pixels[:, 0]
         if np.isfinite(seen[:, 0]).sum() >= MIN_POINTS
     ]
     if not found:

@@ -12,6 +12,7 @@ from lightpen.detection.inspection import (
     Exposure,
     StraySearch,
     inspect,
+    is_sharp,
     lasting_light,
     stray_light,
 )
@@ -54,7 +55,7 @@ def test_a_good_exposure_has_ten_good_leds_in_focus() -> None:
     exposure = found.exposure
     assert (exposure.n_dark, exposure.n_good, exposure.n_saturated) == (0, 10, 0)
     assert exposure.are_leds
-    assert found.is_sharp
+    assert is_sharp(found.edge_width)
 
 
 def test_what_is_bright_is_no_led_until_it_is_labelled() -> None:
@@ -84,7 +85,7 @@ def test_defocus_is_not_sharp() -> None:
     soft = np.asarray(cv2.GaussianBlur(image(), (0, 0), 3), dtype=np.uint8)
     found = inspect(detect_spots(soft))
 
-    assert not found.is_sharp
+    assert not is_sharp(found.edge_width)
     assert found.edge_width > 5
 
 
@@ -93,7 +94,7 @@ def test_nothing_bright_has_no_edge() -> None:
 
     assert found.exposure == Exposure(are_leds=False)
     assert np.isnan(found.edge_width)
-    assert not found.is_sharp
+    assert not is_sharp(found.edge_width)
 
 
 def test_masked_stray_light_is_seen_no_more() -> None:
