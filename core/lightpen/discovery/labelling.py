@@ -21,7 +21,7 @@ from lightpen.detection.pose import (
 from lightpen.discovery.hypotheses import Seed
 from lightpen.discovery.tracks import Pieces, assign, padded
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import reflection, rotation_from_vector
 
 OUTWARDS = 6  # images, farther than which no rotation is carried at once
 MIN_TURN_LEDS = 3  # that fix a rotation about the tip
@@ -172,7 +172,7 @@ class _Search:
         normal = np.linalg.svd(leds - middle)[2][2]
         sight = R @ middle + self.state.cone_rig
         sight /= np.linalg.norm(sight, axis=1, keepdims=True)
-        return _mirror(sight) @ R @ _mirror(normal)
+        return reflection(sight) @ R @ reflection(normal)
 
     def _linearised(
         self, R: FloatArray, pixels: FloatArray
@@ -306,11 +306,6 @@ class _Search:
         for i, predicted in zip(images.tolist(), there, strict=True):
             labels[i] = assign(predicted, self.spots[i], AT_LED * self.width)
         return labels
-
-
-def _mirror(normals: FloatArray) -> FloatArray:
-    """Return the reflections (..., 3, 3) in planes with unit normals (..., 3)."""
-    return np.asarray(np.eye(3) - 2 * normals[..., :, None] * normals[..., None, :])
 
 
 def _loss(lengths: FloatArray, gate: float) -> FloatArray:

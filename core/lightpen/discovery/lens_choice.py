@@ -28,10 +28,10 @@ from lightpen.intrinsics.distortion import (
     MANY,
     N_FOLDS,
     PULLS,
-    WIDE,
     WORTH,
     Choice,
     is_significantly_less,
+    is_wide,
 )
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.model.camera import Camera
@@ -71,7 +71,7 @@ def choose_lens(
     if needed is not None:
         return start.state, Choice(FEW, {})
     best = _Trial(start, any_camera(start.state.rig.cameras[0]))
-    models = (MANY, FISHEYE) if _is_wide(best.camera, pixels) else (MANY,)
+    models = (MANY, FISHEYE) if is_wide(best.camera, pixels) else (MANY,)
     found = (_refitted(start, n, pixels, lengths) for n in models)
     trials = [trial for trial in found if trial is not None]
     if not trials:
@@ -89,12 +89,6 @@ def choose_lens(
             best, errors = trial, its_errors
     choice = Choice(len(best.camera.distortion), held_out, best.pull)
     return best.start.state, choice
-
-
-def _is_wide(camera: Camera, pixels: FloatArray) -> bool:
-    """Return whether LEDs were seen so far off the axis that a fisheye differs."""
-    off = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
-    return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
 
 
 def _refitted(

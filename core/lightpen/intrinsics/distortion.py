@@ -179,7 +179,7 @@ def choose_distortion(
         if folds(first.camera):
             first = _unfolded(views, tolerances, first.camera) or first
         others = [lambda: _richer(views, tolerances, first.camera)]
-        if _is_wide(first.camera, views):
+        if is_wide(first.camera, views.pixels[:, 0]):
             others.append(lambda: _converted(views, tolerances, first.fitted, FISHEYE))
     else:
         others = [
@@ -237,11 +237,13 @@ def is_significantly_less(
     return bool(rms < (1 - WORTH) * rms_before and gains.sum() > least)
 
 
-def _is_wide(camera: Camera, views: Views) -> bool:
-    """Return whether points were seen so far off the axis that a fisheye differs."""
-    pixels = views.pixels[:, 0][views.seen[:, 0]]
+def is_wide(camera: Camera, pixels: FloatArray) -> bool:
+    """Return whether points were seen so far off the axis that a fisheye differs.
+
+    ``pixels`` (..., 2) are NaN where one was not seen.
+    """
     off = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
-    return bool(np.linalg.norm(off, axis=-1).max() > WIDE)
+    return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
 
 
 def _converted(

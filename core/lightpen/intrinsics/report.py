@@ -18,6 +18,7 @@ from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.variance_components import MixedFit
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.model.camera import Camera
+from lightpen.model.decision_rules import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
 
 COLUMNS, ROWS = 4, 3
@@ -62,7 +63,6 @@ SHAPE_NAMES = (
     "bend_across_mm",
     "bend_along_columns_mm",
 )
-COVERAGE_FACTOR = 2.0
 N_WORST = 5
 TITLE = 13  # characters
 

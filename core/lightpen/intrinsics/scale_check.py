@@ -7,8 +7,8 @@ import numpy as np
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
 from lightpen.messages import printable
+from lightpen.model.decision_rules import COVERAGE_FACTOR
 
-COVERAGE_FACTOR = 2.0
 PIXEL = 1.0  # length of a screen that its pixel pitch measures
 LARGEST_U = 0.05  # of the length
 FARTHEST = 0.1  # of the stated length: more is another unit or a slip, no printer

@@ -94,6 +94,11 @@ def skew(vectors: FloatArray) -> FloatArray:
     return np.asarray((vectors @ GENERATORS).reshape(*vectors.shape, 3))
 
 
+def reflection(normals: FloatArray) -> FloatArray:
+    """Return the reflections (..., 3, 3) in planes with unit normals (..., 3)."""
+    return np.asarray(np.eye(3) - 2 * normals[..., :, None] * normals[..., None, :])
+
+
 def nearest_rotation(matrices: FloatArray) -> FloatArray:
     """Return the rotations nearest to matrices (..., 3, 3) in the Frobenius norm."""
     U, _, Vt = np.linalg.svd(matrices)

@@ -1,12 +1,12 @@
 """Faults, reported until they are cleared."""
 
 import logging
+from collections.abc import Callable
 from enum import Enum
 from typing import Protocol
 
 from lightpen.errors import LightpenError
 from lightpen.messages import Message
-from lightpen.runners.serial_queue import Act
 
 _logger = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ class FaultReporter:
         """Whether a fault is active."""
         return self._fault is not None
 
-    def trying(self, act: Act) -> None:
+    def trying(self, act: Callable[[], object]) -> None:
         """Run a function; if it fails, report the fault and keep the state."""
         try:
             act()

@@ -585,7 +585,7 @@ class SwingWorkflow:
             result = accept(self._archive, solution, now, reason, signature)
             status = replace(status, result=result)
             self._faults.end()
-            self._faults.trying(self._enter_owed)
+            self._faults.trying(self._logbook.enter_owed)
         except AcceptanceError:  # something else has come into force meanwhile
             record = open_record(solution.source.folder)
             assessment = assess(self._archive, record, solution)
@@ -614,7 +614,7 @@ class SwingWorkflow:
         status, own = self._status, self._status.result
         if own is not None and own.record == result.record:
             status = replace(status, result=None)
-        self._faults.trying(self._enter_owed)
+        self._faults.trying(self._logbook.enter_owed)
         self._publish(replace(status, revoked=result))
 
     def open_logbook(self) -> None:
@@ -626,10 +626,6 @@ class SwingWorkflow:
             lambda: None,
             lambda fraction: None,
         )
-
-    def _enter_owed(self) -> None:
-        """Enter events in the archive that only files hold so far."""
-        self._logbook.enter_owed()
 
     def _on_caught_up(self, faults: tuple[Message, ...]) -> None:
         for fault in faults:

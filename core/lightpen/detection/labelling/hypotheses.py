@@ -24,6 +24,7 @@ from lightpen.detection.labelling.matching import (
 from lightpen.detection.labelling.p3p import solve_p3p
 from lightpen.detection.labelling.spot_arrays import SpotArrays
 from lightpen.model.ellipse import conic_images
+from lightpen.model.rigid import reflection
 
 MAX_SPOTS = 14  # of which triples are made
 MAX_GAP = 1.15  # between two LEDs, over the size of the pen
@@ -85,7 +86,7 @@ def lookalike_poses(
     flat = np.linalg.eigh(np.swapaxes(arms, 1, 2) @ arms).eigenvectors[:, :, 0]
     middle_cam = np.einsum("cij,cj->ci", best.R, middle) + best.t
     view = middle_cam / np.linalg.norm(middle_cam, axis=1, keepdims=True)
-    R = _mirror(view) @ best.R @ _mirror(flat)
+    R = reflection(view) @ best.R @ reflection(flat)
     t = middle_cam - np.einsum("cij,cj->ci", R, middle)
     alike = [replace(best, R=R, t=t)]
     for motion, shift in zip(pen.self_rotations, pen.self_translations, strict=True):
@@ -262,7 +263,3 @@ def _most_explaining(candidates: Candidates, reach: float, n: int) -> Candidates
     distinct = order[new]
     best = first_of_each(candidates.image[distinct], score[distinct], n)
     return candidates.of(distinct[best])
-
-
-def _mirror(normals: FloatArray) -> FloatArray:
-    return np.asarray(np.eye(3) - 2 * normals[:, :, None] * normals[:, None])
