@@ -10,7 +10,9 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.adjustment import with_effects
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.effects import mechanics_of
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -20,7 +22,7 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
+from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
 from lightpen.estimation.contact.joint import TURN_RIDGE
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
@@ -315,3 +317,41 @@ def test_two_cameras_find_the_focal_length_of_one_that_is_off() -> None:
     assert np.median(np.linalg.norm(errors, axis=1)) <= 0.005
     # 95 % of 36, less three standard deviations of 3.6 %.
     assert np.mean(inside) > 0.84
+
+
+def test_the_right_side_of_the_images_does_not_depend_on_priors() -> None:
+    rng = np.random.default_rng(4)
+    swing, rig = swing_poses(20, rng), rig_of(CAMERA)
+    pixels = simulate_rig_centers(rig, PEN, swing, 0.03, rng)
+    state = BundleState(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
+    axes = axes_of_cone(swing.rotations)
+    views = views_at(state, pixels)
+    mechanics = mechanics_of(views, swing.rotations, axes, PEN.leds, 0.004)
+    held = tuple(each.at_zero for each in mechanics)
+    priors, modes = priors_of(rig, PEN, USUAL), seat_modes_of(swing.rotations)
+    bundle = fit_bundle(pixels, state, priors, modes, 1.0, effects=held)
+
+    whole = with_effects(bundle, mechanics)
+
+    assert np.abs(whole.values - bundle.values).max() > 1e-3
+    # Next to what holds a sag at 0, the images hardly matter.
+    scale = np.abs(bundle.right).max()
+    np.testing.assert_allclose(whole.right, bundle.right, atol=1e-6 * scale)
+
+
+def test_a_drift_is_the_largest_distance_between_two_places_of_the_cone() -> None:
+    rng = np.random.default_rng(5)
+    swing, rig = swing_poses(12, rng), rig_of(CAMERA)
+    shifts = rng.uniform(1.0, 3.0, (12, 1))
+    pixels = simulate_rig_centers(rig, PEN, swing, 0.03, rng)
+    start = BundleState(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
+    modes = seat_modes_of(swing.rotations, shifts)
+    bundle = fit_bundle(pixels, start, priors_of(rig, PEN, USUAL), modes, 1.0)
+    values = bundle.values.copy()
+    in_time, along = rng.standard_normal((2, 3))
+    values[bundle.layout.drift] = np.concatenate([in_time, along])
+
+    time, lamp = np.linspace(0.0, 1.0, 12)[:, None], shifts / np.ptp(shifts)
+    places = time * in_time + lamp * along
+    apart = [np.linalg.norm(one - other) for one in places for other in places]
+    assert replace(bundle, values=values).drift == pytest.approx(max(apart))

@@ -12,6 +12,7 @@ from lightpen.estimation.bundle.consistency_findings import (
     DIAMETER,
     Contradiction,
     _of_camera,
+    _places,
 )
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
@@ -19,6 +20,7 @@ from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
@@ -274,3 +276,63 @@ def test_each_number_of_a_camera_can_be_changed_alone() -> None:
     changes = [[one.by @ other.along for other in numbers] for one in numbers]
     # The lens is round to half a thousandth.
     np.testing.assert_allclose(changes, np.eye(9), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("camera", "of_rig", "of_pen", "code"),
+    [
+        ("", False, True, "warning.pen-file-contradicted"),
+        ("", False, False, "warning.camera-file-contradicted"),
+        ("left", False, False, "warning.camera-file-of-rig-contradicted"),
+        ("left", True, False, "warning.rig-file-contradicted"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("unit", "uncertainty", "wanted"),
+    [("mm", 0.11, 10.06), ("px", 1.1, 10.1), ("", 9.9, 10.1), ("", 12.0, 10.0)],
+)
+def test_a_contradiction_says_what_is_wanted_and_what_is_stated(
+    camera: str,
+    of_rig: bool,
+    of_pen: bool,
+    code: str,
+    unit: str,
+    uncertainty: float,
+    wanted: float,
+) -> None:
+    found = Contradiction(
+        *(DIAMETER, unit, 9.0, 0.04, 10.0611, uncertainty, 18.0),
+        *(camera, of_rig, of_pen),
+    ).message
+
+    assert found.code == code
+    values = dict(found.values)
+    assert values.pop("camera", "") == camera
+    assert values == {
+        "what": DIAMETER,
+        "wanted": wanted,
+        "wanted_u": uncertainty,
+        "stated": 9.0,
+        "stated_u": 0.04,
+        "unit": f" {unit}" if unit else "",
+    }
+
+
+def test_a_rig_file_states_turns_and_translations_of_all_cameras_but_the_first() -> (
+    None
+):
+    rig = row_of_cameras(3, 1000.0)
+    numbers = iter(_places(rig))
+    unit = np.eye(12)
+    for c, first in ((1, 0), (2, 6)):
+        for k in range(3):
+            turn, shift = next(numbers), next(numbers)
+            assert (turn.unit, turn.value, turn.camera) == ("deg", 0.0, rig.names[c])
+            assert turn.size == pytest.approx(180 / np.pi)
+            assert (shift.unit, shift.size, shift.camera) == ("mm", 1.0, rig.names[c])
+            assert shift.value == rig.translations[c, k]
+            for each, at in ((turn, first + k), (shift, first + 3 + k)):
+                np.testing.assert_array_equal(each.by, unit[at])
+                np.testing.assert_array_equal(each.along, unit[at])
+            assert turn.what.values == shift.what.values == {"axis": "xyz"[k]}
+    assert not list(numbers)

@@ -9,7 +9,9 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.priors import priors_of, thermal_growth
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.lens_field import LensField
+from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
+from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import paper_camera, paper_pen
 
 CAMERA = paper_camera()
@@ -91,6 +93,41 @@ def test_where_cameras_stand_is_taken_as_stated_or_assumed() -> None:
     np.testing.assert_allclose(
         np.sqrt(np.diag(assumed.covariance)), [0.01] * 3 + [5.0] * 3
     )
+
+
+def test_each_further_camera_is_assumed_to_stand_as_uncertainly() -> None:
+    three = replace(row_of_cameras(3, 1000.0), covariance=None)
+    assumptions = Assumptions(rotation=0.01, translation=5.0)
+    assumed = priors_of(three, PEN, assumptions).extrinsics
+
+    assert assumed is not None
+    sigmas = 2 * (3 * [0.01] + 3 * [5.0])
+    np.testing.assert_allclose(assumed.covariance, np.diag(np.square(sigmas)))
+
+
+@pytest.mark.parametrize(
+    ("pen", "assumptions", "sigma", "is_assumed"),
+    [
+        # Measured, with the expansion as uncertain as a tenth of it.
+        (PEN, Assumptions(temperature_c=26.0, temperature=0.5), (0.5, 0.6), False),
+        (PEN, Assumptions(temperature_c=26.0, expansion_share=0.2), (0.5, 1.2), False),
+        (PEN, Assumptions(warmth=3.0), (3.0, 0.0), True),
+        # All of what is not corrected.
+        (BARE, Assumptions(temperature_c=26.0, temperature=0.2), (0.2, 6.0), True),
+    ],
+)
+def test_the_size_is_as_uncertain_as_temperature_and_expansion(
+    pen: Pen, assumptions: Assumptions, sigma: tuple[float, float], is_assumed: bool
+) -> None:
+    """In kelvins of the expansion: by the temperature, and by the expansion."""
+    expansion = pen.expansion or assumptions.expansion
+    stated = replace(pen, expansion_sigma=None, temperature_c=None)
+    prior = priors_of(rig_of(CAMERA), stated, assumptions).temperature
+
+    assert np.sqrt(prior.covariance[0, 0]) == pytest.approx(
+        expansion * np.hypot(*sigma)
+    )
+    assert prior.assumed == is_assumed
 
 
 def test_a_warm_pen_is_larger_by_its_expansion() -> None:

@@ -4,13 +4,23 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import priors_of
+from lightpen.estimation.bundle.seat_modes import seat_modes_of
+from lightpen.estimation.bundle.tip_frames import tip_frames
 from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.contact.led_quality import LedQuality
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.formats.observation_files import Centers
+from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
+from lightpen.model.rig import rig_of
 from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.swings import (
     paper_camera,
@@ -46,3 +56,73 @@ def test_a_displaced_led_leaves_two_frames() -> None:
     text = calibration_text(found, "joint", None, judge(found, SwingLimits()))
     assert "Result and U refer to the former." in text
     assert " ".join(f"{value:.4f}" for value in frames.of_all) in text
+
+
+@pytest.fixture(scope="module")
+def bundle() -> Bundle:
+    rng = np.random.default_rng(1)
+    swing, rig = swing_poses(15, rng), rig_of(CAMERA)
+    poses = swing.rotations, swing.translations
+    pixels = simulate_centers(CAMERA, PEN, *poses, 0.02, rng)[:, None]
+    state = BundleState(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
+    modes = seat_modes_of(swing.rotations)
+    return fit_bundle(pixels, state, priors_of(rig, PEN, USUAL), modes, 1.0)
+
+
+def with_leds(bundle: Bundle, leds: FloatArray) -> Bundle:
+    """Return the fit with other LEDs."""
+    pen = replace(bundle.state.pen, leds=leds)
+    return replace(bundle, state=replace(bundle.state, pen=pen))
+
+
+def quality(*displaced: int, n_used: int = 15) -> LedQuality:
+    """Return the quality of LEDs, with the numbers of displaced ones, from 1."""
+    some = np.array(displaced, dtype=int) - 1
+    used, moves = np.full(PEN.n_leds, 15), np.zeros((PEN.n_leds, 3))
+    used[some], moves[some] = n_used, MOVED
+    return LedQuality(
+        n_seen=np.full(PEN.n_leds, 15),
+        n_used=used,
+        rms=np.zeros(PEN.n_leds),
+        mean=np.zeros((PEN.n_leds, 2)),
+        displacement=moves,
+        displaced=displaced,
+    )
+
+
+TIP = np.array([1.0, -90.0, -25.0])
+OFF = PEN.leds + MOVED * (np.arange(PEN.n_leds) == 8)[:, None]
+
+
+@pytest.mark.parametrize("is_fitted", [True, False])
+def test_the_frame_of_the_file_is_that_in_which_the_others_fit_it(
+    bundle: Bundle, is_fitted: bool
+) -> None:
+    """An LED left out of most images stands where its displacement says."""
+    fitted = with_leds(bundle, OFF if is_fitted else PEN.leds)
+    frames = tip_frames(fitted, quality(9, n_used=15 if is_fitted else 7), TIP)
+
+    R, t = fit_rigid(OFF, PEN.leds)
+    assert frames is not None
+    np.testing.assert_allclose(frames.of_file, TIP, atol=1e-9)
+    np.testing.assert_allclose(frames.of_all, R @ TIP + t, atol=1e-9)
+    assert frames.is_of_file
+    assert np.linalg.norm(frames.of_all - TIP) > 0.01
+
+
+def test_a_tip_in_the_frame_of_all_leds_is_said_to_be(bundle: Bundle) -> None:
+    R, t = fit_rigid(OFF, PEN.leds)
+    fitted = with_leds(bundle, OFF @ R.T + t)
+
+    frames = tip_frames(fitted, quality(9, n_used=8), TIP)
+
+    assert frames is not None
+    np.testing.assert_allclose(frames.of_all, TIP, atol=1e-9)
+    np.testing.assert_allclose(frames.of_file, R.T @ (TIP - t), atol=1e-9)
+    assert not frames.is_of_file
+
+
+def test_a_frame_needs_four_leds_and_one_that_is_displaced(bundle: Bundle) -> None:
+    assert tip_frames(bundle, quality(), TIP) is None
+    assert tip_frames(bundle, quality(1, 2, 3, 7, 8, 9), TIP) is not None
+    assert tip_frames(bundle, quality(1, 2, 3, 7, 8, 9, 10), TIP) is None

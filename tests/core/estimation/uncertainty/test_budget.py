@@ -231,6 +231,20 @@ def test_what_holding_back_from_a_likely_error_changes_is_a_share() -> None:
     np.testing.assert_allclose(last.standard_uncertainty, np.abs(changed[:3]))
 
 
+def test_one_camera_of_a_rig_that_states_nothing_makes_the_share_assumed() -> None:
+    adjustment = adjusted(calibrated(0.05 * noise(8, n_images=40)))
+    whole, priors = adjustment.whole, adjustment.priors
+    (stated,) = priors.cameras
+    for others, is_assumed in (
+        ((stated,), False),
+        ((replace(stated, assumed=True),), True),
+    ):
+        rig = replace(priors, cameras=(stated, *others))
+        shares = contributions_of(whole, rig, 40, np.eye(6), np.zeros(6))
+        (camera,) = (s for s in shares if s.name is ContributionName.CAMERA)
+        assert camera.assumed == is_assumed
+
+
 def fitted_variances(budget: Budget) -> FloatArray:
     """Return the variances of tip and cone by what is fitted at every station."""
     others = {ContributionName.SHRINKAGE, *SHARES_OF_EFFECTS.values()} - MECHANICAL
