@@ -70,7 +70,8 @@ def accept_tip(
         None if rig_file is None else rig_file.path,
     )
     inputs = Inputs(
-        *(with_content(camera_file), with_content(pen.path), (), None),
+        *(with_content(camera_file), with_content(pen.path), ()),
+        preparation.nominal_tip,
         origin=origin,
         rig=rig_inputs,
     )
