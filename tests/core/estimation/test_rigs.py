@@ -302,6 +302,8 @@ def test_a_single_image_of_another_moment_is_left_out_and_reported() -> None:
     apart = [why is Reason.OTHER_MOMENT for why in result.cameras[1].reasons]
     assert np.flatnonzero(apart).tolist() == [4, 20]
     assert result.used.all()
+    # Of these moments, by the image of the first camera alone.
+    np.testing.assert_allclose(result.tips_cam[[4, 20]], 2 * [SWING.cone_cam], atol=0.5)
     assert "the other cameras at 2 of 30 instants" in str(warnings_of(result)[0])
     error = np.abs(result.joint.tip_pen - SWING.tip_pen)
     assert (error < 1.5 * result.budget.expanded_uncertainty[:3]).all()

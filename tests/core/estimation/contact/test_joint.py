@@ -248,3 +248,83 @@ def test_a_start_endlessly_far_does_not_settle() -> None:
         fit_contact(
             ContactModel.of(CAMERA, PEN, pixels), true.rotations, true.tip_pen, far
         )
+
+
+@pytest.mark.parametrize(("scale", "limit"), [(0.03, 0.15), (1e-4, 0.025)])
+def test_leds_are_left_out_beyond_five_standard_deviations(
+    scale: float, limit: float
+) -> None:
+    """Of the least noise of centres at least; few images leave less of it."""
+    residuals = np.zeros((12, 8, 2))
+    residuals[..., 0] = scale * 1.17741 / np.sqrt(2 * 96 / (2 * 96 - 3 * 12))
+    residuals[[1, 2, 3], 4] = [[0.0, 0.99 * limit], [0.0, 1.01 * limit], [np.nan] * 2]
+
+    found = inliers(residuals)
+
+    # One LED fewer is seen, which makes 3 in 10,000.
+    assert found[1, 4]
+    assert not found[[2, 3], 4].any()
+    assert found.sum() == 12 * 8 - 2
+
+
+def test_what_an_image_says_of_tip_and_cone_is_what_its_rotation_leaves() -> None:
+    truth = swing(12)
+    pixels = centers(truth, 0.05)
+    pixels[3, 4:], pixels[7, 2] = np.nan, pixels[7, 2] + 3.0
+    model = ContactModel.of(CAMERA, PEN, pixels)
+    result = fit(truth, pixels)
+    state = model.at(result.rotations, result.tip_pen, result.cone_cam)
+
+    used = result.used
+    assert used.sum() == 120 - 7
+    squares = np.sum(result.residuals[used] ** 2)
+    sigma = np.sqrt(squares / (2 * 113 - 3 * 12 - 6))
+    assert result.sigma == pytest.approx(sigma)
+    assert result.rms == pytest.approx(np.sqrt(squares / 113))
+    of_images = np.where(used[..., None], result.residuals, 0.0) ** 2
+    mean = np.sum(of_images, axis=(1, 2)) / used.sum(axis=1)
+    np.testing.assert_allclose(result.image_rms, np.sqrt(mean))
+    for i, R in enumerate(result.rotations):
+        J = state.jacobian[i, used[i]].reshape(-1, 6) / sigma
+        r = state.residuals[i, used[i]].ravel() / sigma
+        turn, cone = J[:, :3], J[:, 3:]
+        A = cone @ np.hstack([-R, np.eye(3)])
+        free = np.eye(len(r)) - turn @ np.linalg.pinv(turn)
+        information = A.T @ free @ A
+        scale = np.abs(information).max()
+        np.testing.assert_allclose(
+            result.information[i], information, rtol=1e-5, atol=5e-6 * scale
+        )
+        np.testing.assert_allclose(
+            result.gradients[i], A.T @ free @ r, rtol=1e-3, atol=1e-3 * np.sqrt(scale)
+        )
+
+
+def test_of_a_fit_of_no_led_nothing_is_told() -> None:
+    truth = swing(12)
+    result = fit(truth, centers(truth, 0.05))
+    none = JointFit(**{**vars(result), "used": np.zeros_like(result.used)})
+
+    assert np.isnan(none.image_rms).all()
+
+
+def test_a_fit_that_starts_near_another_ends_as_that_of_any_start() -> None:
+    """An LED far off is known at once, and the last step may be a micrometre."""
+    truth = swing(30)
+    pixels = centers(truth, 0.05)
+    pixels[5, 3] += 40.0
+    whole = fit(truth, pixels)
+    near = fit_contact(
+        ContactModel.of(CAMERA, PEN, pixels),
+        whole.rotations,
+        whole.tip_pen + 1e-3,
+        whole.cone_cam - 1e-3,
+        is_near=True,
+    )
+
+    np.testing.assert_array_equal(near.used, whole.used)
+    np.testing.assert_allclose(near.tip_pen, whole.tip_pen, atol=2e-6)
+    np.testing.assert_allclose(near.residuals, whole.residuals, atol=2e-3)
+    assert near.sigma == pytest.approx(whole.sigma, rel=1e-5)
+    scale = np.abs(whole.information).max()
+    np.testing.assert_allclose(near.information, whole.information, atol=1e-4 * scale)

@@ -12,6 +12,7 @@ import pytest
 from benchmarks.small_records import record_of
 
 from lightpen.detection.observations import observe_centers
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.estimation.reports.methods import Method
@@ -20,6 +21,10 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text, pivot_text
 from lightpen.estimation.reports.verdict import Verdict, judge
+from lightpen.estimation.uncertainty.budget import (
+    ContributionName,
+    UncertaintyContribution,
+)
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.observation_files import Centers
@@ -367,3 +372,42 @@ def test_a_jitter_is_reported_where_it_is_more_than_round_parts_make(
     assert found.bundle.components.jitter.covariance is not None
     reported = {warning.code for warning in warnings_of(found)}
     assert ("warning.seat-jitter" in reported) == is_reported
+
+
+def shown(found: Calibration, start: str) -> list[str]:
+    """Return the lines of the text that start so."""
+    text = calibration_text(found, "joint", None, verdict())
+    return [line for line in text.splitlines() if line.startswith(start)]
+
+
+def test_the_first_five_images_left_out_are_named() -> None:
+    names = [f"frame {i}" for i in (2, 4, 6, 8, 10, 12)]
+    for n, named in ((5, ", ".join(names[:5])), (6, ", ".join(names[:5]) + ", ...")):
+        reasons = [Reason.NONE] * 40
+        for i in range(n):
+            reasons[2 * i + 1] = Reason.SLIPPED
+        (camera,) = calibration().cameras
+        images = replace(camera, reasons=tuple(reasons))
+        found = replace(calibration(), cameras=(images,), reasons=tuple(reasons))
+
+        assert shown(found, "  dropped") == [f"  dropped    {n} tip slipped: {named}"]
+
+
+@pytest.mark.parametrize(
+    ("angle", "said"),
+    [
+        (0.3, "along the pen's y axis, U ="),  # whose cosine is 0.955
+        (0.33, "along (0.00, 0.95, 0.32) of the pen, U ="),
+    ],
+)
+def test_a_weakest_direction_near_an_axis_is_named_by_it(
+    angle: float, said: str
+) -> None:
+    along = np.array([0.0, np.cos(angle), np.sin(angle)])
+    covariance = 1e-8 * np.eye(6)
+    covariance[:3, :3] += 1e-4 * np.outer(along, along)
+    share = UncertaintyContribution(ContributionName.NOISE, covariance)
+    budget = replace(calibration().budget, shares=(share,))
+
+    (line,) = shown(replace(calibration(), budget=budget), "Weakest")
+    assert said in line
