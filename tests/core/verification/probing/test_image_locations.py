@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from lightpen.errors import FileError
+from lightpen.formats.simulated_files import mark_simulated
+from lightpen.model.origin import Origin
 from lightpen.model.rig import Rig, rig_of
 from lightpen.simulator.swings import paper_camera
-from lightpen.verification.probing.image_locations import touch_place
+from lightpen.verification.probing.image_locations import runs_at, touch_place
 
 ONE = rig_of(paper_camera())
 TWO = replace(
@@ -55,3 +57,42 @@ def test_a_run_without_the_images_of_a_camera_is_refused(tmp_path: Path) -> None
 
     with pytest.raises(FileError, match="right"):
         touch_place((str(tmp_path / "run"),), TWO)
+
+
+def test_the_places_of_each_camera_can_be_given_apart(tmp_path: Path) -> None:
+    places = [str(tmp_path / name) for name in ("one", "other")]
+    for place in places:
+        write_images(Path(place))
+
+    found = touch_place(tuple(places), TWO)
+
+    assert [each.files[0].parent.name for each in found.images] == ["one", "other"]
+    assert found.name == places[0]
+    assert len(found.files) == 4
+    assert (found.origin, found.touches, found.viewers) == (Origin.RECORDED, None, None)
+    for wrong in (places[:1], [*places, places[0]]):
+        with pytest.raises(FileError, match="left, right"):
+            touch_place(tuple(wrong), TWO)
+
+
+def test_images_of_a_simulated_camera_say_so(tmp_path: Path) -> None:
+    write_images(tmp_path / "run")
+    mark_simulated(tmp_path / "run")
+
+    assert touch_place((str(tmp_path / "run"),)).origin is Origin.SIMULATED
+
+
+def test_a_place_is_a_run_or_a_folder_of_runs_in_their_order(tmp_path: Path) -> None:
+    for name in ("run 10", "run 2", "both/left", "both/right"):
+        write_images(tmp_path / name)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "notes.txt").write_text("Not a run.")
+    runs = (str(tmp_path / "run 2"), str(tmp_path / "run 10"))
+
+    assert runs_at(runs[0]) == runs[:1]
+    assert runs_at(str(tmp_path)) == runs
+    assert runs_at(str(tmp_path), TWO) == (str(tmp_path / "both"),)
+    assert runs_at(str(tmp_path / "both"), TWO) == (str(tmp_path / "both"),)
+    for nowhere in ("empty", "nothing"):
+        with pytest.raises(FileError):
+            runs_at(str(tmp_path / nowhere))
