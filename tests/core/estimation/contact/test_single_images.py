@@ -77,7 +77,7 @@ def test_without_edges_a_tip_that_is_off_slipped() -> None:
 
 @pytest.mark.parametrize(
     ("n_seen", "n_wrong", "fits"),
-    [(10, 2, True), (10, 5, False), (6, 3, False), (5, 2, False)],
+    [(10, 2, True), (4, 0, True), (10, 5, False), (6, 3, False), (5, 2, False)],
 )
 def test_most_leds_of_an_image_and_four_must_agree_with_its_pose(
     n_seen: int, n_wrong: int, fits: bool

@@ -101,7 +101,7 @@ def pivoting(n: int, tip: FloatArray, seed: int = 4) -> tuple[FloatArray, FloatA
     """Return exact poses about a pivot 800 mm away."""
     rng = np.random.default_rng(seed)
     rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (n, 3)))
-    return rotations, np.array([10.0, 20.0, 800.0]) - rotations @ tip
+    return rotations, np.array([300.0, 20.0, 800.0]) - rotations @ tip
 
 
 def code_of(rotations: FloatArray, translations: FloatArray) -> str:
