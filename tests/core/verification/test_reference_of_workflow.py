@@ -396,7 +396,14 @@ def test_a_verification_that_is_closed(trace: Trace) -> None:
     shutil.copytree(trace.folder / SIMULATED, copy / SIMULATED)
     trace.workflow.shut_down()
     (interrupted,) = find_interrupted(copy)
-    abandon_interrupted(copy, interrupted, NOON)
+    for day in ("20310430", "20310502"):
+        name = interrupted.path.name.replace("20310501", day)
+        shutil.copy(interrupted.path, interrupted.path.with_name(name))
+    newer, same, older = find_interrupted(copy)
+    assert newer.path.name > interrupted.path.name > older.path.name
+    assert same == interrupted
+    for each in (newer, interrupted, older):
+        abandon_interrupted(copy, each, NOON)
 
     closed = Trace(copy, trace.prepared)
     assert find_interrupted(copy) == ()

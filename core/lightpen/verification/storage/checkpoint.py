@@ -169,7 +169,7 @@ def find_interrupted(data: Path) -> tuple[InterruptedVerification, ...]:
     for root in (data, data / SIMULATED):
         folder = root / VERIFICATIONS / UNDER_WAY
         try:
-            paths = sorted(folder.glob(f"*{SUFFIX}"), reverse=True)
+            paths = folder.glob(f"*{SUFFIX}")
             found += (_read(path) for path in paths if not _is_held(path))
         except OSError as error:
             raise unreadable(folder, WHAT, error) from error
