@@ -7,6 +7,7 @@ from tests.simulated_centers import correlated_noise
 from lightpen.arrays import BoolArray
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot.pivot_groups import PoseGroups, find_groups
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.postures import SwingKind
 from lightpen.simulator.swings import swing_poses
 
@@ -78,3 +79,39 @@ def test_poses_of_one_tip_are_one_group_however_they_drift(
 
 def test_exact_poses_are_one_group() -> None:
     assert groups_of(noise=0.0) is None
+
+
+@pytest.mark.parametrize(("step", "is_told"), [(0.4, True), (0.2, False)])
+def test_a_tip_exchanged_at_a_pose_is_told_by_the_order_of_the_poses(
+    step: float, is_told: bool
+) -> None:
+    """By less than the noise, which each side has to itself."""
+    rng = np.random.default_rng(2)
+    rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (150, 3)))
+    translations = np.array([10.0, 20.0, 800.0]) - rotations @ [2.0, -1.0, 150.0]
+    translations[90:, 0] += step
+    translations += 0.2 * rng.standard_normal((150, 3))
+    used = np.arange(150) % 10 != 3
+    groups = find_groups(rotations, translations, used)
+
+    assert (groups is not None) == is_told
+    if groups is not None:
+        expected = np.where(np.arange(150) < 90, 1, 2) * used
+        assert np.sum(groups.group != expected) <= 2
+        assert groups.pivot_distance == pytest.approx(step, abs=0.1)
+
+
+@pytest.mark.parametrize(("turn", "is_told"), [(0.6, True), (0.02, False)])
+@pytest.mark.parametrize("least_first", [True, False])
+def test_poses_that_hardly_turn_make_no_group(
+    turn: float, is_told: bool, least_first: bool
+) -> None:
+    rng = np.random.default_rng(3)
+    sizes = np.where((np.arange(100) < 40) == least_first, turn, 0.6)
+    rotations = rotation_from_vector(sizes[:, None] * rng.uniform(-1, 1, (100, 3)))
+    others = sizes == turn if turn < 0.6 else np.arange(100) < 40
+    translations = np.array([10.0, 20.0, 800.0]) - rotations @ [2.0, -1.0, 150.0]
+    translations += 5.0 * others[:, None] + 0.1 * rng.standard_normal((100, 3))
+
+    groups = find_groups(rotations, translations, np.ones(100, bool))
+    assert (groups is not None) == is_told
