@@ -1,6 +1,5 @@
 """A swing of a pen without files: recorded image by image, and solved now and then."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -30,7 +29,7 @@ from lightpen.model.posture import Posture, posture_of
 from lightpen.record.swings.writing import make_record_folder
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sentences import worded
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 from lightpen_app.work.live_view import Mailbox
 from lightpen_app.work.workbench import Workbench
 
@@ -86,7 +85,7 @@ class DiscoveryRun(QObject):
         self.keeps_camera = False  # the selected camera file is taken as known
         self._state = DiscoveryState()
         self._recording: _Recording | None = None
-        self._job: Job | None = None
+        self._job = LatestJob(self)
         self._next_trial = FIRST_TRIAL
         self._taken = Mailbox(self)  # the GUI may be slower than the images
 
@@ -114,7 +113,7 @@ class DiscoveryRun(QObject):
                 mark_simulated(folder)
             return folder
 
-        self._run(make, self._on_begun)
+        self._job.start(make, self._on_begun, self._on_failed)
 
     def stop(self) -> None:
         """End the capture."""
@@ -127,7 +126,7 @@ class DiscoveryRun(QObject):
     def give_up(self) -> None:
         """End capture and computation, and detect what is selected again."""
         self.stop()
-        self._drop_job()
+        self._job.cancel()
         self._recording = None
         self._live.set_region(self._workbench.selection.preparation.region)
         self._become(**vars(DiscoveryState()))
@@ -136,13 +135,11 @@ class DiscoveryRun(QObject):
         """Find pen and camera to scale, by all images."""
         self.stop()
         self._become(progress=0.0, fault="", is_saved=False)
-        self._try(request)
-        if self._job is not None:
-            self._job.progressed.connect(lambda done: self._become(progress=done))
+        self._try(request, lambda done: self._become(progress=done))
 
     def cancel(self) -> None:
         """End the computation; what was found before stays."""
-        self._drop_job()
+        self._job.cancel()
         self._become(progress=None)
 
     def choose_frame(self, origin: int, along: int) -> None:
@@ -164,30 +161,13 @@ class DiscoveryRun(QObject):
             write_pen(found.pen, pen)
             return open_files(camera, pen)
 
-        self._run(write, self._on_saved)
+        self._job.start(write, self._on_saved, self._on_failed)
 
     def _become(self, **changes: object) -> None:
         before, self._state = self._state, replace(self._state, **changes)  # type: ignore[arg-type]
         self.changed.emit()
         if self._state.found is not before.found:
             self.found_changed.emit()
-
-    def _run(
-        self, function: Callable[[Report], object], take: Callable[..., None]
-    ) -> None:
-        self._drop_job()
-        self._job = job = Job(function, self)
-
-        def on_succeeded(result: object) -> None:
-            self._job = None
-            take(result)
-
-        job.start(on_succeeded, self._on_failed)
-
-    def _drop_job(self) -> None:
-        if self._job is not None:
-            self._job.cancel()
-            self._job = None
 
     def _on_begun(self, folder: Path) -> None:
         self._recording = recording = _Recording(folder)
@@ -227,7 +207,7 @@ class DiscoveryRun(QObject):
             guide = guide.with_postures(np.array(seen))
             posture = posture_of(guide.pen, seen[-1])
         self._become(n_images=n_images, guide=guide, posture=posture)
-        if n_images >= self._next_trial and self._job is None:
+        if n_images >= self._next_trial and not self._job.is_running:
             self._next_trial = round(LATER * n_images)
             self._try(Request((), 0.0))
         is_covered = guide is not None and guide.is_complete
@@ -239,7 +219,7 @@ class DiscoveryRun(QObject):
             self.stop()
             self._become(fault=worded(why))
 
-    def _try(self, request: Request) -> None:
+    def _try(self, request: Request, progressed: Report | None = None) -> None:
         recording = self._recording
         if recording is None:
             return
@@ -252,7 +232,7 @@ class DiscoveryRun(QObject):
             names = tuple(f"{number:06}.png" for number in range(1, len(spots) + 1))
             return discover(sightings_of_spots(names, spots, size), request, report)
 
-        self._run(find, self.take)
+        self._job.start(find, self.take, self._on_failed, progressed=progressed)
 
     def take(self, found: Discovery) -> None:
         """Take over pen, camera and tip as found."""
@@ -262,7 +242,6 @@ class DiscoveryRun(QObject):
         self._become(found=found, guide=guide, fault="", progress=None)
 
     def _on_failed(self, sentence: str) -> None:
-        self._job = None
         self._become(fault=sentence, progress=None)
 
     def _on_saved(self, opened: OpenedFiles) -> None:

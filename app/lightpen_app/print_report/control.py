@@ -30,7 +30,7 @@ from lightpen.record.folder.verifications import (
 )
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.swings.names import Names
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.save_place import SavePlace
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class PrintReportControl(QObject):
         super().__init__(page)
         self._place = place
         self._page = page
-        self._reading: Job | None = None
+        self._reading = LatestJob(self)
 
     def show(self, find: Callable[[], Path]) -> None:
         """Show the record on paper of the file that a function finds on the disk."""
@@ -108,14 +108,11 @@ class PrintReportControl(QObject):
         self._read(lambda: read_kept_verification(path), self._show_verification)
 
     def _read(self, read: Callable[[], T], show: Callable[[T], None]) -> None:
-        self.shut_down()
-        self._reading = job = Job(lambda _: read(), self)
-        job.start(show, self.failed)
+        self._reading.start(lambda _: read(), show, self.failed)
 
     def shut_down(self) -> None:
         """Cancel previews that are not shown yet."""
-        if self._reading is not None:
-            self._reading.cancel()
+        self._reading.cancel()
 
     def _show(self, found: ReportContent) -> None:
         # Printing takes long to be imported, and few swings are printed.

@@ -15,7 +15,7 @@ from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.swing.image_sources import SourceKind
 from lightpen.swing.preparation import Preparation
 from lightpen_app.look.words import shortened
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.settings import Settings
@@ -42,15 +42,14 @@ class FilesOfCameras(QObject):
         self._selection, self._settings = selection, settings
         self._notifications = notifications
         self._serials: tuple[str, ...] = ()
-        self._job: Job | None = None
+        self._job = LatestJob(self)
 
         # Connections
         selection.changed.connect(self._on_selected)
 
     def shut_down(self) -> None:
         """Cancel opening."""
-        if self._job is not None:
-            self._job.cancel()
+        self._job.cancel()
 
     def _on_selected(self, before: Preparation) -> None:
         now = self._selection.preparation
@@ -60,7 +59,7 @@ class FilesOfCameras(QObject):
         elif serials != self._serials:
             self._serials = serials
             self._open_own(now, serials)
-        elif self._job is None and _kept(now) != _kept(before):
+        elif not self._job.is_running and _kept(now) != _kept(before):
             self._keep(now, serials)
 
     def _keep(self, now: Preparation, serials: tuple[str, ...]) -> None:
@@ -101,9 +100,7 @@ class FilesOfCameras(QObject):
     def _open_own(self, now: Preparation, serials: tuple[str, ...]) -> None:
         """Use mask and files of the cameras that are open now."""
         self._notifications.withdraw(self)
-        if self._job is not None:
-            self._job.cancel()
-            self._job = None
+        self._job.cancel()
         own = [self._settings.camera_files(serial) for serial in serials]
         if own[0] != CameraFiles():
             now = replace(now, mask=_array(own[0].mask))
@@ -125,15 +122,14 @@ class FilesOfCameras(QObject):
             self._keep(now, serials)
 
     def _read(self, read: Callable[[], Opened], take: Callable[[Opened], None]) -> None:
-        self._job = job = Job(lambda _: read(), self)
         serials = self._serials
 
         def on_read(opened: Opened) -> None:
-            self._job = None
             if self._serials == serials:
                 take(opened)
 
-        job.start(on_read, self._on_unread)
+        on_unread = partial(self._notifications.notify, self)
+        self._job.start(lambda _: read(), on_read, on_unread)
 
     def _on_file_read(self, file: CameraFile) -> None:
         now = self._selection.preparation
@@ -141,10 +137,6 @@ class FilesOfCameras(QObject):
 
     def _on_rig_read(self, file: RigFile) -> None:
         self._selection.set_preparation(self._selection.preparation.with_rig(file))
-
-    def _on_unread(self, why: str) -> None:
-        self._job = None
-        self._notifications.notify(self, why)
 
 
 def serials_in_use(now: Preparation) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 import logging
 from dataclasses import replace
-from functools import partial
 
 from PySide6.QtCore import QObject, Signal
 
@@ -12,7 +11,7 @@ from lightpen.cameras.sources import source_named
 from lightpen.live.sources import SourceEnvironment, cameras_of
 from lightpen.swing.image_sources import CameraInUse
 from lightpen.swing.preparation import Preparation
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.settings import Settings
@@ -43,7 +42,7 @@ class CameraSetup(QObject):
         self._settings = settings
         self._around = around
         self._is_started = False
-        self._search: Job | None = None
+        self._search = LatestJob(self)
         self.live = live
 
         # Connections
@@ -75,8 +74,6 @@ class CameraSetup(QObject):
         source = source_named(kind)
         if source is None:
             return
-        if self._search is not None:
-            self._search.cancel()
         was_open = self.live.is_open
         self.live.close()
         find, live = source.find, self.live
@@ -85,19 +82,13 @@ class CameraSetup(QObject):
             live.await_closed()
             return find(producer)
 
-        self._search = job = Job(search, self)
-        job.start(
-            self.cameras_found,
-            self.search_failed,
-            ended=partial(self._on_search_ended, job, was_open=was_open),
-        )
+        def open_again() -> None:
+            if was_open and not live.is_open:
+                self.open()
 
-    def _on_search_ended(self, job: Job, *, was_open: bool) -> None:
-        if job is not self._search:
-            return
-        self._search = None
-        if was_open and not self.live.is_open:
-            self.open()
+        self._search.start(
+            search, self.cameras_found, self.search_failed, ended=open_again
+        )
 
     def _on_selected(self, before: Preparation) -> None:
         now = self._selection.preparation

@@ -125,5 +125,50 @@ class Job(QObject):
         self.deleteLater()
 
 
+class LatestJob(QObject):
+    """Runs one job at a time; of an earlier one nothing is reported any more."""
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._job: Job | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether an outcome is awaited; no longer once it is reported."""
+        return self._job is not None
+
+    def start(
+        self,
+        function: Callable[[Report], object],
+        succeeded: Slot | None = None,
+        failed: Slot | None = None,
+        *,
+        progressed: Slot | None = None,
+        crashed: Slot | None = None,
+        ended: Slot | None = None,
+    ) -> None:
+        """Cancel the earlier job, and start another with the slots of `Job.start`.
+
+        ``ended`` follows its outcome, unless it is cancelled.
+        """
+        self.cancel()
+        self._job = job = Job(function, self)
+        outcomes = job.succeeded, job.failed, job.crashed
+        for outcome in outcomes:
+            outcome.connect(self._forget)
+        job.start(succeeded, failed, progressed=progressed, crashed=crashed)
+        for outcome in outcomes if ended is not None else ():
+            outcome.connect(ended)
+
+    def cancel(self) -> None:
+        """Cancel the job, if there is one; it reports nothing any more."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+
+    def _forget(self) -> None:
+        self._job = None
+
+
 def _emit_nothing() -> None:
     """No-op for a cancelled job."""

@@ -17,7 +17,7 @@ from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.notifications import Notifications
 
 AGAIN_MS = 15 * 60 * 1000  # interval of checking for overdue tips
@@ -55,7 +55,7 @@ class LibraryWatch(QObject):
         self._now = now
         self._statuses = StationStatus()
         self._notifications = notifications
-        self._reading: Job | None = None
+        self._reading = LatestJob(self)
         self._asked: deque[tuple[object, Change]] = deque()
         self._changing: Job | None = None
         self._is_over = False
@@ -88,8 +88,6 @@ class LibraryWatch(QObject):
         """Read it again; only the last request is answered."""
         if self._is_over:
             return
-        if self._reading is not None:
-            self._reading.cancel()
         self._timer.start()
         folder, logbook, rule, now = (
             self._folder,
@@ -111,8 +109,7 @@ class LibraryWatch(QObject):
                 return statuses(opened.database, opened.chain, rule, library, now())
             return StationStatus(library)
 
-        self._reading = job = Job(read, self)
-        job.start(self._on_read, self._on_read_failed)
+        self._reading.start(read, self._on_read, self._on_read_failed)
 
     def look_at_shared(self) -> None:
         """Report changes copied from other stations, and read them."""
@@ -156,8 +153,7 @@ class LibraryWatch(QObject):
         self._is_over = True
         self._timer.stop()
         self._look.stop()
-        if self._reading is not None:
-            self._reading.cancel()
+        self._reading.cancel()
 
     def _on_changed(self, asked: object) -> None:
         self.change_kept.emit(asked)
@@ -169,13 +165,11 @@ class LibraryWatch(QObject):
             self._change_next()
 
     def _on_read(self, found: StationStatus) -> None:
-        self._reading = None
         self._notifications.withdraw(self)
         self._statuses = found
         self.changed.emit()
 
     def _on_read_failed(self, why: str) -> None:
-        self._reading = None
         if why != self._notifications.text(self):
             self._notifications.notify(self, why)
         self._statuses = StationStatus()

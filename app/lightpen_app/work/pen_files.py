@@ -14,7 +14,7 @@ from lightpen.record.library.library_changes import Author, add_item, change_ite
 from lightpen.record.library.tip_library import ItemKind, LedFile, Library, ListedPen
 from lightpen.swing.image_sources import SourceKind
 from lightpen.swing.preparation import Preparation
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.selection import Selection
@@ -42,7 +42,7 @@ class PenFiles(QObject):
         self._selection, self._library = selection, library
         self._notifications = notifications
         self._folder, self._now = folder, now
-        self._job: Job | None = None
+        self._job = LatestJob(self)
 
         # Connections
         selection.changed.connect(self._on_selected)
@@ -93,8 +93,7 @@ class PenFiles(QObject):
 
     def shut_down(self) -> None:
         """Cancel opening."""
-        if self._job is not None:
-            self._job.cancel()
+        self._job.cancel()
 
     def _own_file(self, pen: str) -> LedFile | None:
         listed = self._library.library.item(ItemKind.PEN, pen)
@@ -121,15 +120,14 @@ class PenFiles(QObject):
         now = self._selection.preparation
         pen, own = now.names.pen, self._own_file(now.names.pen)
         self._notifications.withdraw(self)
-        if self._job is not None:
-            self._job.cancel()
+        self._job.cancel()
         if now.pen_file is not None:
             self._selection.set_preparation(replace(now, pen_file=None))
         if own is None:
             return
         path, units = Path(own.path), own.units or None
-        self._job = job = Job(lambda _: PenFile.read(path, units), self)
-        job.start(
+        self._job.start(
+            lambda _: PenFile.read(path, units),
             lambda file: self._on_read(pen, own, file),
             lambda why: self._notifications.notify(self, why),
         )

@@ -1,7 +1,5 @@
 """The live stream of pose and tip as a Qt object: settings and state."""
 
-from functools import partial
-
 from PySide6.QtCore import QObject, Qt, Signal
 
 from lightpen.cameras.clock import Clock
@@ -13,7 +11,7 @@ from lightpen.streaming.messages import StreamedTip, tip_metadata
 from lightpen.streaming.server import PoseStream, StreamPlace, StreamStatus
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.probing.current_tip import read_tip_in_force
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 
 
 class Streaming(QObject):
@@ -34,7 +32,7 @@ class Streaming(QObject):
         self._wanted: StreamPlace | None = None
         self._opened: StreamPlace | None = None  # that is open, or was tried
         self._opening: Job | None = None
-        self._reading: Job | None = None
+        self._reading = LatestJob(self)
         self._has_tip = False
         self._fault = ""
         # It takes every image, on the thread that looks at them.
@@ -72,14 +70,11 @@ class Streaming(QObject):
 
     def read_tip(self) -> None:
         """Read the current tip, which may have changed."""
-        if self._reading is not None:
-            self._reading.cancel()
-            self._reading = None
+        self._reading.cancel()
         if self._wanted is None:
             return
         archive, preparation = self._archive, self._preparation
-        self._reading = job = Job(lambda _: _tip(archive, preparation), self)
-        job.start(self._on_tip_read, ended=partial(self._on_reading_ended, job))
+        self._reading.start(lambda _: _tip(archive, preparation), self._on_tip_read)
 
     def shut_down(self) -> None:
         """Close the stream after all jobs have ended."""
@@ -117,10 +112,6 @@ class Streaming(QObject):
         self.stream.set_tip(tip)
         self._has_tip = tip is not None
         self.changed.emit()
-
-    def _on_reading_ended(self, job: Job) -> None:
-        if job is self._reading:
-            self._reading = None
 
 
 def _what_counts(preparation: Preparation) -> tuple[object, ...]:

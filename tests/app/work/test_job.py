@@ -4,13 +4,13 @@ import time
 from threading import Event
 
 import pytest
-from PySide6.QtCore import QThread, QThreadPool
+from PySide6.QtCore import QObject, QThread, QThreadPool
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.errors import CalibrationError
 from lightpen.messages import message
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 
 
 def endless(report: Report) -> None:
@@ -122,3 +122,34 @@ def test_the_progress_of_a_cancelled_job_is_not_reported(qtbot: QtBot) -> None:
         assert QThreadPool.globalInstance().waitForDone(60_000)
         job.cancel()  # it waits in the event queue of this thread
         QApplication.processEvents()
+
+
+def test_of_two_jobs_only_the_latest_reports(qtbot: QtBot) -> None:
+    parent, told, ends = QObject(), list[int](), list[bool]()
+    latest = LatestJob(parent)
+
+    def on_succeeded(number: int) -> None:
+        told.append(number)
+        ends.append(latest.is_running)
+
+    latest.start(endless, on_succeeded, ended=lambda: told.append(-1))
+    latest.start(lambda report: 2, on_succeeded, ended=lambda: told.append(3))
+    assert latest.is_running
+    qtbot.waitUntil(lambda: told == [2, 3])
+
+    assert ends == [False]  # its outcome is no longer awaited once it is told
+    assert QThreadPool.globalInstance().waitForDone(60_000)
+    QApplication.processEvents()
+    assert told == [2, 3]
+
+
+def test_a_latest_job_that_is_cancelled_is_no_longer_awaited(qtbot: QtBot) -> None:
+    parent, told = QObject(), list[object]()
+    latest = LatestJob(parent)
+    latest.start(endless, told.append, told.append, ended=lambda: told.append(None))
+    latest.cancel()
+
+    assert not latest.is_running
+    assert QThreadPool.globalInstance().waitForDone(60_000)
+    QApplication.processEvents()
+    assert told == []

@@ -28,7 +28,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.board_capture import BoardCapture
 from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.live_view import LiveView
 
 
@@ -53,7 +53,7 @@ class BoardCalibration(QObject):
         self._capture, self._live = capture, live
         self._computed: ComputedCamera | None = None
         self._is_saved = False
-        self._job: Job | None = None
+        self._job = LatestJob(self)
         self._remark: Callable[[], StatusMessage] = StatusMessage
 
     @property
@@ -122,9 +122,7 @@ class BoardCalibration(QObject):
 
     def _give_up(self) -> None:
         """Cancel the computation and discard an unused result."""
-        if self._job is not None:
-            self._job.cancel()
-            self._job = None
+        self._job.cancel()
         if self._computed is not None and not self._is_saved:
             self.concluded.emit(self._trial(TrialOutcome.REFUSED))
         self._computed = None
@@ -132,8 +130,9 @@ class BoardCalibration(QObject):
 
     def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
         self._give_up()
-        self._job = job = Job(calibrate, self)
-        job.start(self._on_found, self._on_refused, progressed=self._on_progressed)
+        self._job.start(
+            calibrate, self._on_found, self._on_refused, progressed=self._on_progressed
+        )
 
     def _on_progressed(self, fraction: float) -> None:
         self.set_remark(partial(self._progress_message, fraction))
@@ -143,11 +142,10 @@ class BoardCalibration(QObject):
         return StatusMessage(words, Sign.WAIT, Tone.QUIET)
 
     def _on_refused(self, sentence: str) -> None:
-        self._job = None
         self.set_remark(partial(StatusMessage.fault, sentence))
 
     def _on_found(self, computed: ComputedCamera) -> None:
-        self._job, self._computed, self._is_saved = None, computed, False
+        self._computed, self._is_saved = computed, False
         self.found_changed.emit()
         self.set_remark(partial(self._found_message, computed.found))
 

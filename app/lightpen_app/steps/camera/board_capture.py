@@ -18,7 +18,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 
 LONGEST_UNSEEN = 3.0  # s, after which the cause is sought
 NANOSECONDS = 1e9
@@ -67,8 +67,8 @@ class BoardCapture(QObject):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self._state = CaptureState()
-        self._searching: Job | None = None
-        self._leading: Job | None = None
+        self._searching = LatestJob(self)
+        self._leading = LatestJob(self)
 
     @property
     def state(self) -> CaptureState:
@@ -78,14 +78,12 @@ class BoardCapture(QObject):
     @property
     def is_searching(self) -> bool:
         """Whether an image is being processed."""
-        return self._searching is not None
+        return self._searching.is_running
 
     def start(self, board: Board | None) -> None:
         """Restart, without views."""
-        for job in (self._searching, self._leading):
-            if job is not None:
-                job.cancel()
-        self._searching = self._leading = None
+        self._searching.cancel()
+        self._leading.cancel()
         self._become(CaptureState(board))
 
     def stop(self) -> None:
@@ -95,7 +93,7 @@ class BoardCapture(QObject):
     def take(self, frame: Frame) -> None:
         """Process an image unless the previous one is still being processed."""
         state, time_s = self._state, frame.host_ts_ns / NANOSECONDS
-        if state.sought is None or self._searching is not None:
+        if state.sought is None or self._searching.is_running:
             return
         capture = state.capture
         if capture is None:
@@ -108,19 +106,11 @@ class BoardCapture(QObject):
         if asks_why or capture.points is not None:
             self._state = replace(state, seen_s=time_s)
         look = partial(look_for_board, frame.image, capture.board, asks_why)
-        self._searching = job = Job(look, self)
-        job.start(
-            lambda seen: self._on_looked(seen, time_s),
-            ended=partial(self._on_search_ended, job),
-        )
+        self._searching.start(look, lambda seen: self._on_looked(seen, time_s))
 
     def _become(self, state: CaptureState) -> None:
         self._state = state
         self.changed.emit()
-
-    def _on_search_ended(self, job: Job) -> None:
-        if job is self._searching:
-            self._searching = None
 
     def _on_looked(self, seen: BoardLook, time_s: float) -> None:
         state = self._state
@@ -139,23 +129,23 @@ class BoardCapture(QObject):
     def _lead(self) -> None:
         """Find the next pose to suggest."""
         capture = self._state.capture
-        if capture is None or self._leading is not None:
+        if capture is None or self._leading.is_running:
             return
-        self._leading = job = Job(partial(find_outline, capture), self)
-        job.start(
-            self._on_led, ended=partial(self._on_leading_ended, job, len(capture.kept))
+        n_kept = len(capture.kept)
+        self._leading.start(
+            partial(find_outline, capture),
+            self._on_led,
+            ended=lambda: self._on_leading_ended(n_kept),
         )
 
     def _on_led(self, wanted: SuggestedOutline) -> None:
         if self._state.sought is not None:
             self._become(replace(self._state, outline=wanted.outline))
 
-    def _on_leading_ended(self, job: Job, n_kept: int) -> None:
+    def _on_leading_ended(self, n_kept: int) -> None:
         """Repeat the computation if views were added meanwhile."""
-        if job is self._leading:
-            self._leading = None
-            if self._state.sought is not None and self._state.n_kept > n_kept:
-                self._lead()
+        if self._state.sought is not None and self._state.n_kept > n_kept:
+            self._lead()
 
 
 def look_for_board(

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.formats.opened_files import CameraFile
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class IntrinsicsControl(QObject):
         self._place = workbench.save_place
         self._panel = panel
         self._page = page
-        self._reading: Job | None = None
+        self._reading = LatestJob(self)
         self._board: BoardWindow | None = None  # made when it is requested
 
         # Connections
@@ -41,21 +41,19 @@ class IntrinsicsControl(QObject):
         """Close the window and cancel reading."""
         if self._board is not None:
             self._board.close()
-        self._drop_reading()
-
-    def _drop_reading(self) -> None:
-        if self._reading is not None:
-            self._reading.cancel()
+        self._reading.cancel()
 
     def _forget_file(self) -> None:
         """Clear the message on a file that was chosen at another station."""
-        self._drop_reading()
+        self._reading.cancel()
         self._panel.forget_refused()
 
     def _on_path_chosen(self, path: str) -> None:
-        self._drop_reading()
-        self._reading = job = Job(lambda _: CameraFile.read(Path(path)), self)
-        job.start(self._on_file_read, self._on_file_refused)
+        self._reading.start(
+            lambda _: CameraFile.read(Path(path)),
+            self._on_file_read,
+            self._panel.set_problem,
+        )
 
     def _on_calibration_requested(self) -> None:
         if self._board is None:
@@ -75,10 +73,5 @@ class IntrinsicsControl(QObject):
         self._archive_writer.keep_camera_trial(trial, names)
 
     def _on_file_read(self, camera_file: CameraFile) -> None:
-        self._reading = None
         now = self._selection.preparation
         self._selection.set_preparation(replace(now, camera_file=camera_file))
-
-    def _on_file_refused(self, sentence: str) -> None:
-        self._reading = None
-        self._panel.set_problem(sentence)

@@ -14,7 +14,7 @@ from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.work.camera_setup import CameraSetup
 from lightpen_app.work.chosen_files import ChosenFiles
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.selection import Selection
 
 
@@ -27,7 +27,7 @@ class SecondCameraChoice(QWidget):
         super().__init__()
         self._selection, self._chosen_files = selection, files
         self._live = camera.live
-        self._reading: Job | None = None
+        self._reading = LatestJob(self)
 
         # Widgets
         self._rig = RigPanel()
@@ -68,8 +68,7 @@ class SecondCameraChoice(QWidget):
 
     def shut_down(self) -> None:
         """Cancel reading."""
-        if self._reading is not None:
-            self._reading.cancel()
+        self._reading.cancel()
 
     def _on_workbench_changed(self) -> None:
         now = self._selection.preparation
@@ -90,15 +89,10 @@ class SecondCameraChoice(QWidget):
             self._chosen_files.use_samples()
 
     def _on_path_chosen(self, path: str) -> None:
-        self.shut_down()
-        self._reading = job = Job(lambda _: read_rig(Path(path)), self)
-        job.start(self._on_rig_read, self._on_rig_refused)
+        self._reading.start(
+            lambda _: read_rig(Path(path)), self._on_rig_read, self._rig.set_problem
+        )
 
     def _on_rig_read(self, rig_file: RigFile) -> None:
-        self._reading = None
         now = self._selection.preparation
         self._selection.set_preparation(now.with_rig(rig_file))
-
-    def _on_rig_refused(self, why: str) -> None:
-        self._reading = None
-        self._rig.set_problem(why)

@@ -11,7 +11,7 @@ from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.work.camera_setup import CameraSetup
 from lightpen_app.work.chosen_files import ChosenFiles
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import Job, LatestJob
 from lightpen_app.work.selection import Selection
 
 
@@ -59,7 +59,7 @@ class BesideControl(QObject):
         super().__init__(panel)
         self._selection = selection
         self._panel = panel
-        self._looking: Job | None = None
+        self._looking = LatestJob(self)
         self._source = SourceChoice()
         self._found = FilesBeside()
 
@@ -76,16 +76,14 @@ class BesideControl(QObject):
 
     def shut_down(self) -> None:
         """Stop."""
-        if self._looking is not None:
-            self._looking.cancel()
+        self._looking.cancel()
 
     def _look(self, source: SourceChoice) -> None:
         self._source, self._found = source, FilesBeside()
         self.shut_down()
         if source.kind != SourceKind.RECORDED or not source.place:
             return
-        self._looking = job = Job(lambda _: files_beside(source.place), self)
-        job.start(self._on_found)
+        self._looking.start(lambda _: files_beside(source.place), self._on_found)
 
     def _on_found(self, files: FilesBeside) -> None:
         self._found = files

@@ -25,7 +25,7 @@ from lightpen_app.steps.leds.draft import (
 )
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.work.chosen_files import ChosenFiles
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 from lightpen_app.work.pen_files import PenFiles
 
 T = TypeVar("T")
@@ -48,7 +48,7 @@ class LedFileControl(QObject):
         self._pens = pens
         self._shown = LedState()
         self._problem: Callable[[], str] = self._frame_error
-        self._job: Job | None = None
+        self._job = LatestJob(self)
 
         # Connections
         panel.path_chosen.connect(self._on_path_chosen)
@@ -71,8 +71,7 @@ class LedFileControl(QObject):
 
     def drop_job(self) -> None:
         """Ignore the outcome of a file being read or written."""
-        if self._job is not None:
-            self._job.cancel()
+        self._job.cancel()
 
     def _on_draft_changed(self) -> None:
         before, self._shown = self._shown, self._leds.state
@@ -194,9 +193,6 @@ class LedFileControl(QObject):
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
     ) -> None:
         """Read or write a file, and ignore the outcome of an earlier one."""
-        self.drop_job()
-        self._job = job = Job(function, self)
-        job.start(on_succeeded, self._on_failed)
-
-    def _on_failed(self, sentence: str) -> None:
-        self._set_problem(lambda: sentence)
+        self._job.start(
+            function, on_succeeded, lambda sentence: self._set_problem(lambda: sentence)
+        )

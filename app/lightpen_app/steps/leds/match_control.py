@@ -12,7 +12,7 @@ from lightpen.model.pen import Pen
 from lightpen.pen_check.match import PenMatch, add_view, match_pen
 from lightpen_app.steps.leds.draft import LedDraft
 from lightpen_app.steps.leds.match_panel import MatchPanel
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
@@ -32,7 +32,7 @@ class PenWatch(QObject):
         self._views: tuple[Spots, ...] = ()
         self._compared: tuple[Spots, ...] = ()
         self._last: PenMatch | None = None
-        self._job: Job | None = None  # whose outcome is awaited
+        self._job = LatestJob(self)
         self._timer = QTimer(self, interval=PERIOD_MS)
 
         # Connections
@@ -66,35 +66,30 @@ class PenWatch(QObject):
     def stop(self) -> None:
         """Compare no more."""
         self._timer.stop()
-        self._drop_job()
+        self._job.cancel()
 
     def _forget(self) -> None:
         self._compared = ()
-        self._drop_job()
+        self._job.cancel()
         self.value_changed.emit(None)
-
-    def _drop_job(self) -> None:
-        if self._job is not None:
-            self._job.cancel()
-            self._job = None
 
     def _compare(self) -> None:
         camera, pen, views = self._camera, self._pen, self._views
-        if camera is None or pen is None or not views or self._job is not None:
+        if camera is None or pen is None or not views or self._job.is_running:
             return
         if views is self._compared:
             return
         self._compared = views
-        self._job = job = Job(lambda report: match_pen(camera, pen, views), self)
-        job.start(self._on_compared, crashed=self._on_crashed)
+        self._job.start(
+            lambda report: match_pen(camera, pen, views),
+            self._on_compared,
+            # The views after these are compared again.
+            crashed=lambda: self.value_changed.emit(None),
+        )
 
     def _on_compared(self, match: PenMatch) -> None:
-        self._job, self._last = None, match
+        self._last = match
         self.value_changed.emit(match)
-
-    def _on_crashed(self) -> None:
-        self._job = None
-        self.value_changed.emit(None)  # the views after these are compared again
 
 
 class MatchControl(QObject):

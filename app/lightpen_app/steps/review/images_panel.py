@@ -29,7 +29,7 @@ from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 
 TABLE_WIDTH = 38 * GRID
 VIEW_SHARE, PLOT_SHARE = 3, 2  # of the height
@@ -65,7 +65,7 @@ class ImagesPanel(Translated, QWidget):
         super().__init__()
         self._solution: Solution | None = None
         self._why_locked = ""
-        self._job: Job | None = None
+        self._job = LatestJob(self)
         self._loading: tuple[RecordSource, int, int] | None = None
         self._shown: tuple[int, int] | None = None  # number and camera
         self._steps = QUndoStack(self)
@@ -101,9 +101,9 @@ class ImagesPanel(Translated, QWidget):
         layout.setRowStretch(3, PLOT_SHARE)
 
         # Connections
-        self._table.number_changed.connect(self._on_number_changed)
+        self._table.number_changed.connect(self._on_choice_changed)
         self._table.selection_changed.connect(self._refresh_buttons)
-        self._switch.value_changed.connect(self._on_camera_changed)
+        self._switch.value_changed.connect(self._on_choice_changed)
         self._misfits.number_chosen.connect(self._table.choose)
         self._misfits.limit_set.connect(self._leave_out)
         self._take_out.clicked.connect(self._on_take_out_clicked)
@@ -142,7 +142,7 @@ class ImagesPanel(Translated, QWidget):
         self._refresh_misfits()
         self._refresh_texts()
         self._mark()
-        if self._shown is None and self._job is None:
+        if self._shown is None and not self._job.is_running:
             self._load_wanted()
 
     def set_locked(self, why: str) -> None:
@@ -165,9 +165,7 @@ class ImagesPanel(Translated, QWidget):
 
     def shut_down(self) -> None:
         """Stop reading an image."""
-        job, self._job = self._job, None
-        if job is not None:
-            job.cancel()
+        self._job.cancel()
 
     def _shortcut(
         self, key: QKeySequence.StandardKey | Qt.Key, act: Callable[[], None]
@@ -266,14 +264,9 @@ class ImagesPanel(Translated, QWidget):
             text = self.tr("Image {0}: pen not found. {1}")
             self._caption.setText(text.format(number, worded(detail)))
 
-    def _on_number_changed(self, number: int) -> None:
+    def _on_choice_changed(self) -> None:
         self._mark()
-        if self._job is None:
-            self._load_wanted()
-
-    def _on_camera_changed(self) -> None:
-        self._mark()
-        if self._job is None:
+        if not self._job.is_running:
             self._load_wanted()
 
     def _load_wanted(self) -> None:
@@ -282,11 +275,14 @@ class ImagesPanel(Translated, QWidget):
         if self._loading is None or self._solution is None:
             return
         _, number, camera = self._loading
-        self._job = job = Job(partial(_decoded, self._solution, number, camera), self)
-        job.start(self._on_decoded, self._on_undecoded, crashed=self._on_crashed)
+        self._job.start(
+            partial(_decoded, self._solution, number, camera),
+            self._on_decoded,
+            self._on_undecoded,
+            crashed=lambda: self._on_undecoded(self.tr("Image not available")),
+        )
 
     def _on_decoded(self, image: _Decoded) -> None:
-        self._job = None
         if (image.source, image.number, image.camera) != self._wanted():
             self._load_wanted()
             return
@@ -297,15 +293,11 @@ class ImagesPanel(Translated, QWidget):
         self._view.show_around(np.array(rings).reshape(-1, 2))
 
     def _on_undecoded(self, sentence: str) -> None:
-        self._job = None
         if self._loading != self._wanted():
             self._load_wanted()
             return
         self._clear_view()
         self._view.set_message(sentence)
-
-    def _on_crashed(self) -> None:
-        self._on_undecoded(self.tr("Image not available"))
 
     def _wanted(self) -> tuple[RecordSource, int, int] | None:
         """Return number and camera of the selected image."""

@@ -20,7 +20,7 @@ from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 
 USUAL_TRIALS, MOST_TRIALS = 200, 10_000
 PROGRESS_STEPS = 1000
@@ -34,7 +34,7 @@ class MonteCarloRow(Translated, QWidget):
         self._solution: Solution | None = None
         self._found: MonteCarlo | None = None
         self._fault = ""
-        self._job: Job | None = None
+        self._job = LatestJob(self)
 
         # Widgets
         self._start = PushButton()
@@ -76,9 +76,7 @@ class MonteCarloRow(Translated, QWidget):
 
     def stop(self) -> None:
         """Compute no more."""
-        job, self._job = self._job, None
-        if job is not None:
-            job.cancel()
+        self._job.cancel()
 
     def _on_start_clicked(self) -> None:
         solution = self._solution
@@ -90,11 +88,10 @@ class MonteCarloRow(Translated, QWidget):
             with local_workers(max(1, (os.cpu_count() or 1) - 1)) as in_workers:
                 return run_monte_carlo(calibration, n_trials, in_workers, report)
 
-        self.stop()
         self._found, self._fault = None, ""
         self._progress.setValue(0)
-        self._job = job = Job(compute, self)
-        job.start(
+        self._job.start(
+            compute,
             self._on_found,
             self._on_failed,
             progressed=self._on_progressed,
@@ -107,11 +104,11 @@ class MonteCarloRow(Translated, QWidget):
         self._progress.setValue(round(PROGRESS_STEPS * fraction))
 
     def _on_found(self, found: MonteCarlo) -> None:
-        self._job, self._found = None, found
+        self._found = found
         self._refresh()
 
     def _on_failed(self, why: str) -> None:
-        self._job, self._fault = None, why
+        self._fault = why
         self._refresh()
 
     def _on_cancel_clicked(self) -> None:
@@ -139,7 +136,7 @@ class MonteCarloRow(Translated, QWidget):
         self._refresh()
 
     def _refresh(self) -> None:
-        is_busy = self._job is not None
+        is_busy = self._job.is_running
         self._start.setVisible(not is_busy)
         self._start.set_why_not(self._why_not())
         for field in (self._label, self._trials):

@@ -17,7 +17,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.status_mark import message_icon, status_message
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
@@ -111,7 +111,7 @@ class NextTipsControl(QObject):
         super().__init__(row)
         self._selection, self._run, self._tips = selection, run, library
         self._row = row
-        self._search: Job | None = None
+        self._search = LatestJob(self)
 
         # Connections
         library.changed.connect(self._show_statuses)
@@ -126,13 +126,11 @@ class NextTipsControl(QObject):
         if result is None:
             return
         archive = self._run.archive
-        self._search = job = Job(lambda _: next_tips(archive, result), self)
-        job.start(self._row.set_value)
+        self._search.start(lambda _: next_tips(archive, result), self._row.set_value)
 
     def shut_down(self) -> None:
         """Stop."""
-        if self._search is not None:
-            self._search.cancel()
+        self._search.cancel()
 
     def _show_statuses(self) -> None:
         self._row.set_statuses(self._tips.statuses)

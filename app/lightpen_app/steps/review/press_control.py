@@ -1,10 +1,12 @@
 """The press test in Review: begun by a button, compared off the GUI thread."""
 
+from functools import partial
+
 from PySide6.QtCore import QObject
 
 from lightpen.swing.status import SwingStatus
 from lightpen_app.steps.review.view import ReviewView
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 
@@ -19,7 +21,7 @@ class PressTestControl(QObject):
         self._runner = run.runner
         self._result, self._notices = view.result, notifications
         self._compared: tuple[object, object] = None, None
-        self._job: Job | None = None
+        self._job = LatestJob(self)
 
         # Connections
         view.tools.press_requested.connect(self._press)
@@ -44,14 +46,9 @@ class PressTestControl(QObject):
 
             return press_test(one, other)
 
-        self._job = job = Job(compared, self)
-        job.start(self._result.set_pressed, self._on_failed)
+        on_failed = partial(self._notices.notify, self)
+        self._job.start(compared, self._result.set_pressed, on_failed)
 
     def shut_down(self) -> None:
         """Compare no more."""
-        if self._job is not None:
-            self._job.cancel()
-            self._job = None
-
-    def _on_failed(self, why: str) -> None:
-        self._notices.notify(self, why)
+        self._job.cancel()

@@ -31,7 +31,7 @@ from lightpen_app.look.phrases import missing_input_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import listed
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
@@ -62,7 +62,7 @@ class InterruptedControl(QObject):
         self._data_folder, self._clock = workbench.folder, workbench.around.now
         self._panel = panel
         self._settle = settle
-        self._search: Job | None = None
+        self._search = LatestJob(self)
         self._work: Job | None = None
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
@@ -90,13 +90,11 @@ class InterruptedControl(QObject):
     def shut_down(self) -> None:
         """Cancel running jobs."""
         self._searching.stop()
-        for job in (self._search, self._work):
-            if job is not None:
-                job.cancel()
+        self._search.cancel()
+        if self._work is not None:
+            self._work.cancel()
 
     def _search_now(self) -> None:
-        if self._search is not None:
-            self._search.cancel()
         run, data = self._run, self._data_folder
         archive, folder = run.archive, run.records_folder
 
@@ -104,8 +102,7 @@ class InterruptedControl(QObject):
             swings = conclude_accepted(archive, find_unfinished(folder))
             return Interrupted(swings, find_interrupted(data))
 
-        self._search = Job(search, self)
-        self._search.start(self._on_found, self._show_fault)
+        self._search.start(search, self._on_found, self._show_fault)
 
     def _on_found(self, found: "Interrupted") -> None:
         swings = found.swings

@@ -8,7 +8,7 @@ from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.widgets.lazy import LazyWidget
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import LatestJob, Report
 
 if TYPE_CHECKING:
     from lightpen.verification.history.trend import Trend
@@ -23,7 +23,7 @@ class LargeScreenPanel(QWidget):
     def __init__(self, logbook: LazyLogbook) -> None:
         super().__init__()
         self._logbook = logbook
-        self._job: Job | None = None
+        self._job = LatestJob(self)
 
         # Widgets
         self._trend = LazyWidget(_make_trend)
@@ -50,16 +50,12 @@ class LargeScreenPanel(QWidget):
             wanted = EntryFilter(pen=pen, tip=tip, is_simulated=is_simulated)
             return trend_of(logbook.opened().database, wanted)
 
-        self._job = job = Job(read, self)
-        job.start(self._show, self._on_failed)
+        # History shows why it failed.
+        self._job.start(read, self._show, lambda _: self._show(None))
 
     def shut_down(self) -> None:
         """Cancel running jobs."""
-        if self._job is not None:
-            self._job.cancel()
-
-    def _on_failed(self, _: str) -> None:
-        self._show(None)  # History shows why
+        self._job.cancel()
 
     def _show(self, trend: "Trend | None") -> None:
         has_trend = trend is not None and len(trend.entries) >= LEAST_TREND

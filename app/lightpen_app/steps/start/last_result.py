@@ -11,7 +11,7 @@ from lightpen.swing.preparation import Preparation
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.steps.start.large_screen_panel import LargeScreenPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
@@ -33,7 +33,7 @@ class LastResultPresenter(QObject):
         super().__init__(panel)
         self._selection, self._run, self._library = selection, run, library
         self._panel, self._large = panel, large
-        self._lookup: Job | None = None
+        self._lookup = LatestJob(self)
 
         # Connections
         selection.changed.connect(self._on_selected)
@@ -61,8 +61,7 @@ class LastResultPresenter(QObject):
     def shut_down(self) -> None:
         """Stop."""
         self._large.shut_down()
-        if self._lookup is not None:
-            self._lookup.cancel()
+        self._lookup.cancel()
 
     def _look_up(self, use: Callable[[Result | None], None]) -> None:
         self.shut_down()
@@ -72,15 +71,17 @@ class LastResultPresenter(QObject):
             self._panel.set_value(LastResult(is_named=False))
             return
         archive = self._run.archive
-        self._lookup = job = Job(
-            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated), self
-        )
 
         def show(result: Result | None) -> None:
             self._panel.set_value(LastResult(result, is_simulated=is_simulated))
             use(result)
 
-        job.start(show, self._on_failed, crashed=self._on_crashed)
+        self._lookup.start(
+            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated),
+            show,
+            self._on_failed,
+            crashed=lambda: self._on_failed(self.tr("Last calibration not available")),
+        )
 
     def _fill_in(self, result: Result | None) -> None:
         now = self._selection.preparation
@@ -90,9 +91,6 @@ class LastResultPresenter(QObject):
 
     def _on_failed(self, sentence: str) -> None:
         self._panel.set_value(LastResult(fault=sentence))
-
-    def _on_crashed(self) -> None:
-        self._on_failed(self.tr("Last calibration not available"))
 
     def _on_selected(self, before: Preparation) -> None:
         self.show_status()

@@ -7,7 +7,7 @@ from PySide6.QtGui import QImage, QImageReader, QPixmap
 from PySide6.QtWidgets import QLabel
 
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 
 ReadPicture = Callable[[], bytes]  # raises a `LightpenError`
 
@@ -20,7 +20,7 @@ class TipPicture(Translated, QLabel):
 
     def __init__(self, place: QSize) -> None:
         super().__init__()
-        self._job: Job | None = None
+        self._job = LatestJob(self)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setWordWrap(True)
         self.setTextFormat(Qt.TextFormat.PlainText)
@@ -30,28 +30,22 @@ class TipPicture(Translated, QLabel):
 
     def set_value(self, read: ReadPicture | None) -> None:
         """Show another picture; None for none."""
-        if self._job is not None:
-            self._job.cancel()
-            self._job = None
+        self._job.cancel()
         self.clear()
         if read is None:
             self._retranslate()
             return
         place, density = self.size(), self.devicePixelRatioF()
-        self._job = job = Job(lambda _: _scaled(read, place, density), self)
-        job.start(self._on_read, self._on_failed)
+        self._job.start(
+            lambda _: _scaled(read, place, density), self._on_read, self.setText
+        )
 
     def _on_read(self, image: QImage) -> None:
-        self._job = None
         self.setPixmap(QPixmap.fromImage(image))
-
-    def _on_failed(self, why: str) -> None:
-        self._job = None
-        self.setText(why)
 
     def _retranslate(self) -> None:
         self.setAccessibleName(self.tr("Picture of the tip"))
-        if self._job is None and self.pixmap().isNull():
+        if not self._job.is_running and self.pixmap().isNull():
             self.setText(self.tr("No picture"))
 
 

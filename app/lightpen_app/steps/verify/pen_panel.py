@@ -34,7 +34,7 @@ from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
 
 LATEST = 8  # swings, which the table has room for
@@ -55,9 +55,9 @@ class PenPanel(Translated, QWidget):
         self._new: NewLedFile | None = None
         self._fault = ""  # why there is no better file
         self._unread = ""  # why the swings cannot be read
-        self._reading: Job | None = None
-        self._improving: Job | None = None
-        self._opening: Job | None = None  # the new file
+        self._reading = LatestJob(self)
+        self._improving = LatestJob(self)
+        self._opening = LatestJob(self)  # the new file
         self._read_of: tuple[object, ...] = ()
 
         # Widgets
@@ -99,8 +99,7 @@ class PenPanel(Translated, QWidget):
     def shut_down(self) -> None:
         """Cancel running jobs."""
         for job in (self._reading, self._improving, self._opening):
-            if job is not None:
-                job.cancel()
+            job.cancel()
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
@@ -142,25 +141,21 @@ class PenPanel(Translated, QWidget):
         self._unread = ""
         if is_other:
             self.shut_down()  # what comes of it would be of the pen before
-            self._improving = None
             self._shown, self._new, self._fault = None, None, ""
-        elif self._reading is not None:
-            self._reading.cancel()
+        self._reading.cancel()
         if now.pen_file is None:
-            self._reading = None
             self._refresh()
             return
         work = partial(read_pen_over_time, archive, now)
-        self._reading = job = Job(work, self)
-        job.start(self._on_read, self._on_unread)
+        self._reading.start(work, self._on_read, self._on_unread)
         self._refresh()
 
     def _on_read(self, found: PenOverTime) -> None:
-        self._reading, self._shown = None, found
+        self._shown = found
         self._refresh()
 
     def _on_unread(self, why: str) -> None:
-        self._reading, self._unread = None, why
+        self._unread = why
         self._refresh()
 
     def _on_failed(self, why: str) -> None:
@@ -177,10 +172,10 @@ class PenPanel(Translated, QWidget):
         self._progress.setValue(0)
         now, scale = self._clock(), self._scale()
         work = partial(improve_led_file, self._folder, pen, scale, now)
-        self._improving = job = Job(work, self)
-        job.start(
+        self._improving.start(
+            work,
             self._on_improved,
-            self._on_improving_failed,
+            self._on_failed,
             progressed=self._on_progressed,
             crashed=self._on_cancel_clicked,
         )
@@ -197,20 +192,14 @@ class PenPanel(Translated, QWidget):
         self._progress.setValue(round(PROGRESS_STEPS * fraction))
 
     def _on_improved(self, new: NewLedFile) -> None:
-        self._improving, self._new = None, new
+        self._new = new
         was_waited_for = self._cancel.hasFocus()
         self._refresh()
         if was_waited_for:
             give_focus(self._use)
 
-    def _on_improving_failed(self, why: str) -> None:
-        self._improving = None
-        self._on_failed(why)
-
     def _on_cancel_clicked(self) -> None:
-        job, self._improving = self._improving, None
-        if job is not None:
-            job.cancel()
+        self._improving.cancel()
         self._refresh()
         give_focus(self._improve)
 
@@ -218,8 +207,8 @@ class PenPanel(Translated, QWidget):
         if self._new is None:
             return
         path: Path = self._new.path
-        self._opening = job = Job(lambda _: PenFile.read(path), self)
-        job.start(partial(self._on_new_read, self._read_of), self._on_failed)
+        on_read = partial(self._on_new_read, self._read_of)
+        self._opening.start(lambda _: PenFile.read(path), on_read, self._on_failed)
 
     def _on_new_read(self, made_for: tuple[object, ...], pen_file: PenFile) -> None:
         now = self._selection.preparation
@@ -230,7 +219,7 @@ class PenPanel(Translated, QWidget):
     # What is shown
 
     def _refresh(self) -> None:
-        found, is_busy = self._shown, self._improving is not None
+        found, is_busy = self._shown, self._improving.is_running
         health = None if found is None else found.health
         self._verdict.set_value(self._health_message(health))
         self._left_out.setText(self._left_out_text())
@@ -257,7 +246,7 @@ class PenPanel(Translated, QWidget):
             assessment = health.assessment
             words = f"{worded(assessment.reason)} {worded(BY_SIMPLE_ACCEPTANCE)}"
             return StatusMessage(words, *GRADE_MARKS[assessment.grade])
-        if self._shown is None and self._reading is None:
+        if self._shown is None and not self._reading.is_running:
             return StatusMessage()
         if self._shown is None:
             return StatusMessage(self.tr("Reading the swings of the pen."), Sign.WAIT)
