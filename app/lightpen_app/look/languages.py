@@ -40,17 +40,11 @@ class LanguageSwitch(QObject):
     def __init__(self, application: QApplication) -> None:
         super().__init__(application)
         self._application = application
-        self._language = SOURCE_LANGUAGE
         self._translators: list[QTranslator] = []
-
-    def language(self) -> str:
-        """Return the language in use."""
-        return self._language
 
     def set_language(self, language: str) -> None:
         """Use another language, of numbers and of Qt's own texts too."""
         self.remove()
-        self._language = language
         QLocale.setDefault(QLocale(language))
         qt_folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
         self._install(f"qtbase_{language}", qt_folder)

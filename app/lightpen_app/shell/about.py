@@ -50,7 +50,3 @@ class About(FittedWindow, QDialog):
 
         # Connections
         buttons.rejected.connect(self.reject)
-
-    def text(self) -> str:
-        """Return the text that lists the versions."""
-        return self._versions.text()

@@ -134,10 +134,6 @@ class OperatorView(Translated, QWidget):
         self._notice.setVisible(bool(text))
         self._resize_letters()
 
-    def distance_m(self) -> float:
-        """Return the viewing distance, m."""
-        return self._distance_m
-
     def set_distance_m(self, distance_m: float) -> None:
         """Size the letters for another viewing distance, m."""
         self._distance_m = distance_m

@@ -29,10 +29,6 @@ class DeviceField(ChoiceField):
         self.activated.connect(self._on_activated)
         edit.returnPressed.connect(self._on_return_pressed)
 
-    def value(self) -> str:
-        """Return the serial number or address that was given last."""
-        return self._value
-
     def set_value(self, value: str) -> None:
         """Show another camera."""
         self._value = value

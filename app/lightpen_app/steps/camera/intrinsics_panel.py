@@ -78,10 +78,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def value(self) -> CameraFile | None:
-        """Return the file in use."""
-        return self._file
-
     def set_value(self, value: CameraFile | None) -> None:
         """Show another file and clear the message about the previous one."""
         if value is self._file:

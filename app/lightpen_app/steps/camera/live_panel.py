@@ -82,10 +82,6 @@ class LivePanel(Translated, QWidget):
         self._shown = shown
         self._switch.set_value(shown)
 
-    def state(self) -> StatusMessage:
-        """Return the state of the camera."""
-        return self._state.value()
-
     def figures(self) -> str:
         """Return the number of spots and the frame rate, shortened to the width."""
         return self._figures.text()

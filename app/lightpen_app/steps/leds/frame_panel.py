@@ -61,10 +61,6 @@ class FramePanel(Translated, QGroupBox):
         """Draw another pen."""
         self.view.set_value(picture)
 
-    def value(self) -> FrameCheck | None:
-        """Return the listed checks."""
-        return self._value
-
     def set_value(self, value: FrameCheck | None) -> None:
         """List the checks of another pen; None clears the list."""
         self._value = value

@@ -115,15 +115,6 @@ class MatchPanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def state(self) -> State:
-        """Return the state of the last images."""
-        return self._banner.value()
-
-    def remarks(self) -> tuple[str, ...]:
-        """Return the remarks on the views so far."""
-        texts = (remark.text() for remark in self._messages)
-        return tuple(filter(None, texts))
-
     def set_image(self, shown: DisplayedImage) -> None:
         """Show another image."""
         detection = shown.seen.detection
@@ -167,10 +158,6 @@ class MatchPanel(Translated, QGroupBox):
         if is_aside != self._is_aside:
             self._is_aside = is_aside
             self._refresh()
-
-    def value(self) -> PenMatch | None:
-        """Return the agreement of the pen with the views so far."""
-        return self._match
 
     def set_value(self, value: PenMatch | None) -> None:
         """Show how the pen fits the views; None while unknown."""

@@ -87,10 +87,6 @@ class LedTablePanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def value(self) -> PenDraft:
-        """Return the value."""
-        return self._value
-
     def set_value(self, value: PenDraft, changes: Changes) -> None:
         """Show another draft; one that differs from the file can be discarded."""
         self._value = value

@@ -124,10 +124,6 @@ class LastResultPanel(Translated, QGroupBox):
         for cell in (*self._axes, *self._tip, *self._uncertainty):
             set_size(cell, figures)
 
-    def value(self) -> LastResult:
-        """Return the value."""
-        return self._value
-
     def set_value(self, value: LastResult) -> None:
         """Show another result, or why there is none."""
         self._value = value

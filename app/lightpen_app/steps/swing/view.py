@@ -49,7 +49,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._value = OperatorValue()
         self._room = NO_ROOM  # so that its least size at first widens no window
 
         # Widgets
@@ -107,15 +106,10 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._use_room()
         self._retranslate()
 
-    def value(self) -> OperatorValue:
-        """Return the value."""
-        return self._value
-
     def set_value(
         self, value: OperatorValue, note: str = "", *, is_verdict: bool = False
     ) -> None:
         """Show something else; a verdict has the whole width."""
-        self._value = value
         self._instruction.set_text(value.instruction)
         self._hint.set_text(value.hint, bold=False)
         self._verdict.set_value(value.state)

@@ -90,10 +90,6 @@ class PartView(Translated, QWidget):
         self.setSizePolicy(policy, policy)
         self._retranslate()
 
-    def value(self) -> PartValue:
-        """Return the value."""
-        return self._value
-
     def set_value(self, value: PartValue) -> None:
         """Draw another state."""
         self._value = value

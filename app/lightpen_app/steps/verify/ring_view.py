@@ -51,10 +51,6 @@ class RingView(Translated, QWidget):
         self.setSizePolicy(policy, policy)
         self._retranslate()
 
-    def value(self) -> RingValue:
-        """Return the value."""
-        return self._value
-
     def set_value(self, value: RingValue) -> None:
         """Show other touches."""
         if value != self._value:
