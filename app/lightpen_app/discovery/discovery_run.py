@@ -30,7 +30,7 @@ from lightpen.record.swings.writing import make_record_folder
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import LatestJob, Report
-from lightpen_app.work.live_view import Mailbox
+from lightpen_app.work.live_images import Mailbox
 from lightpen_app.work.workbench import Workbench
 
 DISCOVERIES = "discoveries"  # in the data folder

@@ -33,7 +33,7 @@ from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 SIDE_WIDTH = 52 * GRID

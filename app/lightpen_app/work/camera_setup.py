@@ -12,7 +12,8 @@ from lightpen.live.sources import SourceEnvironment, cameras_of
 from lightpen.swing.image_sources import CameraInUse
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.job import LatestJob, Report
-from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.settings import Settings
 

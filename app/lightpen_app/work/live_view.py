@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from threading import Lock, Thread
+from threading import Thread
 from time import monotonic
 
-from PySide6.QtCore import QObject, QSize, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 
-from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.protocol import (
     CameraCapabilities,
@@ -26,65 +25,23 @@ from lightpen.cameras.worker_events import (
     ProcessingKeepsUp,
     SettingsApplied,
     WorkerEvent,
-    WorkerStopped,
 )
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError
-from lightpen.live.pipeline import Live, LiveImage, Sink
+from lightpen.live.pipeline import Live, Sink
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.toucher import ProbingOperator
 from lightpen.streaming.server import PoseStream
-from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
+from lightpen_app.work.live_images import QueuedListener
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
-
-class Mailbox(QObject):
-    """One slot between a producing thread and the GUI.
-
-    A queued signal with every image would fill the memory whenever the GUI is busy;
-    here only the newest waits, with one pending `ready`.
-    """
-
-    ready = Signal()  # a value waits; emitted once until it is taken
-
-    def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._lock = Lock()
-        self._value: object | None = None
-
-    def put(self, value: object) -> None:
-        """Put a value, from any thread, in place of the one waiting."""
-        with self._lock:
-            waited = self._value is not None
-            self._value = value
-        if not waited:
-            self.ready.emit()
-
-    def take(self) -> object | None:
-        """Return the newest value, or None if it was taken already."""
-        with self._lock:
-            value, self._value = self._value, None
-        return value
-
-
 WITHOUT_IMAGES = "without-images"  # cause of a notification
 CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
-
-
-@dataclass(frozen=True, eq=False)
-class DisplayedImage:
-    """A live image, ready to be shown."""
-
-    # (H // 2, W // 2), the image at half its size, see
-    # `lightpen_app.look.pooling.pooled`
-    half: Image
-    size: QSize  # of the whole image, px
-    seen: LiveImage
 
 
 class LiveView(QObject):
@@ -126,7 +83,7 @@ class LiveView(QObject):
         self._is_watched = True
         self._simulated: list[SimulatedCamera] = []
         self._operator: Operator | None = None
-        self._listener: _QueuedListener | None = None
+        self._listener: QueuedListener | None = None
         self._closing: list[Thread] = []
         self._notifications = notifications
 
@@ -149,7 +106,7 @@ class LiveView(QObject):
         self._operator = first.operator if isinstance(first, SimulatedCamera) else None
         self._chosen = min(self._chosen, len(cameras) - 1)
         self._states = [_CameraState() for _ in cameras]
-        self._listener = listener = _QueuedListener(self)
+        self._listener = listener = QueuedListener(self)
         listener.camera = self._chosen
         listener.image_shown.connect(self.image_shown)
         listener.event_received.connect(self._on_event_received)
@@ -351,7 +308,7 @@ class LiveView(QObject):
                 ProbingOperator(operator) if is_led and operator else None
             )
 
-    def _stop(self, live: Live, listener: "_QueuedListener") -> None:
+    def _stop(self, live: Live, listener: QueuedListener) -> None:
         try:
             live.stop()
         except DeviceLost as error:
@@ -425,52 +382,3 @@ _WORST_FIRST = (
     Connection.SILENT,
     Connection.STREAMING,
 )
-
-
-class _QueuedListener(QObject):
-    """Forwards events from the threads of a camera to that of the GUI.
-
-    Its public signals are emitted on the thread of the GUI, so that blocking them
-    there is enough to receive none.
-    """
-
-    image_shown = Signal(object)
-    event_received = Signal(object, int)
-    _event_posted = Signal(object, int)
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        self.camera = 0  # whose images are shown
-        self._images = Mailbox(self)
-
-        # Connections
-        queued = Qt.ConnectionType.QueuedConnection
-        self._images.ready.connect(self._on_image_ready, queued)
-        self._event_posted.connect(self.event_received, queued)
-
-    def discard(self) -> None:
-        """Free the image that waits."""
-        self._images.take()
-
-    # On the threads of the camera
-
-    def on_image(self, image: LiveImage) -> None:
-        """Leave an image for the GUI."""
-        if image.camera != self.camera:
-            return
-        pixels = image.frame.image
-        height, width = pixels.shape
-        half = pooled(pixels, image.frame.bits)
-        self._images.put(DisplayedImage(half, QSize(width, height), image))
-
-    def on_camera(self, event: WorkerEvent, camera: int) -> None:
-        """Forward an event of a camera."""
-        if not isinstance(event, WorkerStopped):  # the connection closes besides
-            self._event_posted.emit(event, camera)
-
-    # On the thread of the GUI
-
-    def _on_image_ready(self) -> None:
-        shown = self._images.take()
-        if isinstance(shown, DisplayedImage) and shown.seen.camera == self.camera:
-            self.image_shown.emit(shown)

@@ -9,7 +9,7 @@ from pytestqt.qtbot import QtBot
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import DARK, Tone
 from lightpen_app.widgets.image_view import MAX_ZOOM, ImageView, Marker
-from lightpen_app.work.live_view import Mailbox
+from lightpen_app.work.live_images import Mailbox
 
 WIDTH, HEIGHT = 2448, 2048
 

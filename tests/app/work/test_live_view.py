@@ -24,7 +24,8 @@ from lightpen.streaming.server import PoseStream
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun

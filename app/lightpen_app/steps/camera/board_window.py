@@ -38,7 +38,8 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.save_place import SavePlace
 
 SIDE_WIDTH = 48 * GRID

@@ -26,7 +26,7 @@ from lightpen_app.widgets.live_markers import led_numbers, live_markers
 from lightpen_app.widgets.origin_mark import origin_message
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 
 HEAD_GAP = 3 * GRID  # px, between the words above the image
 N_TIMED = 40  # images of which the rate is the mean: two seconds

@@ -16,7 +16,7 @@ from lightpen_app.steps.camera.source_control import BesideControl, SourceSearch
 from lightpen_app.steps.camera.view import CameraPanels
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 

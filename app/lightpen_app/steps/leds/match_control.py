@@ -13,7 +13,8 @@ from lightpen.pen_check.match import PenMatch, add_view, match_pen
 from lightpen_app.steps.leds.draft import LedDraft
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.work.job import LatestJob
-from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.swing_run import SwingRun
 

@@ -27,7 +27,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 
 
 class FixableMessage(Translated, QWidget):

@@ -8,7 +8,8 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.spin import SpinFit, fit_spin
 from lightpen.model.posture import angles_between
 from lightpen_app.look.sentences import worded
-from lightpen_app.work.live_view import DisplayedImage, LiveView
+from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import LiveView
 
 STEP = np.radians(1.0)  # from one posture that is kept to the next
 MOST = 500  # postures

@@ -5,7 +5,7 @@ from collections import deque
 from PySide6.QtCore import QObject
 
 from lightpen.live.pipeline import LiveImage
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.swing_run import SwingRun
 
 RATE_S = 2.0  # over which the images are counted

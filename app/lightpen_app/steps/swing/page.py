@@ -26,7 +26,7 @@ from lightpen_app.steps.swing.page_state import (
 from lightpen_app.steps.swing.simulator_controls import SwingSimulatorControls
 from lightpen_app.steps.swing.view import SwingView
 from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped

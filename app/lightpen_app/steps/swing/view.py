@@ -23,7 +23,7 @@ from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 
 if TYPE_CHECKING:
     from lightpen_app.steps.swing.plots_panel import SwingPlots

@@ -24,7 +24,7 @@ from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
 

@@ -40,7 +40,7 @@ from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.widgets.board_view import BoardView
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:

@@ -52,7 +52,7 @@ from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
