@@ -65,7 +65,7 @@ def prepared(
 
     It begins a second after the tip was seated; whole swings are walked elsewhere.
     """
-    rules, view = "lightpen.swing.capture.rules", "lightpen_app.steps.swing.view_state"
+    rules, view = "lightpen.swing.capture.rules", "lightpen_app.steps.swing.words"
     for module in (rules, view):
         monkeypatch.setattr(f"{module}.COUNTDOWN", 1.0)
     settings.set_station(STATION, LONG)

@@ -22,7 +22,8 @@ from lightpen.swing.capture.state import (
 )
 from lightpen.swing_messages import PEN_LOST, Code
 from lightpen_app.steps.swing.remaining_images import RemainingImages, in_true_steps
-from lightpen_app.steps.swing.view_state import SwingViewState, SwingWords
+from lightpen_app.steps.swing.view_state import SwingViewState
+from lightpen_app.steps.swing.words import SwingWords
 from lightpen_app.widgets.sign_label import StatusMessage
 
 SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
