@@ -1,6 +1,6 @@
 """Section of the report on the evidence: images, LEDs and files."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from PySide6.QtCore import QCoreApplication
@@ -189,6 +189,14 @@ def file_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
         ),
         (translate("paper", "Pen"), inputs.pen),
     ]
+    rows = [(what, each.file, each.sha256) for what, each in files]
+    return input_blocks(rows, len(inputs.observations))
+
+
+def input_blocks(
+    files: Sequence[tuple[str, str, str]], n_observations: int
+) -> Iterable[Block]:
+    """Return what each file is, its name and hash; of the images how many there are."""
     yield heading(translate("paper", "Input files"))
     yield from table(
         [
@@ -196,7 +204,7 @@ def file_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
             Column(translate("paper", "File"), 1.6),
             Column("SHA-256", 3.6),
         ],
-        [(what, each.file, each.sha256) for what, each in files],
+        files,
         size=PrintSize.SMALL,
     )
     text = translate(
@@ -204,7 +212,7 @@ def file_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
         "Images or files of LED centres: {0}. The JSON file lists each with its "
         "SHA-256.",
     )
-    yield paragraph(text.format(len(inputs.observations)))
+    yield paragraph(text.format(n_observations))
 
 
 def _left_out(calibration: CalibrationRecord) -> Iterable[Block]:

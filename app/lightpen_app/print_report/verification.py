@@ -33,6 +33,7 @@ from lightpen_app.print_report.blocks import (
     subheading,
     table,
 )
+from lightpen_app.print_report.evidence import input_blocks
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
 from lightpen_app.print_report.part import part_blocks
 from lightpen_app.print_report.sections import (
@@ -201,29 +202,14 @@ def _tables(of: Mapping[str, Any]) -> Iterator[Block]:
 
 
 def _inputs(inputs: Any) -> Iterable[Block]:
-    """Yield the files with their hashes; of the images how many there are."""
+    """Return the files with their hashes, and how many images there are."""
     files = {k: v for k, v in inputs.items() if isinstance(v, Mapping) and "file" in v}
     others = inputs.get("files", ())
     rows = [(name, each["file"], each["sha256"]) for name, each in files.items()]
     rows += [("", each["file"], each["sha256"]) for each in others]
     for each in inputs.get("touches", ()):  # of live ones, whose images it lists
         rows.append(("touches", each["folder"], each["journal_sha256"]))
-    yield heading(translate("paper", "Input files"))
-    yield from table(
-        [
-            Column("", 0.7),
-            Column(translate("paper", "File"), 1.6),
-            Column("SHA-256", 3.6),
-        ],
-        rows,
-        size=PrintSize.SMALL,
-    )
-    text = translate(
-        "paper",
-        "Images or files of LED centres: {0}. The JSON file lists each with its "
-        "SHA-256.",
-    )
-    yield paragraph(text.format(len(inputs.get("images", ()))))
+    return input_blocks(rows, len(inputs.get("images", ())))
 
 
 def _title(name: str) -> str:
