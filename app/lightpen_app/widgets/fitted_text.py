@@ -32,7 +32,6 @@ class FittedText(QWidget):
         self,
         largest: float,
         n_lines: int = 1,
-        alignment: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
         least: float = 0.0,
         *,
         wraps: bool = True,
@@ -41,7 +40,7 @@ class FittedText(QWidget):
         self._least = least
         self._largest = largest
         self._n_lines = n_lines
-        self._flags = int(alignment | Qt.AlignmentFlag.AlignVCenter)
+        self._flags = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self._flags |= WRAPPED if wraps else 0
         self._text = ""
         self._tone = Tone.PLAIN

@@ -84,15 +84,9 @@ class ImageView(Translated, QWidget):
         """Show an image that is `pooled` already; ``size`` is that of the whole."""
         self._show(half, size, tuple(markers))
 
-    def set_image(
-        self, image: Image | None, markers: Sequence[Marker] = (), *, bits: int = 8
-    ) -> None:
-        """Show an (H, W) image at once, or none."""
-        if image is None:
-            self._show(None, QSize(), ())
-            return
-        height, width = image.shape
-        self._show(pooled(image, bits), QSize(width, height), tuple(markers))
+    def clear(self) -> None:
+        """Show no image."""
+        self._show(None, QSize(), ())
 
     def set_markers(self, markers: Sequence[Marker]) -> None:
         """Draw other rings on the image that is shown."""

@@ -1,11 +1,14 @@
 """The live image: small LEDs stay visible, the newest image wins, marks sit right."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QPoint, QPointF, QSize, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from lightpen.arrays import Image
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import DARK, Tone
 from lightpen_app.widgets.image_view import MAX_ZOOM, ImageView, Marker
@@ -27,6 +30,10 @@ def dark_image() -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
     return np.zeros((HEIGHT, WIDTH), np.uint8)
 
 
+def show(view: ImageView, image: Image, markers: Sequence[Marker] = ()) -> None:
+    view.set_half(pooled(image), QSize(image.shape[1], image.shape[0]), markers)
+
+
 def test_the_brightest_of_four_pixels_is_kept() -> None:
     image = np.array([[1, 2, 9, 0], [3, 4, 0, 0], [7, 7, 0, 0]], np.uint8)
 
@@ -45,7 +52,7 @@ def test_an_led_of_one_pixel_stays_visible(view: ImageView, part: int) -> None:
     view.resize(WIDTH // part, HEIGHT // part)
     image = dark_image()
     image[800, 1200] = 255
-    view.set_image(image)
+    show(view, image)
 
     place = view.place_of(1200, 800).toPoint()
     shown = view.grab().toImage()
@@ -63,7 +70,7 @@ def test_an_image_has_no_seams(view: ImageView, part: int) -> None:
     view.resize(WIDTH // part, HEIGHT // part)
     image = np.repeat(np.arange(HEIGHT, dtype=np.uint32) // 9, WIDTH)
     pixels = image.astype(np.uint8).reshape(HEIGHT, WIDTH)
-    view.set_image(pixels)
+    show(view, pixels)
 
     shown = view.grab().toImage()
     inside = range(5, shown.height() - 5)
@@ -75,7 +82,7 @@ def test_an_image_has_no_seams(view: ImageView, part: int) -> None:
 
 
 def test_a_ring_is_drawn_about_its_place(view: ImageView) -> None:
-    view.set_image(dark_image(), [Marker(1200, 800, 40, tone=Tone.GOOD)])
+    show(view, dark_image(), [Marker(1200, 800, 40, tone=Tone.GOOD)])
 
     shown = view.grab().toImage()
     right = (view.place_of(1240, 800)).toPoint()
@@ -88,7 +95,7 @@ def test_a_ring_is_drawn_about_its_place(view: ImageView) -> None:
 
 def test_rings_of_doubt_are_dashed_besides_their_colour(view: ImageView) -> None:
     def drawn(tone: Tone) -> int:
-        view.set_image(dark_image(), [Marker(1200, 1000, 400, tone=tone)])
+        show(view, dark_image(), [Marker(1200, 1000, 400, tone=tone)])
         image = view.grab().toImage()
         ring = (
             view.place_of(
@@ -106,7 +113,7 @@ def test_rings_of_doubt_are_dashed_besides_their_colour(view: ImageView) -> None
 
 def test_what_is_left_out_is_crossed(view: ImageView) -> None:
     marker = Marker(1200, 1000, 200, tone=Tone.QUIET, crossed=True)
-    view.set_image(dark_image(), [marker])
+    show(view, dark_image(), [marker])
 
     shown = view.grab().toImage()
     for x in (1100, 1200, 1300):
@@ -120,7 +127,7 @@ def test_what_is_left_out_is_crossed(view: ImageView) -> None:
 def test_a_label_stands_where_it_is_reported(
     view: ImageView, angle: float, dx: int, dy: int
 ) -> None:
-    view.set_image(dark_image(), [Marker(1200, 1000, 1, "8", label_angle=angle)])
+    show(view, dark_image(), [Marker(1200, 1000, 1, "8", label_angle=angle)])
     drawn = view.grab().toImage()
     middle = view.place_of(1200, 1000).toPoint() + QPoint(14 * dx, 14 * dy)
     lit = [
@@ -135,7 +142,7 @@ def test_a_label_stands_where_it_is_reported(
 def test_a_label_covers_no_other_ring(view: ImageView) -> None:
     beside = Marker(1256, 1000, 16)  # where the label would stand
 
-    view.set_image(dark_image(), [Marker(1200, 1000, 1, "8", label_angle=0), beside])
+    show(view, dark_image(), [Marker(1200, 1000, 1, "8", label_angle=0), beside])
 
     drawn = view.grab().toImage()
     middle = view.place_of(1256, 1000).toPoint()
@@ -144,7 +151,7 @@ def test_a_label_covers_no_other_ring(view: ImageView) -> None:
 
 
 def test_pixels_and_places_agree_at_every_enlargement(view: ImageView) -> None:
-    view.set_image(dark_image())
+    show(view, dark_image())
     for zoom in (1.0, 3.0, MAX_ZOOM):
         view.set_zoom(zoom)
         pixel = view.pixel_at(view.place_of(1000.25, 700.5))
@@ -154,13 +161,13 @@ def test_pixels_and_places_agree_at_every_enlargement(view: ImageView) -> None:
 def test_the_corner_of_the_image_is_half_a_pixel_before_its_first_centre(
     view: ImageView,
 ) -> None:
-    view.set_image(dark_image())
+    show(view, dark_image())
 
     assert view.place_of(-0.5, -0.5) == QPointF(0, 0)
 
 
 def test_a_click_tells_the_image_point(view: ImageView, qtbot: QtBot) -> None:
-    view.set_image(dark_image())
+    show(view, dark_image())
 
     with qtbot.waitSignal(view.pixel_clicked) as blocker:
         QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(300, 200))
@@ -169,7 +176,7 @@ def test_a_click_tells_the_image_point(view: ImageView, qtbot: QtBot) -> None:
 
 
 def test_a_drag_moves_the_image_and_is_no_click(view: ImageView, qtbot: QtBot) -> None:
-    view.set_image(dark_image())
+    show(view, dark_image())
     view.set_zoom(4.0)
     before = view.place_of(1000, 1000)
 
@@ -183,7 +190,7 @@ def test_a_drag_moves_the_image_and_is_no_click(view: ImageView, qtbot: QtBot) -
 
 
 def test_keys_enlarge_move_and_show_all_again(view: ImageView) -> None:
-    view.set_image(dark_image())
+    show(view, dark_image())
     QTest.keyClick(view, Qt.Key.Key_Plus)
     before = view.place_of(1000, 1000).x()
     QTest.keyClick(view, Qt.Key.Key_Right)

@@ -305,7 +305,7 @@ def test_labels_of_many_bars_are_written_upwards(qtbot: QtBot) -> None:
 
 
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
-    plot = LinePlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")], "iteration")
+    plot = LinePlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")])
     show(qtbot, plot)
     bars = BarPlot(Axes("U"), [Curve("x_um", "x"), Curve("y_um", "y")], "part")
     show(qtbot, bars)
@@ -316,7 +316,7 @@ def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
 
 
 def test_later_steps_are_saved_but_not_shown(qtbot: QtBot) -> None:
-    plot = LinePlot(Axes("Objective"), [Curve("objective")], "iteration")
+    plot = LinePlot(Axes("Objective"), [Curve("objective")])
     show(qtbot, plot)
     steps = np.arange(60.0)
 
@@ -344,7 +344,7 @@ def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) ->
 
 def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
     bars = BarPlot(Axes("LEDs"), [Curve("rms")], "led")
-    lines = LinePlot(Axes("Tip"), [Curve("x_um")], "iteration")
+    lines = LinePlot(Axes("Tip"), [Curve("x_um")])
     for plot in (bars, lines):
         show(qtbot, plot)
     before = bars.n_items(), lines.n_items()

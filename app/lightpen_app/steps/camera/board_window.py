@@ -220,7 +220,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _on_found_changed(self) -> None:
         found = self._calibration.found
         if self._capture.state.capture is None:  # the views are from a folder
-            self._image.set_image(None)
+            self._image.clear()
             if found is not None:
                 width, height = found.views.image_sizes[0]
                 blank = np.zeros((height // 2, width // 2), np.uint8)

@@ -123,7 +123,7 @@ class LivePanel(Translated, QWidget):
 
     def _forget(self) -> None:
         """Clear the image until the next arrives."""
-        self.view.set_image(None)
+        self.view.clear()
         self._seen = None
         self._arrivals.clear()
         self._n_lost.clear()

@@ -132,7 +132,7 @@ class MatchPanel(Translated, QGroupBox):
         """Clear the image."""
         self._detection = None
         self._forget()
-        self.view.set_image(None)
+        self.view.clear()
         self._refresh_state()
 
     def set_why_unknown(self, sentence: str) -> None:

@@ -311,7 +311,7 @@ class ImagesPanel(Translated, QWidget):
 
     def _clear_view(self) -> None:
         self._shown = None
-        self._view.set_image(None)
+        self._view.clear()
         self._view.set_message("")
         self._view.set_arrows(NO_ARROWS)
 

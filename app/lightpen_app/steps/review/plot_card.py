@@ -18,6 +18,8 @@ from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
 
+N_COLUMNS = 2  # of a grid
+
 
 class NamedPicture(NamedTuple):
     """A plot as PNG, with the end of its file name."""
@@ -136,14 +138,14 @@ class PlotGrid(QWidget):
     saved = Signal(str)  # as of any of the cards
     failed = Signal(str)
 
-    def __init__(self, cards: Sequence[PlotCard], n_columns: int = 2) -> None:
+    def __init__(self, cards: Sequence[PlotCard]) -> None:
         super().__init__()
         self._cards = tuple(cards)
 
         # Layout
         layout = grid_layout(self)
         for i, card in enumerate(self._cards):
-            layout.addWidget(card, *divmod(i, n_columns))
+            layout.addWidget(card, *divmod(i, N_COLUMNS))
 
         # Connections
         for card in self._cards:

@@ -277,10 +277,8 @@ class MethodsPanel(PlotsPanel):
 
     def __init__(self) -> None:
         # Widgets
-        self._objective = LinePlot(Axes(""), [Curve("objective_mm2")], "iteration")
-        self._change = LinePlot(
-            Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES], "iteration"
-        )
+        self._objective = LinePlot(Axes(""), [Curve("objective_mm2")])
+        self._change = LinePlot(Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES])
         super().__init__(
             [
                 PlotCard(self._objective, "convergence-objective"),

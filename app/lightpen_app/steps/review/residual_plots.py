@@ -15,6 +15,7 @@ from lightpen_app.widgets.plots import Axes, Plot
 
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.94
+N_BINS = 41
 LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
 LEAST_WORDED = 22 * GRID  # px of height, from which the words fit above the line
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the edge
@@ -321,13 +322,13 @@ class Histogram(Plot):
         self._item.addItem(self._normal)
         self._restyle()
 
-    def set_data(self, values: FloatArray, n_bins: int = 41) -> None:
+    def set_data(self, values: FloatArray) -> None:
         """Show the distribution of values (N,)."""
         assert self._bars is not None
         if not len(values):
             return
         reach = float(np.abs(values).max()) or 1.0
-        heights, edges = np.histogram(values, n_bins, (-reach, reach))
+        heights, edges = np.histogram(values, N_BINS, (-reach, reach))
         middles = (edges[1:] + edges[:-1]) / 2
         step = edges[1] - edges[0]
         self._bars.setOpts(x=middles, height=heights, width=0.9 * step)

@@ -121,15 +121,11 @@ class BarPlot(NamedPlot):
 
 
 class LinePlot(NamedPlot):
-    """Values with marks, joined by lines, over steps.
+    """Values with marks, joined by lines, over iterations; at most three."""
 
-    At most three; ``x_column`` is the column of x in the CSV file.
-    """
-
-    def __init__(self, axes: Axes, curves: Sequence[Curve], x_column: str) -> None:
+    def __init__(self, axes: Axes, curves: Sequence[Curve]) -> None:
         self._curves: list[pg.PlotDataItem] = []
         super().__init__(axes, curves)
-        self._x_column = x_column
         for _, symbol in zip(curves, SYMBOLS, strict=False):
             curve = pg.PlotDataItem(symbol=symbol, symbolSize=6)
             self._item.addItem(curve)
@@ -145,7 +141,7 @@ class LinePlot(NamedPlot):
         """
         for curve, value in zip(self._curves, values, strict=True):
             curve.setData(x, value)
-        self._columns = {self._x_column: x, **self._named(*values)}
+        self._columns = {"iteration": x, **self._named(*values)}
         self._fit(x[x <= until], np.concatenate(values))
 
     @override

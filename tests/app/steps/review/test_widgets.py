@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QGuiApplication, QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
@@ -166,7 +166,7 @@ def test_arrows_are_drawn_about_the_pen_that_fills_the_view(qtbot: QtBot) -> Non
     view = ResidualView()
     qtbot.addWidget(view)
     view.resize(400, 300)
-    view.set_image(np.zeros((2048, 2448), np.uint8))
+    view.set_half(np.zeros((1024, 1224), np.uint8), QSize(2448, 2048))
     view.show()
     points = np.array([[1000.0, 800.0], [1200.0, 1200.0]])
     plain = view.grab().toImage()
