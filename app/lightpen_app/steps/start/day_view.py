@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
+from PySide6.QtCore import QModelIndex, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
@@ -190,16 +190,11 @@ class DayView(Translated, QWidget):
         selection = self._table.selectionModel()
         blocked = selection.blockSignals(True)
         self._model.removeRows(0, self._model.rowCount())
-        for row in self._shown:
-            self._model.appendRow(self._cells(row))
-        selection.blockSignals(blocked)
         for index, row in enumerate(self._shown):
+            self._model.appendRow(self._cells(row))
             if (row.pen, row.tip) == self._chosen:
-                flags = QItemSelectionModel.SelectionFlag
-                at = self._model.index(index, 0)
-                blocked = selection.blockSignals(True)
-                selection.setCurrentIndex(at, flags.ClearAndSelect | flags.Rows)
-                selection.blockSignals(blocked)
+                self._table.selectRow(index)
+        selection.blockSignals(blocked)
         self._table.viewport().update()
 
     def _cells(self, row: TipRow) -> list[QStandardItem]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, QSize, Qt, Signal
+from PySide6.QtCore import QModelIndex, QSize, Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -224,16 +224,10 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
             if self._retired.isChecked() or not item.is_retired:
                 self._model.appendRow(self._row(item))
                 if present is not None and item.id == present.id:
-                    self._choose_row(self._model.rowCount() - 1)
-        if self.current() is None and self._model.rowCount():
-            self._choose_row(0)
+                    self._table.selectRow(self._model.rowCount() - 1)
+        if self.current() is None:
+            self._table.selectRow(0)
         self._refresh()
-
-    def _choose_row(self, row: int) -> None:
-        flags = QItemSelectionModel.SelectionFlag
-        self._table.selectionModel().setCurrentIndex(
-            self._model.index(row, 0), flags.ClearAndSelect | flags.Rows
-        )
 
     def _row(self, item: AnyItem) -> list[QStandardItem]:
         standing, due = self._statuses.of_item(item.kind, item.id), item.due
