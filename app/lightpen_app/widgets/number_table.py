@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID, TextSize, set_size
+from lightpen_app.widgets.row_table import LEFT, RIGHT
 
 ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; that of the head likewise
 
@@ -46,9 +47,9 @@ class NumberTable(QTableWidget):
         self.setCornerButtonEnabled(False)
         across, down = self.horizontalHeader(), self.verticalHeader()
         across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        across.setDefaultAlignment(_RIGHT)
+        across.setDefaultAlignment(RIGHT)
         across.setHighlightSections(False)
-        down.setDefaultAlignment(_LEFT)
+        down.setDefaultAlignment(LEFT)
         down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         down.setHighlightSections(False)
         self.set_letters(TextSize.BODY)
@@ -80,7 +81,7 @@ class NumberTable(QTableWidget):
         for i, row in enumerate(value.cells):
             for j, text in enumerate(row):
                 item = QTableWidgetItem(text)
-                item.setTextAlignment(_RIGHT)
+                item.setTextAlignment(RIGHT)
                 self.setItem(i, j, item)
         self._share_width()
         self.updateGeometry()
@@ -132,7 +133,3 @@ class NumberTable(QTableWidget):
         for index in sorted(self.selectedIndexes()):
             lines.setdefault(index.row(), []).append(index.data() or "")
         return "\n".join("\t".join(cells) for cells in lines.values())
-
-
-_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter

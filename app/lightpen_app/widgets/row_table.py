@@ -16,6 +16,8 @@ from lightpen_app.look.theme import GRID
 
 Index = QModelIndex | QPersistentModelIndex
 ROW_HEIGHT = 7 * GRID // 2
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
 class TitledModel(QAbstractTableModel):
@@ -74,9 +76,7 @@ class RowTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
         across = self.horizontalHeader()
         across.setHighlightSections(False)
-        across.setDefaultAlignment(
-            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        )
+        across.setDefaultAlignment(LEFT)
         across.setStretchLastSection(True)
 
     def show_other_words(self) -> None:

@@ -24,7 +24,13 @@ from lightpen_app.steps.history.texts import (
     verdict_text,
     what_text,
 )
-from lightpen_app.widgets.row_table import ROW_HEIGHT, Index, RowTable, TitledModel
+from lightpen_app.widgets.row_table import (
+    RIGHT,
+    ROW_HEIGHT,
+    Index,
+    RowTable,
+    TitledModel,
+)
 from lightpen_app.widgets.translated import Translated
 
 WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
@@ -102,7 +108,7 @@ class HistoryModel(TitledModel):
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         column = index.column()
         if role == Qt.ItemDataRole.TextAlignmentRole and column in NUMBERS:
-            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            return RIGHT
         if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
             line = self.line(index.row())
             return UNREAD if line is None else _text(line, column)

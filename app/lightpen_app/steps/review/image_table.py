@@ -11,7 +11,7 @@ from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID
-from lightpen_app.widgets.row_table import Index, RowTable, TitledModel
+from lightpen_app.widgets.row_table import RIGHT, Index, RowTable, TitledModel
 from lightpen_app.widgets.translated import Translated
 
 NUMBER, MISFIT, LEDS, STATE = range(4)
@@ -51,7 +51,7 @@ class ImageModel(TitledModel):
         if role == Qt.ItemDataRole.ToolTipRole:
             return self._text(self._rows[index.row()], STATE)
         if role == Qt.ItemDataRole.TextAlignmentRole and index.column() != STATE:
-            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            return RIGHT
         return None
 
     @override

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QModelIndex, Qt, Signal
+from PySide6.QtCore import QModelIndex, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
@@ -21,7 +21,7 @@ from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.row_table import RowTable
+from lightpen_app.widgets.row_table import RIGHT, RowTable
 from lightpen_app.widgets.translated import Translated
 
 N_ITEMS = 4  # of the readiness line
@@ -203,9 +203,7 @@ class DayView(Translated, QWidget):
         colors = colors_of(self.palette())
         for column, tone in ((2, row.due.tone), (5, row.grade.tone)):
             cells[column].setForeground(QColor(colors.tone(tone)))
-        cells[3].setTextAlignment(
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        )
+        cells[3].setTextAlignment(RIGHT)
         for cell in cells:
             cell.setToolTip(cell.text())
         return cells

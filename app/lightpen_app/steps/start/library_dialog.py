@@ -34,7 +34,7 @@ from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
+from lightpen_app.widgets.row_table import RIGHT, ROW_HEIGHT, RowTable
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.status_mark import status_message
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
@@ -46,7 +46,6 @@ NUMBERS = (3, 4)  # columns of them
 LIST_HEIGHT = 47 * GRID  # px, at least: its lead may take two lines
 PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
 KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE, ItemKind.CAMERA, ItemKind.REFERENCE)
-RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 LONGEST_REASON = 200  # characters
 
 
