@@ -89,10 +89,6 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         self._state = state
         self._refresh()
 
-    def words(self) -> str:
-        """Return the texts about the stream."""
-        return self._state_label.value().text
-
     def _refresh(self) -> None:
         is_on = self._on.isChecked()
         for each in (self._address, self._port):

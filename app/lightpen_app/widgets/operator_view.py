@@ -143,14 +143,6 @@ class OperatorView(Translated, QWidget):
         """Return the size of letters for the viewing distance, px."""
         return letters_for(self._distance_m, _dots_per_inch(self.screen()))
 
-    def instruction_px(self) -> float:
-        """Return the size at which the instruction is drawn, px."""
-        return self._instruction.size_px()
-
-    def count_px(self) -> float:
-        """Return the size at which the count is drawn, px."""
-        return self._count.size_px()
-
     def open_beside(self, window: QWidget) -> None:
         """Fill a screen other than that of the given window, if there is one."""
         other = other_screen(window.screen(), QGuiApplication.screens())

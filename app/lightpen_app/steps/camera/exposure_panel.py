@@ -105,10 +105,6 @@ class ExposurePanel(Translated, QFrame):
         self._adjustment = adjustment
         self._refresh()
 
-    def advice(self) -> str:
-        """Return the advice."""
-        return self._advice.text()
-
     def _on_exposure_edited(self, exposure_ms: float) -> None:
         self.exposure_changed.emit(exposure_ms * US_PER_MS)
 
@@ -262,10 +258,6 @@ class FocusPanel(Translated, QFrame):
         """Show whether the images are recorded, so that settings have no effect."""
         self._is_recorded = is_recorded
         self._refresh()
-
-    def hint(self) -> str:
-        """Return the advice."""
-        return self._hint.text()
 
     def _refresh(self) -> None:
         if self._is_recorded:

@@ -57,17 +57,9 @@ class RigPanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def remark(self) -> StatusMessage:
-        """Return the remarks on the file in use."""
-        return self._remark_label.value()
-
     def problem(self) -> StatusMessage:
         """Return why the file that was chosen last is not the one in use."""
         return self._problem.value()
-
-    def step(self) -> StatusMessage:
-        """Return whether the cameras are synchronous."""
-        return self._step.value()
 
     def set_value(self, is_wanted: bool, file: RigFile | None) -> None:
         """Show whether there are two cameras, and their file.

@@ -88,14 +88,6 @@ class SettingsPanel(Translated, QGroupBox):
         self._retranslate()
         self.set_camera(None, CameraSettings())
 
-    def hint(self) -> StatusMessage:
-        """Return the remark on the pixel format."""
-        return self._hint.value()
-
-    def counts(self) -> str:
-        """Return the frame counters as text."""
-        return self._counts.text()
-
     def set_stats(self, stats: Stats) -> None:
         """Show the frame counters of this camera."""
         self._stats = stats

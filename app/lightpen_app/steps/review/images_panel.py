@@ -159,10 +159,6 @@ class ImagesPanel(Translated, QWidget):
             self._steps.command(self._steps.index() - 1).setObsolete(True)
             self._steps.undo()
 
-    def number(self) -> int | None:
-        """Return the number of the image that is shown."""
-        return self._table.number()
-
     def shut_down(self) -> None:
         """Stop reading an image."""
         self._job.cancel()

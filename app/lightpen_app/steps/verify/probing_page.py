@@ -56,7 +56,7 @@ class ProbingPage(ResponsiveLayout, Page):
     ) -> None:
         super().__init__()
         self._workbench, self._sounds = workbench, sounds
-        self._selection, self._tips = workbench.selection, workbench.library
+        self._selection = workbench.selection
         self._run, self._live = run, workbench.live
         self._camera = workbench.camera
         self._runner = self._run.runner

@@ -1060,7 +1060,7 @@ def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
     panel.set_value(replace(other, source=replace(other.source)))  # while it is read
 
     qtbot.waitUntil(lambda: not view.image_size().isEmpty())
-    assert panel.number() == number
+    assert table(page).number() == number
     assert view.markers()
 
 
