@@ -93,7 +93,8 @@ def test_motion_and_scale_of_all_leds_are_taken_off_but_not_a_knock_of_one() -> 
 def test_an_led_has_moved_from_two_hundredths_on(
     by: float, moved: tuple[int, ...]
 ) -> None:
-    found = examined(swing(1), swing(2, one_led(by)))
+    elsewhere = one_led(0.04, 7)  # off its place in the file from the first swing on
+    found = examined(swing(1, elsewhere), swing(2, elsewhere + one_led(by)))
 
     assert found.moved == moved
     assert found.assessment.grade is (Grade.REPEAT if moved else Grade.PASS)
@@ -216,7 +217,10 @@ def test_one_swing_or_two_pens_are_refused() -> None:
         examined(swing(1))
     with pytest.raises(UsageError) as refused:
         examined(swing(1), swing(2), swing(3, pen="other"))
-    assert refused.value.message.values["other"] == "swing 3.json"
+    said = refused.value.message.values
+    assert (said["first"], said["other"]) == ("swing 1.json", "swing 3.json")
+    with pytest.raises(UsageError):
+        examined(swing(1, pen="other"), swing(2), swing(3, pen="other"))
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from tests.verifying import BAR, CHOICES, PAPER, found_by
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
+from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.model.rig import rig_of
@@ -22,18 +23,23 @@ from lightpen.verification.probing.probing import ProbingEvent, ProbingEventKind
 from lightpen.verification.session.session import (
     advance_session,
     end_task,
+    run_again,
     touched_anew,
     with_other_choices,
+    with_read,
+    without_last_touch,
 )
 from lightpen.verification.session.session_state import (
+    RunsOfTask,
     SessionSetup,
     SessionState,
     fraction_done,
     instruction,
+    with_drift,
 )
 from lightpen.verification.tasks.articulation import ALIKE, ARTICULATION, OTHER_POSTURE
 from lightpen.verification.tasks.circle import CIRCLE
-from lightpen.verification.tasks.drift import DRIFT
+from lightpen.verification.tasks.drift import DRIFT, measure_drift
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen.verification.tasks.registry import TASKS, AnyTask
@@ -523,3 +529,76 @@ def test_a_witness_alone_is_visited_twice(session: Session) -> None:
     assert DRIFT.kind not in session.state.found
     visit(session)
     assert DRIFT.kind in session.state.found
+
+
+def test_the_last_point_taken_back_is_the_only_one_that_goes(session: Session) -> None:
+    session.touch(*leant(4)[:3])
+    before = session.state
+    session.state = without_last_touch(before)
+
+    assert session.state.touches == before.touches[:2]
+    assert session.state.touching.taken == before.touching.taken[:2]
+    assert session.state.touching.places == before.touching.places[:2]
+    session.touch(leant(4)[3])
+    assert len(session.state.touches) == 3
+
+
+def test_runs_of_earlier_are_added_and_end_their_task(session: Session) -> None:
+    session.choose(LENGTH, options=LengthOptions(SIMULATED_LENGTH, n_places=2))
+    session.touch(*BAR)
+    (run,) = session.state.runs
+    empty, setup = SessionState(), session.setup
+    one = run_again(setup, empty, run, is_last=False)
+    two = run_again(setup, one, run, is_last=False)
+    early = run_again(setup, empty, run, is_last=True)
+
+    assert (one.runs, len(one.found), len(two.found), len(early.found)) == (
+        (run,),
+        0,
+        1,
+        1,
+    )
+    assert len(found_by(two, LENGTH).runs) == 2
+    assert len(found_by(early, LENGTH).runs) == 1
+    assert run_again(setup, two, run, is_last=False).found == two.found
+    with pytest.raises(CalibrationError) as refused:
+        run_again(setup, empty, run[:1], is_last=True)
+    assert refused.value.message.code == "length.too-few"
+
+
+def test_each_task_waits_for_the_visit_after_it_alone(witnessed: Session) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    state, setup = witnessed.state, witnessed.setup
+    (waiting,) = state.pending
+    point = found_by(state, FIXED_POINT)
+    again = RunsOfTask(FIXED_POINT, waiting.runs)
+    length = RunsOfTask(LENGTH, waiting.runs)
+
+    assert with_read(setup, state, again, point).pending == (again,)
+    assert with_read(setup, state, length, point).pending == (waiting, length)
+    assert touched_anew(state, FIXED_POINT).pending == ()
+    assert touched_anew(state, LENGTH).pending == (waiting,)
+    assert touched_anew(state, LENGTH).visits == state.visits
+    assert touched_anew(state, DRIFT).visits == ()
+    assert touched_anew(state, DRIFT).found == {FIXED_POINT.kind: point}
+    visit(witnessed)
+    drift = measure_drift(
+        [("", each) for each in witnessed.state.visits], setup.conditions
+    )
+    counted = with_read(setup, state, RunsOfTask(DRIFT, ()), drift)
+    assert counted.pending == ()
+    within = np.hypot(point.uncertainty, 2 * drift.share)
+    np.testing.assert_allclose(found_by(counted, FIXED_POINT).uncertainty, within)
+    assert counted.found_by(DRIFT) is drift
+
+
+def test_a_drift_is_the_larger_one_of_lamps_and_cone(witnessed: Session) -> None:
+    for holds in ((), leant(4), (), BAR, ()):
+        witnessed.touch(*holds) if holds else visit(witnessed)
+    drift = found_by(witnessed.state, DRIFT)
+    lamps = np.array([1.0, 0.0, 0.0])
+    setup = with_drift(replace(witnessed.setup, drift=lamps), drift)
+
+    assert setup.drift.tolist() == [1.0, *drift.share[1:]]
+    assert with_drift(setup, None) is setup
