@@ -591,6 +591,11 @@ def test_each_task_waits_for_the_visit_after_it_alone(witnessed: Session) -> Non
     within = np.hypot(point.uncertainty, 2 * drift.share)
     np.testing.assert_allclose(found_by(counted, FIXED_POINT).uncertainty, within)
     assert counted.found_by(DRIFT) is drift
+    own = replace(setup, choices=replace(setup.choices, n_frames=9))
+    for by, known in ((None, setup), (own, own)):
+        read = with_read(setup, state, replace(again, setup=by), point)
+        measured = with_read(setup, read, RunsOfTask(DRIFT, ()), drift).measured
+        assert measured[FIXED_POINT.kind].setup is known
 
 
 def test_a_drift_is_the_larger_one_of_lamps_and_cone(witnessed: Session) -> None:
