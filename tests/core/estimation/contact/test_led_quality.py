@@ -10,13 +10,16 @@ from tests.simulated_centers import drop_centers
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.contact.led_quality import LedQuality
+from lightpen.estimation.contact.joint import ContactModel, fit_contact
+from lightpen.estimation.contact.led_quality import LedQuality, measure_leds
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
+from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,
+    select_frames,
     simulate_centers,
     swing_poses,
 )
@@ -117,3 +120,41 @@ def test_residuals_and_counts_are_those_of_the_led() -> None:
     # sigma 0.02 px an axis, less the freedom the fit takes.
     assert ((found.rms > 0.018) & (found.rms < 0.03)).all()
     assert np.abs(found.mean).max() < 5 * 0.02 / np.sqrt(50)
+
+
+def test_an_led_is_judged_by_the_images_that_use_it_or_by_all_if_these_are_few() -> (
+    None
+):
+    rng = np.random.default_rng(4)
+    few = select_frames(SWING, np.arange(20))
+    poses = few.rotations, few.translations
+    pixels = simulate_centers(CAMERA, PEN, *poses, 0.02, rng)
+    model = ContactModel.of(CAMERA, PEN, pixels)
+    whole = fit_contact(model, few.rotations, few.tip_pen, few.cone_cam)
+    used = whole.used.copy()
+    used[1:, 2], used[:, 3], used[9:, 4], used[10:, 5] = False, False, False, False
+    used[5:, 6] = False
+    pixels[6:, 6] = np.nan
+    joint = replace(whole, used=used)
+    found = measure_leds(rig_of(CAMERA), PEN, pixels[:, None], joint)
+
+    state = model.at(whole.rotations, whole.tip_pen, whole.cone_cam)
+    by_led = state.jacobian[..., 3:] @ whole.rotations[:, None]
+    for j, n_used, n_judging in (
+        *((0, 20, 20), (2, 1, 20), (3, 0, 20), (4, 9, 20), (5, 10, 10), (6, 5, 0)),
+    ):
+        assert found.n_used[j] == n_used
+        left = whole.residuals[:n_used, j]
+        if n_used:
+            mean_square = np.mean(np.sum(left**2, axis=1))
+            assert found.rms[j] == pytest.approx(np.sqrt(mean_square))
+            np.testing.assert_allclose(found.mean[j], left.mean(axis=0))
+        else:
+            assert np.isnan([found.rms[j], *found.mean[j]]).all()
+        if n_judging:
+            A = by_led[:n_judging, j].reshape(-1, 3)
+            moved = np.linalg.lstsq(A, state.residuals[:n_judging, j].ravel())[0]
+            np.testing.assert_allclose(found.displacement[j], moved, atol=1e-9)
+        else:
+            assert np.isnan(found.displacement[j]).all()
+    assert found.n_seen.tolist() == 6 * [20] + [6] + 3 * [20]
