@@ -63,10 +63,6 @@ class CapabilityRow(Translated, QWidget):
         self._shown = found, n_tips
         self._refresh()
 
-    def words(self) -> str:
-        """Return the text on the study."""
-        return self._message.value().text
-
     def _on_changed(self) -> None:
         self._refresh()
         self.value_changed.emit()

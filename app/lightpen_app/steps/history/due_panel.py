@@ -77,10 +77,6 @@ class DuePanel(Translated, QWidget):
         self._tips = tuple(tips)
         self._refresh()
 
-    def figures(self) -> Figures:
-        """Return the texts of the table."""
-        return self._table.value()
-
     def _on_edited(self) -> None:
         self.rule_changed.emit(self.rule())
 

@@ -130,16 +130,6 @@ class SelectionPanel(Translated, QWidget):
         """Return the entries of the repeatability."""
         return self._selected if len(self._selected) >= PAIR else self._trend.entries
 
-    def words(self) -> tuple[str, ...]:
-        """Return the texts on the selection."""
-        texts = (
-            *(head.text() for head in self._heads),
-            *(remark.value().text for remark in (self._change, self._verdict)),
-            self._touched.text(),
-            self._study.words(),
-        )
-        return tuple(filter(None, texts))
-
     def _retranslate(self) -> None:
         self._adjust.setText(self.tr("Adjust together"))
         self._adjust.setToolTip(

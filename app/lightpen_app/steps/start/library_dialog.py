@@ -200,14 +200,6 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._refresh()
         return True
 
-    def rows(self) -> tuple[tuple[str, ...], ...]:
-        """Return the texts of the table."""
-        model = self._model
-        return tuple(
-            tuple(model.item(row, column).text() for column in range(len(WIDTHS) + 1))
-            for row in range(model.rowCount())
-        )
-
     def current(self) -> AnyItem | None:
         """Return the item that is chosen in the table."""
         at = self._table.currentIndex()

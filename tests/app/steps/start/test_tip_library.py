@@ -43,6 +43,7 @@ from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.row_table import RowTable
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -81,6 +82,16 @@ class Desk:
     @property
     def library(self) -> Library:
         return read_library(self.data)
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """The texts of the table of the dialog."""
+        (table,) = self.dialog.findChildren(RowTable)
+        model = table.model()
+        return tuple(
+            tuple(model.index(i, j).data() for j in range(model.columnCount()))
+            for i in range(model.rowCount())
+        )
 
     @property
     def dialog(self) -> LibraryDialog:
@@ -297,7 +308,7 @@ def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
     desk.click("Save")
     desk.settle()
     assert desk.library.tips["T-11"].due == date(2031, 2, 3)
-    assert desk.dialog.rows()[0][0] == "T-11"
+    assert desk.rows[0][0] == "T-11"
 
     desk.click("Change...")
     assert isinstance(field := desk.control("ID (as on label)"), QLineEdit)
@@ -332,7 +343,7 @@ def test_what_is_being_kept_is_neither_asked_for_again_nor_left(
 
     slow_disk.set()
     desk.settle()
-    assert desk.dialog.rows()[0][0] == "T-11"
+    assert desk.rows[0][0] == "T-11"
     desk.click("Close")
 
 
@@ -458,12 +469,12 @@ def test_a_tip_is_retired_and_brought_back_with_a_reason(desk: Desk) -> None:
     desk.click("Save")
     desk.settle()
     assert desk.library.tips["T-7"].is_retired
-    assert desk.dialog.rows() == ()
+    assert desk.rows == ()
 
     box = desk.control("Show retired items")
     assert isinstance(box, QAbstractButton)
     box.click()
-    assert desk.dialog.rows()[0][:2] == ("T-7", "RETIRED")
+    assert desk.rows[0][:2] == ("T-7", "RETIRED")
     desk.click("Reactivate...")
     desk.click("Save")
     desk.settle()
