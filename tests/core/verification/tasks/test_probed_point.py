@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from benchmarks.touches import covered_share
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.pivot.pivot import median_distance, outlier_distance
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, simulate_centers
 from lightpen.verification.tasks.probed_point import (
@@ -17,6 +20,9 @@ from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
     ProbingFrame,
     StillFrames,
+    _agreeing,
+    _mean_noise,
+    _pooled_sigma,
     joint_covariance,
     mean_point,
     measure_touches,
@@ -166,6 +172,56 @@ def test_another_tip_moves_the_point_with_the_pen(
     moved = with_tip(touch, instrument, PAPER_TIP + np.array([0.0, 0.0, 1.0]))
 
     np.testing.assert_allclose(moved.point_cam - touch.point_cam, touch.rotation[:, 2])
+
+
+@pytest.mark.parametrize("n", [2, 4, 10])
+@pytest.mark.parametrize("by", [0.99, 1.01])
+def test_a_mean_scatters_by_more_than_its_noise_once_in_a_hundred_times(
+    n: int, by: float
+) -> None:
+    sigma = np.diag([0.1, 0.2, 0.4])
+    by_chance = 1 + 2.33 * np.sqrt(2 / (3 * (n - 1)))  # of chi-square over its freedom
+    step = np.sqrt(by * by_chance * 3 * (n - 1) / n)  # deviations
+    points = step * (-1.0) ** np.arange(n)[:, None] * sigma[1] + 5.0
+
+    found = _mean_noise(points, np.tile(sigma**2, (n, 1, 1)))
+
+    excess = by * by_chance if by > 1 else 1.0
+    np.testing.assert_allclose(found, excess * sigma**2 / n)
+    np.testing.assert_array_equal(_mean_noise(points[:1], sigma[None]), sigma)
+
+
+@pytest.mark.parametrize(
+    ("scatter", "unit"), [(0.5, 1.0), (5.0, 5.0 / median_distance())]
+)
+@pytest.mark.parametrize(("by", "agrees"), [(0.99, True), (1.01, False)])
+def test_an_image_agrees_within_the_noise_or_the_scatter_of_its_touch(
+    scatter: float, unit: float, by: float, agrees: bool
+) -> None:
+    """Of images that lie as many deviations off as said, to all sides."""
+    off = by * outlier_distance() * unit
+    steps = scatter * np.array([1, -1, 1, -1, 1, -1, 1, -1])
+    points = 0.1 * np.outer([*steps, off, -off], [0.0, 1.0, 0.0])
+    found = _agreeing(points, np.tile(0.01 * np.eye(3), (10, 1, 1)))
+
+    assert found == [*range(10 if agrees else 8)]
+
+
+@pytest.mark.parametrize(
+    ("n_leds", "n_images", "freedom"), [(8, 10, 100), (4, 2, 4), (3, 5, 0), (2, 5, 0)]
+)
+def test_the_noise_is_that_of_the_images_and_of_thirty_freedoms_of_the_calibration(
+    instrument: Instrument, n_leds: int, n_images: int, freedom: int
+) -> None:
+    """Six unknowns of a pose are no freedom."""
+    weights = np.zeros((n_images, 10))
+    weights[:, :n_leds] = 0.5
+    poses: Any = SimpleNamespace(
+        weights=weights, rotations=np.zeros((n_images, 3, 3)), sigma=0.07
+    )
+    squares = freedom * 0.07**2 + 30 * instrument.sigma**2
+    expected = np.sqrt(squares / (freedom + 30))
+    assert _pooled_sigma(instrument, poses) == pytest.approx(expected)
 
 
 @pytest.mark.slow

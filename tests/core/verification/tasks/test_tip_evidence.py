@@ -1,8 +1,12 @@
 """What points tell of the tip counts in the directions that they determine."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from math import inf
 
 import numpy as np
+import pytest
+from scipy.stats import chi2, ncx2
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import Grade
@@ -12,8 +16,11 @@ from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
 from lightpen.verification.tasks.tip_evidence import (
     TipEvidence,
+    _detectable,
     block_diagonal,
     judged_tip,
+    points_evidence,
+    tip_entries,
     tip_evidence,
 )
 
@@ -65,3 +72,57 @@ def test_residuals_too_large_for_their_noise_make_the_tip_as_uncertain(
     design = np.linalg.solve(root, np.hstack([by_tip, by_artefact]))
     _, (chi_square,), *_ = np.linalg.lstsq(design, np.linalg.solve(root, residuals))
     np.testing.assert_allclose(worn, chi_square * sound, rtol=1e-2)  # by the prior
+
+
+def test_points_in_one_posture_leave_the_tip_as_unknown_as_before(
+    instrument: Instrument, touching: Callable[..., tuple[ProbedPoint, ...]]
+) -> None:
+    (point,) = touching(PAPER_CONE[None])
+    found = points_evidence([point] * 4, instrument, np.zeros(3))
+
+    np.testing.assert_allclose(found.covariance, 3.0**2 * np.eye(3), atol=1e-6)
+    assert found.detectable == inf
+    assert tip_entries(found)["detectable_tip_error_mm"] is None
+    assert not found.is_significant
+
+
+def test_an_error_is_detectable_that_is_missed_once_in_twenty_times() -> None:
+    sigma = 0.01
+    gate = chi2.isf(0.015, 3)
+    found = _detectable(np.diag([sigma, 0.5 * sigma, 0.1 * sigma]) ** 2)
+
+    assert ncx2.sf(gate, 3, (found / sigma) ** 2) == pytest.approx(0.95, abs=1e-6)
+    for by, is_found in ((0.999, True), (1.001, False)):
+        larger = _detectable((by * sigma / found) ** 2 * np.eye(3))
+        assert (larger == pytest.approx(by)) if is_found else larger == inf
+
+
+@pytest.mark.parametrize(("by", "is_significant"), [(0.999, False), (1.001, True)])
+def test_a_change_is_more_than_chance_beyond_its_quantile(
+    instrument: Instrument,
+    touching: Callable[..., tuple[ProbedPoint, ...]],
+    by: float,
+    is_significant: bool,
+) -> None:
+    points = touching(np.tile(PAPER_CONE, (8, 1)))
+
+    def moved(size: float) -> TipEvidence:
+        """Return the evidence of points of a tip that is off along x."""
+        off = [
+            replace(each, point_cam=PAPER_CONE - size * each.rotation[:, 0])
+            for each in points
+        ]
+        return points_evidence(off, instrument, np.zeros(3))
+
+    usual = moved(0.01)
+    squared = usual.change @ np.linalg.solve(usual.covariance, usual.change)
+    found = moved(0.01 * by * np.sqrt(chi2.isf(0.015, 3) / squared))
+
+    assert found.is_significant == is_significant
+    entries = tip_entries(found)
+    assert entries["wants_other_tip"] == is_significant
+    assert entries["detectable_tip_error_mm"] == found.detectable
+    np.testing.assert_allclose(
+        entries["tip_change_expanded_uncertainty_mm"],
+        2 * np.sqrt(np.diag(found.covariance)),
+    )
