@@ -135,6 +135,114 @@ def test_scatters_that_agree_point_to_nothing() -> None:
     assert found.assessment.grade is Grade.PASS
 
 
+def scattered(deviations: np.ndarray, n: int = 10, seed: int = 5) -> np.ndarray:
+    """Tips with these standard deviations."""
+    draws = np.random.default_rng(seed).standard_normal((n, 3))
+    draws -= draws.mean(axis=0)
+    return np.asarray(PAPER_TIP + deviations * draws / draws.std(axis=0, ddof=1))
+
+
+@pytest.mark.parametrize(("n_tips", "n_touches"), [(5, 10), (10, 3), (12, 12)])
+@pytest.mark.parametrize("by", [0.999, 1.001])
+@pytest.mark.parametrize("is_tip", [True, False])
+def test_scatters_differ_by_more_than_one_chance_in_a_hundred(
+    n_tips: int, n_touches: int, by: float, is_tip: bool
+) -> None:
+    """The log of a variance has a variance of 2 over its degrees of freedom."""
+    variance = 2 / (3 * (n_tips - 1)) + 2 / (3 * (n_touches - 1))
+    ratio = by * np.exp(0.5 * 2.575829 * np.sqrt(variance))
+    of_tip, of_point = (0.002 * ratio, 0.002) if is_tip else (0.002, 0.002 * ratio)
+    found = measure_repeatability(
+        estimates(scattered(np.full(3, of_tip), n_tips)),
+        LIMITS,
+        touched=touched(np.full(3, of_point), 1e-9, n_touches),
+    )
+
+    assert (found.points_to is not None) == (by > 1)
+    if found.points_to is not None:
+        code = "rode-with-pen" if is_tip else "point-moved"
+        assert found.points_to.code == f"repeatability.{code}"
+        said = found.points_to.values
+        assert said["of_tip"] == pytest.approx(np.sqrt(3) * of_tip)
+        assert said["of_point"] == pytest.approx(np.sqrt(3) * of_point)
+        assert found.assessment.reason is found.points_to
+        step = "repeatability.tighten" if is_tip else "verification.verify-again"
+        assert found.assessment.next_step.code == step
+
+
+@pytest.mark.parametrize(("by", "has_moved"), [(0.999, True), (1.001, False)])
+def test_a_point_has_moved_that_scatters_more_than_its_touches_are_expected_to(
+    by: float, has_moved: bool
+) -> None:
+    expected = by * 0.004 / np.exp(0.5 * 2.575829 * np.sqrt(2 / (3 * 9)))
+    steady = estimates(scattered(np.full(3, 1e-4)))
+    found = measure_repeatability(
+        steady, LIMITS, touched=touched(np.full(3, 0.004), expected)
+    )
+    origin = estimates(np.zeros((10, 3)))
+    nowhere = replace(touched(np.zeros(3), 0.0), points=np.zeros((10, 3)))
+    none = measure_repeatability(steady, LIMITS, touched=nowhere)
+    both = measure_repeatability(origin, LIMITS, touched=nowhere)
+
+    assert (found.points_to is not None) == has_moved
+    assert none.points_to is not None  # what scatters at all is more than nothing
+    assert none.points_to.code == "repeatability.rode-with-pen"
+    assert both.points_to is None
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(
+    ("rule", "least"),
+    [
+        (DecisionRule.SIMPLE, 0.01),
+        (DecisionRule.GUARD_BAND, 0.01 / (1 + 1.65 / np.sqrt(18))),
+    ],
+)
+@pytest.mark.parametrize("by", [0.999, 1.001])
+def test_a_tip_repeats_within_its_limit_by_the_coordinate_that_scatters_most(
+    axis: int, rule: DecisionRule, least: float, by: float
+) -> None:
+    """U of a standard deviation is its share by the root of twice its freedom."""
+    deviations = np.full(3, 0.001)
+    deviations[axis] = by * least
+    found = measure_repeatability(
+        estimates(scattered(deviations)), replace(LIMITS, rule=rule)
+    )
+
+    grade = Grade.REPEAT if rule is DecisionRule.SIMPLE else Grade.CHECK
+    assert found.assessment.grade is (grade if by > 1 else Grade.PASS)
+    assert found.assessment.reason.values == {
+        "deviation": pytest.approx(by * least),
+        "axis": "xyz"[axis],
+        "limit": 0.01,
+        "stated": pytest.approx(0.002),
+    }
+
+
+@pytest.mark.parametrize(("least", "is_capable"), [(1.329, False), (1.331, True)])
+@pytest.mark.parametrize("bias", [None, 0.0005])
+def test_a_tip_is_capable_from_four_thirds_on(
+    least: float, is_capable: bool, bias: float | None
+) -> None:
+    values = scattered(np.array([0.001, 0.0005, 0.0008]), 30)
+    # A fifth of the tolerance over six deviations; half of it less the bias over three.
+    tolerance = 5 * (6 * least * 0.001 + 2 * (bias or 0.0))
+    reference = (
+        None if bias is None else values.mean(axis=0) + np.array([bias, 0.0, 0.0])
+    )
+    found = measure_repeatability(
+        estimates(values), LIMITS, tolerance=tolerance, reference=reference
+    )
+
+    assert found.capability is not None
+    assert found.capability.least == pytest.approx(least)
+    assert found.capability.is_capable == is_capable
+    if not is_capable:
+        said = found.assessment.reason.values
+        assert (said["needed"], said["tolerance"]) == (1.33, tolerance)
+        assert said["least"] == pytest.approx(least)
+
+
 def test_capability_is_that_of_a_type_1_study() -> None:
     rng = np.random.default_rng(1)
     values = PAPER_TIP + 0.001 * rng.standard_normal((50, 3))
