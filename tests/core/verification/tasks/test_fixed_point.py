@@ -19,7 +19,7 @@ from lightpen.verification.tasks.fixed_point import (
     measure_fixed_point,
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
-from lightpen.verification.tasks.task import Conditions
+from lightpen.verification.tasks.task import Conditions, TaskProgress
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]
 NOMINAL_TIP = np.array([0.0, -90.0, -25.0])
@@ -252,3 +252,19 @@ def test_a_point_is_left_out_that_lies_far_from_most_whatever_its_noise(
         _at_one_place([])
     assert refused.value.message.values["n_touches"] == 0
     assert refused.value.message.values["needed"] == 3
+
+
+def test_points_come_before_their_comparison(
+    instrument: Instrument, touching: Touching
+) -> None:
+    touches = touching(np.tile(PAPER_CONE, (2, 1)))
+    one, two = (
+        FIXED_POINT.figures_so_far(
+            FixedPointOptions(), TaskProgress(touches[:n]), Conditions(instrument)
+        )
+        for n in (1, 2)
+    )
+    titles = [[table.title.code for table in tables] for tables in (one, two)]
+
+    assert titles[1] == ["fixed-point.table", "fixed-point.comparison"]
+    assert titles[0] == titles[1][:1]
