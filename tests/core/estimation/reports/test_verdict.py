@@ -560,3 +560,17 @@ def test_faces_of_small_leds_in_images_are_said_to_be_unknown(
     if found:
         assert found[0].values["width"] == pytest.approx(8.4, abs=0.5)
         assert found[0].values["depth"] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("n_out", "code"), [(20, Code.MANY_DROPPED), (21, Code.MANY_EXCLUDED)]
+)
+def test_images_are_said_to_be_taken_out_if_most_of_the_dropped_ones_are(
+    good: Calibration, n_out: int, code: Code
+) -> None:
+    reasons = [Reason.TAKEN_OUT] * n_out + [Reason.SLIPPED] * (40 - n_out)
+    reasons += [Reason.NONE] * 110
+    used = np.array([reason is Reason.NONE for reason in reasons])
+    found = replace(good, reasons=tuple(reasons), used=used)
+
+    assert judge(found, SwingLimits(max_uncertainty=0.02)).reason.code == code
