@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from lightpen.verification.probing.probing import HELD_ENOUGH, ProbingPhase
+from lightpen.verification.probing.probing import SETTLING, ProbingPhase
 from lightpen.verification.session.session_state import SessionState
 from lightpen.verification.session.status import VerificationStatus
 from lightpen.verification.tasks.registry import AnyTask
@@ -47,7 +47,7 @@ def is_held(state: SessionState) -> bool:
     """Return whether the pen is held still on a point that is not recorded yet."""
     touching = state.touching
     is_holding = touching.phase is ProbingPhase.HOLDING
-    return is_holding and len(touching.held) >= HELD_ENOUGH
+    return is_holding and len(touching.held) >= SETTLING
 
 
 def lamps_message(status: VerificationStatus) -> StatusMessage:
