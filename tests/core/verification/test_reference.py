@@ -199,7 +199,8 @@ def conditions(instrument: Instrument) -> Conditions:
 
 def shown(tables: tuple[ResultTable, ...]) -> dict[str, Any]:
     """Return tables by their codes; each quantity apart, whatever its size."""
-    return {
+    titles = [{"name": table.title.code} for table in tables]
+    return {"titles": titles} | {
         table.title.code: {
             "columns": [{"name": code_of(each)} for each in table.columns],
             "notes": table.notes,

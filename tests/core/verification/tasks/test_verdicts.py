@@ -1,0 +1,437 @@
+"""The verdict of each task by its figures, just within and just beyond its limits.
+
+Across, radius, drift: 0.01, 0.02, 0.02 mm; along and length 0.03; tip 0.04; form and
+location 0.1.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.messages import Message, message
+from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.verification.tasks import (
+    articulation,
+    circle,
+    drift,
+    fixed_point,
+    length,
+    plane,
+    sphere,
+)
+from lightpen.verification.tasks.assessment import (
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.verification.tasks.circle_fit import CircleFit
+from lightpen.verification.tasks.probed_point import ProbedPoint
+from lightpen.verification.tasks.sphere import Size
+from lightpen.verification.tasks.tip_evidence import (
+    TipEvidence,
+    judged_tip,
+    with_power,
+    worse_finding,
+)
+
+LIMITS = VerificationLimits()
+GUARD = VerificationLimits(rule=DecisionRule.GUARD_BAND)
+GOOD = TipEvidence(np.zeros(3), 1e-6 * np.eye(3), False, 0.0399)
+WEAK, BLIND = replace(GOOD, detectable=0.0401), replace(GOOD, detectable=inf)
+OTHER = replace(GOOD, change=np.array([0.03, 0.0, -0.03]), is_significant=True)
+DOUBTED = replace(OTHER, change=np.array([0.02, 0.0, 0.0]))
+REASON = message("drift.too-few")
+LIFTED = ProbedPoint(
+    *(np.zeros(3), np.eye(3), np.zeros((3, 0)), np.eye(3)), ("lifted",), 0.0
+)
+
+PASSED = "tip.with-power verification.use-tip pass"
+PASSED_WEAKLY = "tip.with-power verification.better-postures pass"
+ANOTHER_TIP = "tip.another verification.calibrate-again repeat"
+DIFFERS = "tip.differs verification.calibrate-again check"
+WEAK_POWER = "tip.weak-power verification.more-points check"
+NO_POWER = "tip.no-power verification.more-points check"
+
+
+def said(found: VerificationAssessment | None) -> str:
+    """Return reason, next step and grade in few words."""
+    if found is None:
+        return ""
+    return f"{found.reason.code} {found.next_step.code} {found.grade.value}"
+
+
+@pytest.mark.parametrize(
+    ("figures", "verdict"),
+    [
+        ({}, PASSED),
+        ({"tip": WEAK}, PASSED_WEAKLY),
+        ({"tip": OTHER, "error": 0.05}, ANOTHER_TIP),
+        ({"tip": DOUBTED}, DIFFERS),
+        # Beyond the limit, or more than chance and a quarter of it.
+        ({"error": 0.0199, "u": 0.0199}, PASSED),
+        ({"error": -0.0201, "u": 0.0199}, "radius-off calibrate-again repeat"),
+        ({"error": 0.0051}, "radius-off calibrate-again check"),
+        ({"error": 0.0049}, PASSED),
+        ({"tip": DOUBTED, "error": 0.0051}, "radius-off calibrate-again check"),
+        # A tenth of the radius is another ring.
+        ({"error": 1.99}, "radius-off calibrate-again repeat"),
+        ({"error": -2.01}, "another verify-again repeat"),
+        ({"roundness": 0.0999, "flatness": 0.0999}, PASSED),
+        ({"roundness": 0.1001}, "form verify-again repeat"),
+        ({"flatness": 0.1001}, "form verify-again repeat"),
+        ({"roundness": 0.199, "by_noise": 0.2}, PASSED),
+        ({"roundness": 0.201, "by_noise": 0.2}, "form verify-again repeat"),
+        ({"left_out": (LIFTED,), "u": 0.0201}, "lifted verify-again check"),
+        ({"u": 0.0201}, "uncertain check-files check"),
+    ],
+)
+def test_a_ring(figures: dict[str, Any], verdict: str) -> None:
+    usual: dict[str, Any] = {
+        "error": 0.0,
+        "u": 0.001,
+        "tip": GOOD,
+        "left_out": (),
+        "by_noise": 0.0,
+    }
+    it = usual | {"roundness": 0.0, "flatness": 0.0} | figures
+    found = circle._assessment([ring(**it)], 20.0, it["u"], it["tip"], LIMITS)
+
+    assert said(found) == whole(verdict, "circle")
+
+
+def whole(verdict: str, task: str) -> str:
+    """Return a verdict with the names of its messages."""
+    reason, step, grade = verdict.split()
+    reason = reason if "." in reason else f"{task}.{reason}"
+    step = step if "." in step else f"verification.{step}"
+    return f"{reason} {step} {grade}"
+
+
+def ring(
+    name: str = "run",
+    error: float = 0.0,
+    roundness: float = 0.0,
+    flatness: float = 0.0,
+    by_noise: float = 0.0,
+    left_out: tuple[ProbedPoint, ...] = (),
+    **_: object,
+) -> circle.CircleRun:
+    fit = CircleFit(
+        *(np.zeros(3), np.array([0.0, 0.0, -1.0]), 20.0),
+        *(np.array([0.0, roundness]), np.array([0.0, flatness])),
+        *(np.zeros(2), np.zeros((2, 3))),
+    )
+    return circle.CircleRun(name, (), left_out, fit, 20.0 + error, 0.0, by_noise)
+
+
+def test_of_runs_round_a_ring_the_one_farthest_beyond_its_limit_is_named() -> None:
+    runs = [
+        ring("noisy", roundness=0.15, by_noise=0.2),
+        ring("lobed", roundness=0.101),
+        ring("round", roundness=0.01),
+    ]
+
+    found = circle._assessment(runs, 20.0, 0.001, GOOD, LIMITS)
+
+    assert found.reason == message("circle.form", run="lobed", form=0.101, limit=0.1)
+    # The mean of the runs is judged, not a single one.
+    runs = [ring(error=0.04), ring(error=-0.04)]
+    even = circle._assessment(runs, 20.0, 0.001, GOOD, LIMITS)
+    assert said(even) == PASSED
+
+
+@pytest.mark.parametrize(
+    ("figures", "verdict"),
+    [
+        ({}, PASSED),
+        ({"tip": WEAK}, PASSED_WEAKLY),
+        ({"tip": OTHER, "error": 0.05}, ANOTHER_TIP),
+        # The limit of a diameter is twice that of a radius.
+        ({"error": 0.0399, "u": 0.0399}, PASSED),
+        ({"error": -0.0401, "u": 0.0399}, "size-off calibrate-again repeat"),
+        ({"error": 0.0101}, "size-off calibrate-again check"),
+        ({"error": 0.0099}, PASSED),
+        ({"error": 2.99}, "size-off calibrate-again repeat"),
+        ({"error": -3.01}, "another verify-again repeat"),
+        ({"form": 0.0999}, PASSED),
+        ({"form": 0.1001}, "form verify-again repeat"),
+        ({"form": 0.199, "by_noise": 0.2}, PASSED),
+        ({"form": 0.201, "by_noise": 0.2}, "form verify-again repeat"),
+        ({"left_out": (LIFTED,), "u": 0.0401}, "lifted verify-again check"),
+        ({"u": 0.0401}, "uncertain check-files check"),
+    ],
+)
+def test_a_sphere(figures: dict[str, Any], verdict: str) -> None:
+    usual: dict[str, Any] = {"error": 0.0, "u": 0.001, "tip": GOOD, "left_out": ()}
+    it = usual | {"form": 0.0, "by_noise": 0.0} | figures
+    size, form = Size(30.0 + it["error"], 30.0, it["u"]), (it["form"], it["by_noise"])
+
+    found = sphere._assessment(size, form, it["left_out"], it["tip"], LIMITS)
+
+    assert said(found) == whole(verdict, "sphere")
+
+
+@pytest.mark.parametrize(
+    ("figures", "verdict"),
+    [
+        ({}, PASSED),
+        ({"tip": WEAK}, PASSED_WEAKLY),
+        ({"tip": OTHER, "flatness": 0.5}, ANOTHER_TIP),
+        ({"flatness": 0.1499}, PASSED),
+        ({"flatness": 0.1501}, "off calibrate-again repeat"),
+        # Flatter than certified.
+        ({"flatness": 0.0, "certified": 0.0999}, PASSED),
+        ({"flatness": 0.0, "certified": 0.1001}, "off more-points check"),
+        # By noise alone it may be as large.
+        ({"flatness": 0.249, "largest": 0.2}, "off more-points check"),
+        ({"flatness": 0.251, "largest": 0.2}, "off calibrate-again repeat"),
+        ({"left_out": (LIFTED,), "u": 0.1001}, "lifted verify-again check"),
+        ({"u": 0.1001}, "uncertain more-points check"),
+        ({"u": 0.0999}, PASSED),
+    ],
+)
+def test_a_plate(figures: dict[str, Any], verdict: str) -> None:
+    usual: dict[str, Any] = {
+        "flatness": 0.05,
+        "certified": 0.05,
+        "u": 0.001,
+        "largest": 0.01,
+    }
+    it = usual | {"left_out": (), "tip": GOOD} | figures
+    residuals = np.array([0.0, it["flatness"]])
+    fit = plane.PlaneFit(np.zeros(3), np.eye(3)[2], 30.0, residuals, np.eye(2))
+
+    found = plane._assessment(
+        *(fit, it["left_out"], it["certified"], (it["u"], it["largest"])),
+        *(it["tip"], LIMITS),
+    )
+
+    assert said(found) == whole(verdict, "plane")
+
+
+@pytest.mark.parametrize(
+    ("error", "largest", "tip", "verdict"),
+    [
+        (0.001, 0.01, GOOD, PASSED),
+        (0.001, 0.01, WEAK, WEAK_POWER),
+        (0.001, 0.01, BLIND, NO_POWER),
+        (0.2, 0.01, OTHER, ANOTHER_TIP),
+        (0.1001, 0.01, GOOD, "off calibrate-again repeat"),
+        (0.0999, 0.01, GOOD, "off calibrate-again check"),  # by chance 0.00999
+        (0.0251, 0.01, GOOD, "off calibrate-again check"),
+        (0.0249, 0.01, GOOD, PASSED),  # hardly a quarter of the limit
+        (0.0399, 0.04, GOOD, PASSED),
+        (0.04, 0.04, GOOD, "off calibrate-again check"),
+        # Chance alone exceeds the limit: 0.1998 once in a thousand times.
+        (0.1001, 0.2, GOOD, "off more-points check"),
+        (0.1997, 0.2, GOOD, "off more-points check"),
+        (0.1999, 0.2, GOOD, "off calibrate-again repeat"),
+    ],
+)
+def test_a_point_in_several_postures(
+    error: float, largest: float, tip: TipEvidence, verdict: str
+) -> None:
+    by_noise = np.linspace(0, largest, 1001)
+
+    found = articulation._assessment(error, by_noise, tip, LIMITS)
+
+    assert said(found) == whole(verdict, "articulation")
+    if found.reason.code == "articulation.off":
+        usual = found.reason.values["uncertainty"]
+        assert usual == pytest.approx(0.9545 * largest)
+
+
+@pytest.mark.parametrize(
+    ("deviation", "expected", "turn", "tip", "verdict"),
+    [
+        ([0.0099, 0.0099, 0.0299], 0.0, 20.0, GOOD, PASSED),
+        ([0.0, 0.0, 0.0], 0.0, 20.0, WEAK, WEAK_POWER),
+        ([1.0, 0.0, 0.0], 0.0, 20.0, DOUBTED, DIFFERS),
+        ([0.0101, 0.0, 0.029], 0.0, 20.0, GOOD, "scatters verify-again repeat"),
+        ([0.0, 0.0101, 0.029], 0.0, 20.0, GOOD, "scatters verify-again repeat"),
+        ([0.0, 0.0, 0.0301], 0.0, 20.0, GOOD, "scatters verify-again repeat"),
+        # chi-square of 5 degrees of freedom exceeds 20.5 once in a thousand times.
+        ([0.0202, 0.0, 0.0], 0.01, 20.0, GOOD, PASSED),
+        ([0.0203, 0.0, 0.0], 0.01, 20.0, GOOD, "scatters verify-again repeat"),
+        ([0.0, 0.0, 0.0], 0.0, 3.01, GOOD, PASSED),
+        ([0.0, 0.0, 0.0], 0.0, 2.99, WEAK, "same-posture verify-again check"),
+    ],
+)
+def test_a_fixed_point(
+    deviation: list[float], expected: float, turn: float, tip: TipEvidence, verdict: str
+) -> None:
+    found = cone(np.array(deviation), expected, turn, tip)
+
+    judged = fixed_point._assessment(found, LIMITS)
+
+    assert said(judged) == whole(verdict, "fixed-point")
+    if judged.reason.code == "fixed-point.scatters":
+        worst = int(np.argmax(deviation / np.array([1.0, 1.0, 3.0])))
+        assert judged.reason.values["axis"] == "uvw"[worst]
+    lifted = fixed_point._assessment(replace(found, left_out=(LIFTED,)), LIMITS)
+    assert lifted.grade is not Grade.PASS
+    if judged.reason.code == "tip.weak-power":
+        assert lifted.reason == message(
+            "fixed-point.lifted", n_left_out=1, n_touches=7, first="lifted"
+        )
+
+
+def cone(
+    deviation: FloatArray, expected: float, turn: float, tip: TipEvidence
+) -> fixed_point.FixedPoint:
+    """Six points in postures that turn to and fro by an angle, degrees."""
+    turns = np.radians(turn) * np.array([1, -1, 1, -1, 1, -1])[:, None] * np.eye(3)[1]
+    touches = tuple(
+        replace(LIFTED, rotation=R) for R in rotation_from_vector(np.array(turns))
+    )
+    scatter = fixed_point.Scatter(np.outer([0.0, np.sqrt(2)], deviation))
+    return fixed_point.FixedPoint(
+        *(accepted(REASON), touches, (), scatter, None, np.zeros(3)),
+        *(np.full(3, expected), tip, None),
+    )
+
+
+@pytest.mark.parametrize(
+    ("places", "tip", "verdict"),
+    [
+        # Error, U and limit of each place.
+        ([(0.0, 0.001, 0.03)], GOOD, PASSED),
+        ([(0.0, 0.001, 0.03)], WEAK, PASSED_WEAKLY),
+        ([(1.0, 0.001, 0.03)], OTHER, ANOTHER_TIP),
+        ([(0.0299, 0.0299, 0.03)], GOOD, PASSED),
+        ([(-0.0301, 0.0299, 0.03)], GOOD, "off check-files repeat"),
+        ([(0.0145, 0.01, 0.03)], GOOD, "off check-files check"),
+        ([(0.0145, 0.01, 0.03)] * 7, GOOD, PASSED),  # one of seven by chance
+        ([(0.0, 0.0301, 0.03)], GOOD, "uncertain verify-again check"),
+        # The place counts that is worst by its limit.
+        ([(0.02, 0.03, 0.1), (0.025, 0.001, 0.03)], GOOD, "off check-files check"),
+        ([(0.0, 0.04, 0.05), (0.0, 0.031, 0.03)], GOOD, "uncertain verify-again check"),
+    ],
+)
+def test_a_length(
+    places: Sequence[tuple[float, float, float]], tip: TipEvidence, verdict: str
+) -> None:
+    runs = [
+        length.LengthRun(str(i), ((), ()), 150.0 + error, 150.0, u, limit, 0.0)
+        for i, (error, u, limit) in enumerate(places, 1)
+    ]
+    scale = length.Scale(1.0, 0.0, 0.0)
+    found = length.Length(
+        accepted(REASON), tuple(runs), np.zeros(len(runs)), scale, tip
+    )
+
+    judged = length._assessment(found, LIMITS)
+
+    assert said(judged) == whole(verdict, "length")
+    assert judged.reason.values.get("run") in {None, str(len(places))}
+
+
+@pytest.mark.parametrize(
+    ("move", "sigma", "verdict"),
+    [
+        ([0.0, 0.0, 0.0], 0.001, "good drift.use-touches pass"),
+        # A move that is certain but does not matter.
+        ([0.0049, 0.0, 0.0], 0.001, "good drift.use-touches pass"),
+        ([0.0051, 0.0, 0.0], 0.001, "moved verify-again check"),
+        ([0.0, 0.0201, 0.0], 0.001, "moved verify-again repeat"),
+        # Along the view it may be three times as much.
+        ([0.0, 0.0, 0.0147], 0.001, "good drift.use-touches pass"),
+        ([0.0, 0.0, 0.0153], 0.001, "moved verify-again check"),
+        # 12.84 of chi-square is more than chance.
+        ([0.019, 0.0, 0.0], 0.019 / 12.7**0.5, "good drift.use-touches pass"),
+        ([0.019, 0.0, 0.0], 0.019 / 13.0**0.5, "moved verify-again check"),
+        ([0.0, 0.0, 0.0], 0.0099, "good drift.use-touches pass"),
+        ([0.0, 0.0, 0.0], 0.0101, "uncertain drift.touch-longer check"),
+        ([0.03, 0.0, 0.0], 0.0098, "moved drift.touch-longer check"),
+    ],
+)
+def test_a_drift_reference(move: list[float], sigma: float, verdict: str) -> None:
+    moves = np.array([[0.0] * 3, move, np.multiply(move, -0.9)])
+    covariances = sigma**2 * np.array([np.zeros((3, 3)), np.eye(3), np.eye(3)])
+
+    found = drift._assessment(("a", "b", "c"), moves, covariances, LIMITS)
+
+    assert said(found) == whole(verdict, "drift")
+    if found.reason.code == "drift.moved":
+        along = 3.0 if move[2] else 1.0
+        assert found.reason.values == {
+            "first": "a",
+            "visit": "b",
+            "distance": pytest.approx(np.linalg.norm(move)),
+            "uncertainty": pytest.approx(2 * sigma / along),
+            "limit": 0.02,
+        }
+
+
+@pytest.mark.parametrize(
+    ("x", "sigma", "is_significant", "limits", "verdict"),
+    [
+        (0.5, 0.001, False, LIMITS, ""),
+        (0.0099, 0.001, True, LIMITS, ""),  # hardly a quarter of the limit
+        (0.0101, 0.001, True, LIMITS, DIFFERS),
+        (0.0399, 0.001, True, LIMITS, DIFFERS),
+        (0.0401, 0.001, True, LIMITS, ANOTHER_TIP),
+        # By a guard band 1.65 standard uncertainties more are needed.
+        (0.0564, 0.01, True, GUARD, DIFFERS),
+        (0.0566, 0.01, True, GUARD, ANOTHER_TIP),
+    ],
+)
+def test_a_tip(
+    x: float,
+    sigma: float,
+    is_significant: bool,
+    limits: VerificationLimits,
+    verdict: str,
+) -> None:
+    change = np.array([-0.6 * x, 0.0, 0.8 * x])
+    found = TipEvidence(change, sigma**2 * np.eye(3), is_significant, 0.01)
+
+    judged = judged_tip(found, limits)
+
+    assert said(judged) == verdict
+    if judged is not None:
+        assert judged.reason.values == {
+            "x": pytest.approx(-0.6 * x),
+            "y": 0.0,
+            "z": pytest.approx(0.8 * x),
+            "distance": pytest.approx(x),
+            "uncertainty": pytest.approx(2 * sigma),
+            "limit": 0.04,
+        }
+
+
+@pytest.mark.parametrize(
+    ("tip", "power"),
+    [
+        (GOOD, message("tip.verified", detectable=0.0399)),
+        (WEAK, message("tip.weak-power", detectable=0.0401, limit=0.04)),
+        (BLIND, message("tip.no-power", limit=0.04)),
+    ],
+)
+def test_a_task_that_passes_says_what_it_would_detect(
+    tip: TipEvidence, power: Message
+) -> None:
+    found = with_power(REASON, tip, LIMITS)
+
+    assert found.reason == message("tip.with-power", reason=REASON, power=power)
+    assert found.grade is Grade.PASS
+
+
+def test_a_refused_tip_comes_before_a_wrong_size_and_that_before_a_doubt() -> None:
+    tip, doubted = refused(REASON, REASON), check(REASON, REASON)
+    off = refused(message("circle.line"), REASON)
+
+    assert worse_finding(None, None) is None
+    assert worse_finding(tip, off) is tip
+    assert worse_finding(doubted, off) is off
+    assert worse_finding(doubted, None) is doubted
+    assert worse_finding(None, off) is off
