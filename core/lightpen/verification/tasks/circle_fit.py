@@ -105,7 +105,7 @@ def residuals_of(
 
 def _across(normal: FloatArray) -> FloatArray:
     """Return the unit vector in a plane nearest to u, or to v where u sticks out."""
-    axis = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > EDGE_ON else [1.0, 0.0, 0.0])
+    axis = np.eye(3)[1 if abs(normal[0]) > EDGE_ON else 0]
     across = axis - (axis @ normal) * normal
     return np.asarray(across / np.linalg.norm(across))
 
