@@ -80,7 +80,7 @@ from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.wizard_pages import make_pages
-from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.verification_run import VerificationRun
 from lightpen_resources import languages
