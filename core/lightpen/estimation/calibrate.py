@@ -291,8 +291,7 @@ class _Start:
     """Step 2: the fit that the adjustment starts from, parameters of the files held."""
 
     rig: Rig  # cameras of the file, with extrinsics by the images
-    # (6 (C - 1),), these less those of the file, rad and mm; None: single camera.
-    extrinsics: FloatArray | None
+    extrinsics: FloatArray  # (6 (C - 1),), these less those of the file, rad and mm
     lags: tuple[TimeLag | None, ...]
     reasons: npt.NDArray[np.object_]  # (N, C)
     moments: IntArray  # (M,), moments with an image that takes part
@@ -345,27 +344,25 @@ def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
     """
     rig, pen, posed = inputs.rig, inputs.pen, single.posed
     reasons = single.reasons.copy()
-    placed, extrinsics = rig, None
-    lags: tuple[TimeLag | None, ...] = ()
-    if rig.n_cameras > 1:
-        found = find_initial_extrinsics(rig, posed)
-        require_usual_rig(rig, found, pen, single.pixels, posed)
-        placed, extrinsics, lags = found.rig, found.deviations(rig), found.lags
-        reasons[found.apart] = Reason.OTHER_MOMENT
+    found = find_initial_extrinsics(rig, posed)
+    require_usual_rig(rig, found, pen, single.pixels, posed)
+    reasons[found.apart] = Reason.OTHER_MOMENT
     used = reasons == Reason.NONE
     advice = single.observations[0].advice
     require_images(np.flatnonzero(used[:, 0]), reasons[:, 0], advice)
     moments = np.flatnonzero(used.any(axis=1))
     pixels = np.where(used[..., None, None], single.pixels, np.nan)[moments]
-    poses = single.rig_poses(placed, [part.poses for part in posed], used)
+    poses = single.rig_poses(found.rig, [part.poses for part in posed], used)
     joint = fit_contact(
-        ContactModel(placed, pen, pixels),
+        ContactModel(found.rig, pen, pixels),
         poses.rotations[moments],
         posed[0].pivot.tip_pen,
         posed[0].pivot.pivot_cam,
     )
     require_fit(joint.sigma)
-    return _Start(placed, extrinsics, lags, reasons, moments, pixels, joint)
+    return _Start(
+        found.rig, found.deviations(rig), found.lags, reasons, moments, pixels, joint
+    )
 
 
 def _adjust_jointly(
