@@ -69,7 +69,7 @@ def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> Stead
     Raises `CalibrationError` if the images do not determine the tip.
     """
     path = _way_of(observations)
-    if path is None or path.moved == 0:
+    if path is None:
         return SteadyImages(observations, pose_images(camera, pen, observations), path)
     with suppress(CalibrationError):  # that of a camera which moves too far
         posed = pose_images(camera, pen, observations)
@@ -120,8 +120,6 @@ def steadied(
 
 def without_field(camera: Camera, observations: Observations) -> Observations:
     """Return observations less the lens field that the camera file states."""
-    if camera.lens_field is None:
-        return observations
     return replace(observations, pixels=camera.without_lens_field(observations.pixels))
 
 
