@@ -12,7 +12,12 @@ from lightpen.detection.observations import Observations, leave_out, observe_cen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.contact.camera_motion import follow_lamps, pose_steadily
+from lightpen.estimation.contact.camera_motion import (
+    CameraPath,
+    follow_lamps,
+    pose_steadily,
+    steadied,
+)
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
@@ -207,6 +212,19 @@ def test_a_camera_moved_if_the_pen_shifts_by_half_as_much_as_the_lamps(
     assert path.is_followed == is_followed
 
 
+@pytest.mark.parametrize(("slip", "is_followed"), [(0.24, True), (0.32, False)])
+def test_what_lies_beyond_three_usual_distances_and_the_lamps_is_a_slip(
+    slip: float, is_followed: bool
+) -> None:
+    """The usual distance is 0.0074 mm, and the way of the lamps 0.028 mm."""
+    late = np.outer(TIME > 0.8, [1.0, 0.0])
+    seen = replace(seen_along(slip * late), lamps=lamps_along(0.1 * late))
+    path = pose_steadily(CAMERA, PEN, seen).path
+
+    assert path is not None
+    assert path.is_followed == is_followed
+
+
 def test_ten_images_are_needed_to_follow_a_lamp() -> None:
     assert follow_lamps(lamps_along(EVEN)[:9]) is None
     assert follow_lamps(lamps_along(EVEN)[:10]) is not None
@@ -249,3 +267,28 @@ def test_the_motion_of_a_camera_is_taken_out_as_its_turn() -> None:
     np.testing.assert_array_equal(
         steady.observations.pixels, steady.observations.seen_pixels
     )
+
+
+def test_each_led_is_turned_back_by_what_the_middle_of_the_lamps_shows() -> None:
+    lamps = np.array([[200.0, 1900.0], [500.0, 1500.0], [800.0, 1800.0]])
+    turns = rotation_from_vector(np.outer(np.sin(3 * TIME), [2e-4, -3e-4, 0.0]))
+
+    def turned(pixels: FloatArray) -> FloatArray:
+        rays = np.dstack([CAMERA.unproject(pixels), np.ones(pixels.shape[:-1])])
+        return CAMERA.project(rays @ np.swapaxes(turns, 1, 2))
+
+    middle = np.tile(lamps.mean(axis=0), (N_IMAGES, 1, 1))
+    path = CameraPath(lamps, (turned(middle) - middle)[:, 0], 0.02, is_followed=True)
+    still = seen_along(STILL)
+    still.pixels[3, 4] = still.seen_pixels[3, 4] = np.nan
+    moving = replace(
+        still, pixels=turned(still.pixels), seen_pixels=turned(still.seen_pixels)
+    )
+    found = steadied(CAMERA, moving, path)
+
+    assert np.nanmax(np.abs(moving.pixels - still.pixels)) > 0.5
+    # Less what is of second order in the turn.
+    np.testing.assert_allclose(found.pixels, still.pixels, atol=3e-3)
+    np.testing.assert_array_equal(found.pixels, found.seen_pixels)
+    assert steadied(CAMERA, moving, replace(path, is_followed=False)) is moving
+    assert steadied(CAMERA, moving, None) is moving
