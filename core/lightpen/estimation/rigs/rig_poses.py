@@ -64,8 +64,6 @@ def poses_in_rig(
 
     ``covariances`` (N, 6, 6) are of (theta, dt), rad and mm.
     """
-    if c == 0:
-        return rotations, translations, covariances
     back = rig.rotations[c].T
     turned = np.zeros((6, 6))
     turned[:3, :3] = turned[3:, 3:] = back
