@@ -26,7 +26,7 @@ from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Nominal, Plan, PlannedFeature, free_plan
 from lightpen.measuring.qif import qif_text
 from lightpen.measuring.surfaces import FeatureKind
-from lightpen.messages import Message
+from lightpen.messages import Message, message
 from lightpen.model.posture import FACING
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.plate import plate_plan
@@ -469,15 +469,25 @@ def test_a_known_sphere_refines_the_tip_or_says_why_not(
 
     entries = PART.entries(found, setup.instrument)["refinement"]
     assert entries["is_used"] is (error < 1)
+    note = PART.tables(found, setup.conditions)[1].notes[-1]
     if error > 1:
         assert found.assessment.grade is not Grade.PASS
-        notes = PART.tables(found, setup.conditions)[1].notes
-        assert notes[-1].code == "part.not-refined"
+        chi_square, n_free = entries["chi_square"], entries["degrees_of_freedom"]
+        assert note == message(
+            "part.not-refined", names="dome", chi_square=chi_square, n_free=n_free
+        )
         return
     np.testing.assert_allclose(entries["tip_shift_pen_mm"], -shift, atol=0.01)
     before = entries["tip_expanded_uncertainty_before_mm"]
     after = entries["tip_expanded_uncertainty_after_mm"]
     assert (after < before / 3).all()
+    assert note.code == "part.refined"
+    assert note.values == {
+        "names": "dome",
+        "shift": pytest.approx(np.linalg.norm(entries["tip_shift_pen_mm"])),
+        "before": pytest.approx(before.max()),
+        "after": pytest.approx(after.max()),
+    }
     assert (np.abs(entries["tip_shift_pen_mm"] + shift) < 1.5 * after).all()
 
 
