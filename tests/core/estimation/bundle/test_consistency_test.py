@@ -71,6 +71,10 @@ def test_all_wrong_numbers_are_named_together(n_wrong: int) -> None:
     assert sorted(diagonal(changes).contradicted) == list(range(n_wrong))
 
 
+def test_of_more_than_three_wrong_numbers_the_worst_is_found_first() -> None:
+    assert diagonal([5.0, 7.0, 6.0, 8.0]).contradicted == (3, 1, 2, 0)
+
+
 def test_a_number_that_no_image_shows_is_not_contradicted() -> None:
     hidden = diagonal([5.0, 5.0])
     information = hidden.information * [[1.0, 0.0], [0.0, 1e-9]]
