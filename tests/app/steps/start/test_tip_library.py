@@ -469,7 +469,7 @@ def test_a_tip_is_retired_and_brought_back_with_a_reason(desk: Desk) -> None:
     desk.click("Save")
     desk.settle()
     assert desk.library.tips["T-7"].is_retired
-    assert desk.rows == ()
+    assert not desk.rows
 
     box = desk.control("Show retired items")
     assert isinstance(box, QAbstractButton)
