@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from tests.accepted_tip import Hold, Holder, accept_tip, leant, round_a_ring
 from tests.reference import assert_as_before
-from tests.verifying import BAR, CHOICES, FRAME, NOON, TABLE
+from tests.verifying import BAR, CHOICES, FRAME, NOON, TABLE, found_by
 
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
@@ -38,6 +38,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.preparation import Preparation
+from lightpen.verification.probing.drift_reference import LampImages, LampObservations
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen.verification.storage.checkpoint import find_interrupted
@@ -408,6 +409,31 @@ def test_a_verification_that_is_closed(trace: Trace) -> None:
     closed = Trace(copy, trace.prepared)
     assert find_interrupted(copy) == ()
     closed.assert_as_before("closed")
+
+
+def test_a_camera_that_turns_before_lamps_counts_in_what_is_touched_then(
+    trace: Trace,
+) -> None:
+    seen: list[Any] = []
+    for shift in (0.0, 5.0):  # px, in the middle
+        trace.workflow.start_over()
+        trace.come(replace(CHOICES, kinds=(FIXED_POINT.kind,)))
+        trace.pick_up()
+        trace.touch(leant(4)[0])
+        lights = [np.array([[100.0 + shift * (i >= 24), 50.0]]) for i in range(48)]
+        lamps = LampImages(tuple(lights), (1000.0,) * 48)
+        trace.workflow._live.begin(LampObservations((lamps,)))
+        trace.touch(*leant(4)[1:])
+        state = trace.workflow.status.state
+        assert state is not None
+        seen.append((trace.workflow.status, found_by(state, FIXED_POINT).uncertainty))
+    (_, still), (status, moved) = seen
+
+    assert status.lamp_drift is not None
+    assert status.lamp_drift.share[0] > 0.1
+    np.testing.assert_allclose(
+        moved, np.hypot(still, 2 * status.lamp_drift.share), rtol=0.05
+    )
 
 
 def over_and_at(places: Sequence[Sequence[float]]) -> list[Hold]:

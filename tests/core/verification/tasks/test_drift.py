@@ -11,9 +11,10 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE
-from lightpen.verification.tasks.drift import measure_drift
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.drift import DRIFT, DriftOptions, measure_drift
 from lightpen.verification.tasks.probed_point import ProbedPoint
-from lightpen.verification.tasks.task import Conditions
+from lightpen.verification.tasks.task import Conditions, TaskProgress
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]
 LIMITS = VerificationLimits()
@@ -103,3 +104,55 @@ def test_a_move_that_a_guard_band_leaves_open_is_checked(
     found = measure_drift(visits, Conditions(instrument, limits))
 
     assert found.assessment.grade is Grade.CHECK
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("by", [0.999, 1.001])
+def test_a_reference_seems_to_move_once_in_two_hundred_times(
+    instrument: Instrument, axis: int, by: float
+) -> None:
+    """A move has a chi-square of three freedoms; along the view a third counts."""
+    sigma, moved = np.array([0.002, 0.003, 0.006]), np.zeros(3)
+    moved[axis] = by * np.sqrt(2 * 12.838156) * sigma[axis]
+    shared = np.zeros((3, len(instrument.covariance)))
+    one, other = (
+        ProbedPoint(PAPER_CONE + off, np.diag(sigma**2), shared, np.eye(3), ("",), 0.0)
+        for off in (np.zeros(3), moved)
+    )
+    share = 1 / 3 if axis == 2 else 1.0
+
+    def found(limit: float) -> VerificationAssessment:
+        conditions = Conditions(instrument, VerificationLimits(drift=limit))
+        return measure_drift([("one", [one]), ("two", [other])], conditions).assessment
+
+    beyond, within = found(0.99 * share * moved[axis]), found(3 * share * moved[axis])
+    assert beyond.grade is (Grade.REPEAT if by > 1 else Grade.CHECK)
+    assert beyond.next_step.code == (
+        "verification.verify-again" if by > 1 else "drift.touch-longer"
+    )
+    # More than chance and a quarter of the limit: neither a pass nor refused.
+    assert within.grade is (Grade.CHECK if by > 1 else Grade.PASS)
+    said = beyond.reason.values
+    assert said["distance"] == pytest.approx(moved[axis])
+    assert said["uncertainty"] == pytest.approx(2 * np.sqrt(2) * sigma[axis] * share)
+    assert found(5 * share * moved[axis]).reason.code == "drift.good"
+
+
+def test_a_move_that_is_more_than_chance_and_within_its_limit_is_good(
+    instrument: Instrument, touching: Touching
+) -> None:
+    places = np.tile(PAPER_CONE, (4, 1))
+    visits = [
+        (f"{off}", touching(places + off * np.eye(3)[0], n_frames=5))
+        for off in (0, 0.02)
+    ]
+    found = measure_drift(visits, Conditions(instrument, VerificationLimits(drift=0.1)))
+    begun = DRIFT.figures_so_far(
+        DriftOptions(),
+        TaskProgress(runs=tuple(points for _, points in visits)),
+        Conditions(instrument),
+    )
+
+    assert found.moves[1, 0] == pytest.approx(0.02, abs=0.005)
+    assert found.assessment.reason.code == "drift.good"
+    assert [row.name for row in begun[0].rows] == ["1", "2"]
