@@ -187,12 +187,11 @@ class ContactModel:
         self, R: FloatArray, tip_pen: FloatArray, cone_rig: FloatArray
     ) -> Linearised:
         """Return the model around rotations (N, 3, 3), tip (3,) and cone (3,)."""
-        residuals, J = self._view(0, R, tip_pen, cone_rig)
-        if self.rig.n_cameras > 1:
-            others = range(1, self.rig.n_cameras)
-            views = [self._view(c, R, tip_pen, cone_rig) for c in others]
-            residuals = np.concatenate([residuals, *(r for r, _ in views)], axis=1)
-            J = np.concatenate([J, *(by for _, by in views)], axis=1)
+        cameras = range(self.rig.n_cameras)
+        views = [self._view(c, R, tip_pen, cone_rig) for c in cameras]
+        residuals, J = (
+            np.concatenate(each, axis=1) for each in zip(*views, strict=True)
+        )
         return Linearised(R, tip_pen, cone_rig, residuals, J)
 
     def _view(
