@@ -115,3 +115,27 @@ def test_poses_that_hardly_turn_make_no_group(
 
     groups = find_groups(rotations, translations, np.ones(100, bool))
     assert (groups is not None) == is_told
+
+
+@pytest.mark.parametrize(
+    ("n_poses", "n_others", "is_told"),
+    [(200, 20, True), (200, 19, False), (40, 6, True), (40, 5, False)],
+)
+def test_a_group_has_a_tenth_of_the_poses_and_six(
+    n_poses: int, n_others: int, is_told: bool
+) -> None:
+    """Beside them are poses of no group, so that more disagree with the first."""
+    rng = np.random.default_rng(4)
+    rotations = rotation_from_vector(rng.uniform(-0.6, 0.6, (n_poses, 3)))
+    translations = np.array([10.0, 20.0, 800.0]) - rotations @ [2.0, -1.0, 150.0]
+    translations += 0.1 * rng.standard_normal((n_poses, 3))
+    order = rng.permutation(n_poses)
+    others, alone = order[:n_others], order[n_others : n_others + 3]
+    translations[others] += [20.0, 0.0, 0.0]
+    translations[alone] += rng.uniform(100.0, 300.0, (3, 3))
+    used = ~np.isin(np.arange(n_poses), order[: n_others + 3])
+
+    groups = find_groups(rotations, translations, used)
+    assert (groups is not None) == is_told
+    if groups is not None:
+        np.testing.assert_array_equal(np.flatnonzero(groups.group == 2), sorted(others))
