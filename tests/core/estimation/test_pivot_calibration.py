@@ -103,9 +103,14 @@ def test_inverted_poses_are_reported() -> None:
     R, t = poses()
     inverse = np.swapaxes(R, 1, 2)
 
-    (warning,) = calibrate_pivot(inverse, -np.einsum("nij,nj->ni", inverse, t)).warnings
+    found = calibrate_pivot(inverse, -np.einsum("nij,nj->ni", inverse, t))
 
+    (warning,) = found.warnings
     assert "This indicates inverted poses" in str(warning)
+    assert warning.values == {
+        "tip": pytest.approx(np.linalg.norm(found.fit.tip_pen)),
+        "pivot": pytest.approx(np.linalg.norm(found.fit.pivot_cam)),
+    }
 
 
 def test_stated_covariances_are_a_floor_to_the_uncertainty() -> None:
@@ -160,3 +165,32 @@ def test_two_fifths_of_the_poses_may_be_a_minority(
     (warning,) = found.warnings
     assert warning.code == "pivot.two-pivots"
     assert warning.values["distance"] == pytest.approx(5.0, abs=0.6)
+
+
+def test_another_tip_of_a_minority_is_named_with_its_distance() -> None:
+    R, t = poses()
+    t[150:] += R[150:] @ [0.0, -5.0, 0.0]
+    (warning,) = calibrate_pivot(R, t).warnings
+
+    assert (warning.code, warning.values) == (
+        "pivot.two-tips",
+        {
+            "distance": pytest.approx(5.0, abs=0.5),
+            "first": "1-150",
+            "second": "151-200",
+            "consequence": message("pivot.minority-left-out"),
+        },
+    )
+
+
+@pytest.mark.parametrize(("n_runs", "dots"), [(10, ""), (11, ", ...")])
+def test_ten_runs_of_poses_are_named(n_runs: int, dots: str) -> None:
+    R, t = poses()
+    starts = 7 * np.arange(n_runs)
+    t[(starts[:, None] + np.arange(3)).ravel()] += np.random.default_rng(1).uniform(
+        50, 200, (3 * n_runs, 3)
+    )
+    (warning,) = calibrate_pivot(R, t).warnings
+
+    runs = ", ".join(f"{start + 1}-{start + 3}" for start in starts[:10])
+    assert warning.values["poses"] == runs + dots
