@@ -28,7 +28,7 @@ from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
 from lightpen.model.rig import rig_of
-from lightpen.record.folder.verifications import VERIFICATIONS
+from lightpen.record.folder.verifications import TOUCHES, VERIFICATIONS
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
@@ -39,6 +39,7 @@ from lightpen.simulator.swings import PAPER_TIP
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.probing.drift_reference import LampImages, LampObservations
+from lightpen.verification.probing.image_locations import touch_place
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen.verification.storage.checkpoint import find_interrupted
@@ -411,6 +412,21 @@ def test_a_verification_that_is_closed(trace: Trace) -> None:
     closed.assert_as_before("closed")
 
 
+def test_the_images_of_touches_say_which_touch_they_are_of(trace: Trace) -> None:
+    trace.come()
+    trace.pick_up()
+    trace.touch(*leant(4)[:2])
+    trace.workflow.undo()
+    trace.touch(leant(4)[2])
+    (run,) = (trace.folder / SIMULATED / VERIFICATIONS / TOUCHES).iterdir()
+    touches = touch_place((str(run),)).touches
+    trace.workflow.shut_down()
+    assert touches is not None
+
+    # A touch that is taken back counts no more; its number is not given again.
+    assert [each.number for each in touches] == [1, 1, 1, 0, 0, 0, 3, 3, 3]
+
+
 def test_a_camera_that_turns_before_lamps_counts_in_what_is_touched_then(
     trace: Trace,
 ) -> None:
@@ -427,6 +443,7 @@ def test_a_camera_that_turns_before_lamps_counts_in_what_is_touched_then(
         state = trace.workflow.status.state
         assert state is not None
         seen.append((trace.workflow.status, found_by(state, FIXED_POINT).uncertainty))
+    trace.workflow.shut_down()
     (_, still), (status, moved) = seen
 
     assert status.lamp_drift is not None
