@@ -105,6 +105,32 @@ def test_a_point_follows_where_the_second_camera_stands(by_two: Instrument) -> N
     np.testing.assert_allclose(derivative[:, by_intrinsics], by_fx, atol=FOLLOWS * size)
 
 
+def test_a_point_follows_a_third_camera_like_a_second_one_in_its_place() -> None:
+    two, pen = beside(paper_camera(), PAPER_CONE), paper_pen()
+    twice = [0, 1, 1]
+    rig = replace(
+        two,
+        cameras=tuple(two.cameras[i] for i in twice),
+        rotations=two.rotations[twice],
+        translations=two.translations[twice],
+        covariance=1e-6 * np.eye(12),
+        names=("left", "right", "right again"),
+    )
+    by_three = instrument_of_files(rig, pen, PAPER_TIP, 1e-6 * np.eye(3), SIGMA)
+    swing = swing_poses(2, np.random.default_rng(4))
+    poses = swing.rotations, swing.translations
+    pixels = np.stack(seen_by(rig, pen, *poses, np.random.default_rng(5), 0.0), axis=1)
+
+    derivatives = point_sensitivities(by_three, fit_rig_poses(rig, pen, pixels, *poses))
+
+    place = by_three.parameters.extrinsics.start
+    second, third = (
+        derivatives[..., place : place + 12].reshape(2, 3, 2, 6).swapaxes(0, 2)
+    )
+    np.testing.assert_allclose(third, second, rtol=1e-6)
+    assert np.abs(second).min() > 0
+
+
 def moved(rig: Rig, k: int, step: float) -> Rig:
     """Return a rig whose second camera is moved by one parameter of its place."""
     change = np.zeros(6)
