@@ -111,6 +111,8 @@ def test_a_pen_that_rests_is_not_touching_until_it_was_taken_up(
     for places in (on_the_table, switched_on, one_wrong_image):
         state, events = run(instrument, places, state=resting)
         assert (state.phase, events) == (ProbingPhase.AT_REST, none)
+        assert len(state.held) == 2  # the first and last image
+        assert state.held[1].frame.name == f"image {len(places) - 1}"
 
     taken_up = [HELD] * STILL + moving() + [HELD] * STILL
     state, events = run(instrument, taken_up, state=resting)

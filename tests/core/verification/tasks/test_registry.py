@@ -5,10 +5,17 @@ from dataclasses import fields
 import pytest
 from msgspec import json, structs
 
+from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.registry import TASKS, AnyOptions, AnyTask, task_of
-from lightpen.verification.tasks.task import NumberOption, Surface, TaskProgress
+from lightpen.verification.tasks.task import (
+    NumberOption,
+    Surface,
+    TaskProgress,
+    certificate_option,
+    count_option,
+)
 
 tasks = pytest.mark.parametrize("task", TASKS, ids=str)
 
@@ -29,6 +36,16 @@ def test_every_field_is_an_option_with_its_limits(task: AnyTask) -> None:
         else:
             assert value is Surface.GROOVE
             assert len(option.labels) == len(Surface)
+
+
+def test_counts_are_no_part_of_an_artefact_and_certificates_may_be_unknown() -> None:
+    count = count_option("n_points", message("option.points"), 3, 50)
+    assert (count.least, count.most, count.decimals) == (3, 50, 0)
+    assert not count.is_of_artefact
+    certificate = certificate_option("length_uncertainty")
+    assert (certificate.least, certificate.most, certificate.decimals) == (0, 1, 4)
+    assert certificate.is_of_artefact
+    assert certificate.is_optional
 
 
 @tasks
