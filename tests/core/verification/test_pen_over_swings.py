@@ -183,6 +183,7 @@ def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> N
     assert '"parent_sha256": "aaaa' in (tmp_path / "new.json").read_text()
 
 
+@pytest.mark.slow
 def test_pooled_swings_put_the_camera_file_right(swing: Swing) -> None:
     true = paper_camera()
     swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
@@ -231,6 +232,7 @@ def test_what_no_swing_shows_stays_as_uncertain_as_the_file_states(
     assert of_shape.max() < 0.005**2
 
 
+@pytest.mark.slow
 def test_the_swing_that_the_file_was_found_from_counts_once(swing: Swing) -> None:
     swings = [swing(true_pen(), number) for number in (1, 2, 3)]
     marks = [marks_of(shown_images(each.calibration).pixels) for each in swings]

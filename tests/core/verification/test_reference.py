@@ -276,7 +276,13 @@ def step_of(
     }
 
 
-@pytest.mark.parametrize("case", [*COURSES, "part"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        *(each for each in COURSES if each != "circle"),
+        *("part", pytest.param("circle", marks=pytest.mark.slow)),
+    ],
+)
 def test_how_a_task_goes_on_is_as_before(
     case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
 ) -> None:

@@ -331,7 +331,9 @@ def in_turn(trace: Trace) -> Iterator[Callable[[], None]]:
         yield from [partial(trace.touch, hold) for hold in holds]
 
 
-@pytest.mark.parametrize("n_acts", [2, 8, 12])
+@pytest.mark.parametrize(
+    "n_acts", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (8, 12))]
+)
 def test_a_verification_that_is_resumed(
     trace: Trace,
     prepared: Preparation,

@@ -405,6 +405,7 @@ def test_a_bug_pauses_it_and_loses_nothing(
 # The images of live touches
 
 
+@pytest.mark.slow
 def test_a_verification_can_be_repeated_from_the_images_of_its_touches(
     at_it: Verifier,
 ) -> None:
@@ -605,6 +606,7 @@ def test_a_lamp_is_watched_on_after_an_interruption(
 # What became of it
 
 
+@pytest.mark.slow
 def test_a_tip_that_keeps_the_limits_is_accepted_with_all_its_records(
     at_it: Verifier,
 ) -> None:

@@ -116,6 +116,7 @@ def test_a_lens_field_is_found_and_corrected() -> None:
     assert not found.contradictions
 
 
+@pytest.mark.slow
 def test_a_measured_lens_field_of_the_camera_file_is_corrected() -> None:
     true, _ = swing()
     exact = simulate_centers(
@@ -169,6 +170,7 @@ def test_a_stylus_that_jumps_with_the_side_of_the_lean_is_found() -> None:
     assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
 
 
+@pytest.mark.slow
 def test_a_camera_that_turns_with_the_lean_is_found() -> None:
     true, _ = swing()
     _, across = lean_of(true.rotations)

@@ -96,6 +96,7 @@ def test_led_errors_are_found_that_are_far_beyond_what_the_file_states() -> None
     assert result.joint.sigma == pytest.approx(0.03, rel=0.1)
 
 
+@pytest.mark.slow
 def test_led_errors_within_what_the_file_states_are_no_finding() -> None:
     results = [
         calibrated(perturbed(0.01, seed, stated=0.01), 0.03, seed, FEW)

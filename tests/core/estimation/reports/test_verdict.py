@@ -235,6 +235,7 @@ def test_what_more_images_shrink_asks_for_more_of_them(
     assert verdict.next_step is NextStep.CAPTURE_MORE
 
 
+@pytest.mark.slow
 def test_a_tip_by_assumptions_alone_passes_only_within_the_limit_with_them() -> None:
     unknown = replace(CAMERA, covariance=None)
     bare = replace(PEN, scale_sigma=None, diameter_sigma=None)

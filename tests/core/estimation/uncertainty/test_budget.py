@@ -196,6 +196,7 @@ def test_halves_agree_with_two_fits_of_half_the_images() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_shares_add_up_to_the_covariance() -> None:
     for correlation in (0.0, 0.9):
         result = calibrated(0.05 * noise(8, correlation, 40))

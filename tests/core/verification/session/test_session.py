@@ -471,6 +471,7 @@ def test_a_first_touch_beside_the_cone_does_not_hold_the_witness_up(
     assert witnessed.state.task(witnessed.setup) is FIXED_POINT
 
 
+@pytest.mark.slow
 def test_a_task_done_anew_is_witnessed_anew(witnessed: Session) -> None:
     visit(witnessed)
     witnessed.touch(*leant(4))
