@@ -22,7 +22,6 @@ from tests.verifying import BAR, CHOICES, FRAME, NOON, TABLE, found_by
 
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
-from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import CameraFile
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import FeatureKind
@@ -33,8 +32,6 @@ from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.runners.serial_queue import Act, Report, T, Task
-from lightpen.simulator.image_plans import plan_scene, render_plan
-from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.preparation import Preparation
@@ -201,18 +198,6 @@ def trace(tmp_path: Path, prepared: Preparation) -> Trace:
     """A tip is in force."""
     accept_tip(tmp_path, prepared)
     return Trace(tmp_path, prepared)
-
-
-@pytest.fixture(scope="module")
-def recorded(prepared: Preparation, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Five images of the pen in the cone, each in another posture."""
-    assert prepared.camera is not None
-    scene = Scene(n_images=5, camera=prepared.camera)
-    folder = tmp_path_factory.mktemp("touches")
-    for plan in plan_scene(scene).image_plans:
-        image = render_plan(scene, plan)
-        (folder / f"{plan.index}.png").write_bytes(encode_png(image))
-    return folder
 
 
 def test_a_verification_with_pauses_and_points_taken_back(trace: Trace) -> None:

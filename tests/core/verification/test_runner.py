@@ -33,7 +33,6 @@ from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import ProbingOperator
@@ -252,18 +251,6 @@ def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(at_it: Verifier) 
     assert at_it.status.task is FIXED_POINT
     assert at_it.status.files == ()
     assert len(at_it.records) == 1
-
-
-@pytest.fixture(scope="module")
-def recorded(prepared: Preparation, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Five images of the pen in the cone, each in another posture."""
-    assert prepared.camera is not None
-    scene = Scene(n_images=5, camera=prepared.camera)
-    folder = tmp_path_factory.mktemp("touches")
-    for plan in plan_scene(scene).image_plans:
-        image = render_plan(scene, plan)
-        (folder / f"{plan.index}.png").write_bytes(encode_png(image))
-    return folder
 
 
 def test_recorded_images_do_a_task(at_it: Verifier, recorded: Path) -> None:
