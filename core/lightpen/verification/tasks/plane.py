@@ -175,7 +175,7 @@ def measure_plane(
 def fit_plane(points_cam: FloatArray) -> PlaneFit:
     """Fit a plane to points (N, 3), mm, not in one place nor on a line."""
     center = points_cam.mean(axis=0)
-    _, extents, axes = np.linalg.svd(points_cam - center)
+    _, extents, axes = np.linalg.svd(points_cam - center, full_matrices=False)
     if extents[0] / np.sqrt(len(points_cam)) < SMALLEST or (
         extents[1] < THIN * extents[0]
     ):
@@ -213,7 +213,7 @@ def _tip_evidence(
 ) -> TipEvidence:
     along = np.array([point.point_cam for point in points]) - fit.center_cam
     across = along - np.outer(along @ fit.normal_cam, fit.normal_cam)
-    axes = np.linalg.svd(across)[2][:2]
+    axes = np.linalg.svd(across, full_matrices=False)[2][:2]
     drift = float(fit.normal_cam**2 @ conditions.drift**2)
     return tip_evidence(
         points,
