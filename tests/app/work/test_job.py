@@ -137,7 +137,7 @@ def test_of_two_jobs_only_the_latest_reports(qtbot: QtBot) -> None:
     assert latest.is_running
     qtbot.waitUntil(lambda: told == [2, 3])
 
-    assert ends == [False]  # its outcome is no longer awaited once it is told
+    assert ends == [False]  # once reported, the outcome is no longer awaited
     assert QThreadPool.globalInstance().waitForDone(60_000)
     QApplication.processEvents()
     assert told == [2, 3]

@@ -44,7 +44,7 @@ PRESSED = (  # shown where the tip is to be pressed into the cone
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 PACE_S, N_PACING = 15.0, 6  # last seconds and images for the remaining time
 LONG_S = 90.0  # shown in minutes
-FEW = 5  # images by which a misfit is reported
+LEAST_JUDGED = 5  # kept images, from which on misfitting LEDs are reported
 
 _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
     Phase.WAIT: (Sign.WAIT, Tone.QUIET),
@@ -132,7 +132,7 @@ class SwingWords(QObject):
         """Return a warning that no swing can resolve."""
         kept = moment.state.kept
         why = out_of_reach(moment.setup.limits, moment.state, moment.short)
-        if len(kept) >= FEW and kept.sigma > USUAL_SIGMA:
+        if len(kept) >= LEAST_JUDGED and kept.sigma > USUAL_SIGMA:
             why = message(Code.LEDS_MISFIT, sigma=kept.sigma, usual=USUAL_SIGMA)
         elif moment.has_unfit_spots and moment.state.phase in (Phase.WAIT, Phase.SEEN):
             n_leds = moment.setup.pen.n_leds

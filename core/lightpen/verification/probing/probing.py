@@ -163,8 +163,8 @@ def advance_touch(
 
 def at_rest(state: ProbingState) -> ProbingState:
     """Return the touches so far; the pen must leave its place before the next."""
-    let_go = _let_go(state)
-    return replace(let_go, phase=ProbingPhase.AT_REST, path=(), is_sliding=False)
+    moving = _let_go(state)
+    return replace(moving, phase=ProbingPhase.AT_REST, path=(), is_sliding=False)
 
 
 def take_all(
