@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.detection.pose import NOISE_FLOOR
+from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.discovery.factorisation import WeakShape, factorise, filled_tracks
 from lightpen.discovery.starts import (
     CameraPrior,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.pose import (
+from lightpen.detection.robust_residuals import (
     cauchy_weights,
     disc_residuals,
     normal_equations,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.pose import NOISE_FLOOR
+from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.discovery.hypotheses import camera_prior
 from lightpen.discovery.labelling import Labelled
 from lightpen.discovery.lens_choice import choose_lens

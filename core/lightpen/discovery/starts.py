@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.pose import CAUCHY_WIDTH, NOISE_FLOOR, robust_sigma
+from lightpen.detection.robust_residuals import CAUCHY_WIDTH, NOISE_FLOOR, robust_sigma
 from lightpen.discovery.factorisation import WeakShape
 from lightpen.discovery.normals import FACING, off_sight
 from lightpen.estimation.bundle.linearised import (

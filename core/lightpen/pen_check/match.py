@@ -23,13 +23,8 @@ from lightpen.detection.labelling.labels import (
     LabelStatus,
     label_images,
 )
-from lightpen.detection.pose import (
-    MIN_POSE_LEDS,
-    Poses,
-    disc_residuals,
-    fit_poses,
-    robust_sigma,
-)
+from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
+from lightpen.detection.robust_residuals import disc_residuals, robust_sigma
 from lightpen.detection.spots import Spots
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message

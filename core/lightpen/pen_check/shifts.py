@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.detection.pose import (
+from lightpen.detection.pose import fit_poses
+from lightpen.detection.robust_residuals import (
     disc_residuals,
-    fit_poses,
     normal_equations,
     robust_sigma,
 )

@@ -5,12 +5,8 @@ import pytest
 from tests.simulated_centers import displace_centers, drop_centers, swap_centers
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.pose import (
-    disc_residuals,
-    fit_paper_poses,
-    fit_poses,
-    start_poses,
-)
+from lightpen.detection.pose import fit_paper_poses, fit_poses, start_poses
+from lightpen.detection.robust_residuals import disc_residuals
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen.simulator.swings import (

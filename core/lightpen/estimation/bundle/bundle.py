@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
+from lightpen.detection.robust_residuals import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS, Components

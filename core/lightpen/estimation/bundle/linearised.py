@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.pose import disc_residuals
+from lightpen.detection.robust_residuals import disc_residuals
 from lightpen.estimation.contact.joint import TURN_RIDGE
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig

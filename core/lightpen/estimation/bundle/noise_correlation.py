@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.pose import NOISE_FLOOR
+from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import Components

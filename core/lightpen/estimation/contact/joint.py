@@ -25,14 +25,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.pose import (
+from lightpen.detection.rig_pose import derivatives_in_rig
+from lightpen.detection.robust_residuals import (
     NOISE_FLOOR,
     cauchy_weights,
     disc_residuals,
     normal_equations,
     robust_sigma,
 )
-from lightpen.detection.rig_pose import derivatives_in_rig
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.information import inverse

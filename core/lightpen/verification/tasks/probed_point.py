@@ -18,9 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.pose import Poses, disc_residuals, normal_equations
+from lightpen.detection.pose import Poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_pose import derivatives_in_rig, fit_rig_poses
+from lightpen.detection.robust_residuals import disc_residuals, normal_equations
 from lightpen.estimation.pivot.pivot import (
     in_deviations,
     median_distance,

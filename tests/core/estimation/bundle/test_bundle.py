@@ -8,7 +8,7 @@ import pytest
 from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.pose import NOISE_FLOOR
+from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.adjustment import with_effects
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
