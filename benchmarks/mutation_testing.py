@@ -72,6 +72,8 @@ OTHER_FUNCTIONS = {
     "any": "all", "all": "any", "argmin": "argmax", "argmax": "argmin",
 }  # fmt: skip
 WORDS_AND_TYPES = {"message", "TypeVar", "NewType"}
+# Arguments that guard against a bug, or change how fast numpy is and no value.
+NOT_MUTATED = {"strict", "allow_nan", "optimize", "full_matrices"}
 
 Edit: TypeAlias = Callable[[ast.AST], None]
 Key: TypeAlias = tuple[str, str]  # of a function: file below core, its name in there
@@ -191,6 +193,9 @@ def _mutable(
         children = []
     else:
         children = list(ast.iter_child_nodes(node))
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".reshape"):
+            # To numpy, -2 means the same as -1.
+            children = [each for each in children if ast.unparse(each) != "-1"]
         yield node, function
     for child in children:
         yield from _mutable(child, within, function)
@@ -202,7 +207,7 @@ def _does_nothing(node: ast.AST) -> bool:
         function = ast.unparse(node.func)
         return function in WORDS_AND_TYPES or function.startswith("_logger.")
     if isinstance(node, ast.keyword):
-        return node.arg == "strict"
+        return node.arg in NOT_MUTATED
     return isinstance(node, ast.Raise | ast.Assert | ast.JoinedStr)
 
 

@@ -41,11 +41,13 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen.verification.storage.checkpoint import find_interrupted
 from lightpen.verification.storage.resuming import abandon_interrupted
-from lightpen.verification.tasks.circle import SIMULATED_RADIUS, CircleOptions
+from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
+from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
+from lightpen.verification.tasks.sphere import SPHERE
 from lightpen.verification.workflow import VerificationWorkflow
 
 UPRIGHT = (Hold(tilt=0.0),) * 3
@@ -286,6 +288,37 @@ def test_a_verification_with_other_choices(
     act.shut_down()
 
     trace.assert_as_before("other-choices")
+
+
+def test_a_verification_that_is_done_when_its_certificate_changes(trace: Trace) -> None:
+    ring = replace(CHOICES, kinds=(CIRCLE.kind,))
+    trace.come(ring)
+    trace.pick_up()
+    trace.touch(*round_a_ring(11, 31.751)[:10])
+    trace.workflow.end_task()
+    trace.workflow.choose(trace.prepared, replace(ring, n_frames=4))
+    other = CircleOptions(SIMULATED_RADIUS + 0.2, 0.001)
+    trace.workflow.choose(trace.prepared, ring.with_options(other))
+    trace.workflow.shut_down()
+
+    trace.assert_as_before("other-certificate")
+
+
+def test_a_length_that_is_ended_between_two_places(
+    trace: Trace, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    bars = replace(CHOICES, kinds=(LENGTH.kind, SPHERE.kind))
+    trace.come(bars.with_options(LengthOptions(SIMULATED_LENGTH, 0.001, n_places=3)))
+    trace.pick_up()
+    trace.touch(*BAR, *BAR)
+    trace.workflow.end_task()
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(trace.folder, copy)
+    trace.workflow.shut_down()
+
+    (interrupted,) = find_interrupted(copy)
+    assert interrupted.under_way is not None
+    assert [run.is_last for run in interrupted.under_way.runs] == [False, True]
 
 
 def test_a_tip_that_fails(trace: Trace) -> None:

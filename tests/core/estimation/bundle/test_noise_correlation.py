@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.reference import assert_as_before
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -116,6 +117,19 @@ def test_an_led_that_is_not_used_has_no_part_in_the_correlation() -> None:
 
     # 3600 pairs, of which one in ten is new.
     assert lag1(residuals, used) == pytest.approx(0.9, abs=0.05)
+
+
+def test_weakly_lasting_noise_is_weighed_as_before() -> None:
+    budget = of_noise(10, 0.25, 3)[1].budget
+
+    assert_as_before(
+        "weakly-lasting-noise",
+        {
+            "coefficient": budget.autocorrelation,
+            "factor": budget.correlation_factor,
+            "uncertainty": budget.expanded_uncertainty,
+        },
+    )
 
 
 def test_images_without_neighbours_tell_no_correlation() -> None:
