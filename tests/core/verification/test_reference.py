@@ -4,7 +4,7 @@ That it is right is shown by the other tests; that nothing changes unnoticed, he
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -224,6 +224,17 @@ def code_of(name: Message | str) -> str:
     return name.code if isinstance(name, Message) else name
 
 
+def scalars_of(found: Any) -> Any:
+    """Return the single numbers of a finding and of its parts, but of its points."""
+    if isinstance(found, tuple):
+        return [scalars_of(each) for each in found]
+    if isinstance(found, float | int):
+        return found
+    if isinstance(found, ProbedPoint) or not is_dataclass(found):
+        return {}
+    return {each.name: scalars_of(getattr(found, each.name)) for each in fields(found)}
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_what_a_task_finds_is_as_before(
     case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
@@ -241,6 +252,7 @@ def test_what_a_task_finds_is_as_before(
         f"verification-{case.replace(', ', '-').replace(' ', '-')}",
         {
             "record": record,
+            "found": scalars_of(found),
             "tables": shown(task.tables(found, conditions)),
             "text": text_figures(
                 found_text(

@@ -62,10 +62,10 @@ def test_a_record_that_lacks_an_entry_is_refused_by_reader_and_schema(
     assert validator.is_valid(SMALL)
 
 
-def seen(led: int) -> dict[str, Any]:
-    spot = {"led": led, "x_px": 1.0, "y_px": 1.0, "area_px2": 1.0}
+def seen(*leds: int) -> dict[str, Any]:
+    spot = {"x_px": 1.0, "y_px": 1.0, "area_px2": 1.0, "fit": True, "used": True}
     frame, other = SMALL["frames"]
-    return {"frames": [{**frame, "leds": [{**spot, "fit": True, "used": True}]}, other]}
+    return {"frames": [{**frame, "leds": [{"led": j, **spot} for j in leds]}, other]}
 
 
 def lamps(n: int) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def lamps(n: int) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("entries", "problem"),
     [
-        (seen(2), "LED is seen that the pen does not have"),
+        (seen(1, 2), "LED is seen that the pen does not have"),
         (lamps(1), "different numbers of fixed lamps"),
         ({"leds": []}, "instrument is of another pen"),
         (
