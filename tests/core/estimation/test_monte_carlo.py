@@ -148,6 +148,28 @@ def test_domes_that_all_stand_out_alike_move_the_tip_along_the_normals(
     assert 0.03 < np.sqrt(np.mean(moves[:, 2] ** 2)) < 0.3
 
 
+def test_areas_that_are_all_read_too_large_hardly_move_the_tip(
+    calibration: Calibration,
+) -> None:
+    trials = trials_of(calibration)
+
+    def trials_with(sigma: float) -> Trials:
+        reading = DiameterReading(trials.pen.diameter, sigma, 0.0)
+        return replace(
+            trials,
+            edge_widths=np.full_like(trials.edge_widths, 1.2),
+            priors=replace(trials.priors, reading=reading),
+        )
+
+    exact, read = trials_with(0.0), trials_with(0.04)
+    found = [(run_trial(exact, n), run_trial(read, n)) for n in range(2)]
+
+    moves = np.array([b - a for a, b in found if a is not None and b is not None])
+    assert len(moves) == 2
+    # By the depth at which a disc larger by 4 parts in 1000 is imaged off its centre.
+    assert 2e-5 < np.sqrt(np.mean(moves[:, 2] ** 2)) < 3e-4
+
+
 @pytest.mark.parametrize(
     ("n_trials", "ratio", "code"),
     [
