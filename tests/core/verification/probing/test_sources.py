@@ -16,11 +16,11 @@ from lightpen.detection.observations import Observations, observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.samples import beside
-from lightpen.simulator.swings import PAPER_CONE, paper_camera, paper_pen
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera, paper_pen
 from lightpen.verification.probing.drift_reference import (
     LampImages,
     LampObservations,
@@ -135,6 +135,26 @@ def test_a_place_of_more_cameras_than_the_rig_has_is_refused(
         observe_place(place, instrument)
     said = refused.value.message.values
     assert (said["n_given"], said["n_cameras"]) == (2, 1)
+
+
+def test_a_moment_has_the_name_of_its_first_image() -> None:
+    rig, pen = beside(paper_camera(), PAPER_CONE), paper_pen()
+    both = instrument_of_files(rig, pen, PAPER_TIP, 1e-6 * np.eye(3), 0.01)
+    held = [next(Holder(rig, pen).still(Hold((x, 0.0, 0.0)))) for x in (0.0, 30.0)]
+    views = [(each.pixels, each.others[0].pixels) for each in held]
+    seen = [
+        observe_centers(Centers(np.arange(2), np.array(own), Path("c")), camera, pen)
+        for camera, own in zip(rig.cameras, zip(*views, strict=True), strict=True)
+    ]
+    names = ("", "left 2.png"), ("right 1.png", "right 2.png")
+    found = touches_of(
+        "run",
+        [replace(each, names=own) for each, own in zip(seen, names, strict=True)],
+        both,
+        ONE_IMAGE,
+    )
+
+    assert named(found) == [("right 1.png",), ("left 2.png",)]
 
 
 def test_lamps_are_those_of_images_that_show_the_pen(instrument: Instrument) -> None:
