@@ -7,6 +7,7 @@ After a wanted change of figures delete the file, run the test and look at what 
 import json
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,24 @@ def text_figures(text: str) -> dict[str, list[float]]:
         "shown": [float(each.group()) for each in found],
         "columns": [each.end() for each in found if each.string.startswith(" ")],
     }
+
+
+def parts_of(value: Any) -> Any:
+    """Return the numbers of a value and of all its parts, as a tree.
+
+    Of an array this is its norm, which has no sign that a library chooses.
+    """
+    if isinstance(value, np.ndarray):
+        known = np.nan_to_num(value.astype(np.float64))
+        return [float(np.linalg.norm(known)), value.size]
+    if isinstance(value, Message) or not hasattr(value, "__dict__"):
+        named = value._asdict() if hasattr(value, "_asdict") else value
+        if isinstance(named, Mapping):
+            return {str(name): parts_of(each) for name, each in named.items()}
+        return [parts_of(each) for each in named] if isinstance(named, tuple) else named
+    if not is_dataclass(value):
+        return None
+    return {each.name: parts_of(getattr(value, each.name)) for each in fields(value)}
 
 
 def _leaves(path: str, tree: Any) -> Iterator[tuple[str, Any]]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.small_records import entries_of
-from tests.reference import assert_as_before, text_figures
+from tests.reference import assert_as_before, parts_of, text_figures
 from tests.simulated_centers import correlated_noise, simulate_rig_centers
 
 from lightpen.arrays import FloatArray
@@ -384,6 +384,18 @@ def test_the_record_of_a_calibration_is_as_before(named: Named) -> None:
             "moved": calibration.moved,
         },
     )
+
+
+@pytest.mark.parametrize(
+    "named", ["usual", "restless", "unstated", "loose", "by_two_cameras"], indirect=True
+)
+def test_all_parts_of_a_calibration_are_as_before(named: Named) -> None:
+    name, calibration = named
+    parts = parts_of(calibration)
+    for steps in ("step_lengths", "increments", "iterates", "objectives"):
+        parts["two_stage"].pop(steps)
+
+    assert_as_before(f"parts-{name}", parts)
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,13 @@ That it is right is shown by the other tests; that nothing changes unnoticed, he
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, fields, is_dataclass, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.reference import assert_as_before, text_figures
+from tests.reference import assert_as_before, parts_of, text_figures
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -224,17 +224,6 @@ def code_of(name: Message | str) -> str:
     return name.code if isinstance(name, Message) else name
 
 
-def scalars_of(found: Any) -> Any:
-    """Return the single numbers of a finding and of its parts, but of its points."""
-    if isinstance(found, tuple):
-        return [scalars_of(each) for each in found]
-    if isinstance(found, float | int):
-        return found
-    if isinstance(found, ProbedPoint) or not is_dataclass(found):
-        return {}
-    return {each.name: scalars_of(getattr(found, each.name)) for each in fields(found)}
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_what_a_task_finds_is_as_before(
     case: str, runs: Mapping[str, tuple[TaskOptions, Named]], conditions: Conditions
@@ -252,7 +241,7 @@ def test_what_a_task_finds_is_as_before(
         f"verification-{case.replace(', ', '-').replace(' ', '-')}",
         {
             "record": record,
-            "found": scalars_of(found),
+            "found": parts_of(found),
             "tables": shown(task.tables(found, conditions)),
             "text": text_figures(
                 found_text(
