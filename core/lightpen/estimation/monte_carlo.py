@@ -241,9 +241,8 @@ def _edge_widths(calibration: Calibration, n_images: int) -> FloatArray:
 def _drawn_moves(trials: Trials, rng: np.random.Generator) -> FloatArray:
     """Return the offset of the tip in the cone in each image, (N, 3), mm."""
     by_form = _drawn(trials.move_covariance, rng).reshape(-1, N_CONE)
-    values, vectors = np.linalg.eigh(trials.jitter)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    shaken = rng.standard_normal((len(trials.forms), N_CONE)) @ root.T
+    draws = rng.standard_normal((len(trials.forms), N_CONE))
+    shaken = draws @ _symmetric_root(trials.jitter)
     return np.asarray(trials.forms @ by_form + shaken)
 
 
@@ -303,6 +302,11 @@ def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
 
 
 def _drawn(covariance: FloatArray, rng: np.random.Generator) -> FloatArray:
+    draws = rng.standard_normal(len(covariance))
+    return np.asarray(_symmetric_root(covariance) @ draws)
+
+
+def _symmetric_root(covariance: FloatArray) -> FloatArray:
+    """Return the root whose sign no library chooses: the same draws everywhere."""
     values, vectors = np.linalg.eigh(covariance)
-    sigmas = np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(vectors @ (sigmas * rng.standard_normal(len(sigmas))))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

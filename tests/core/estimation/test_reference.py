@@ -17,11 +17,12 @@ from tests.simulated_centers import correlated_noise, simulate_rig_centers
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.detection.rig_observations import observe_rig_centers
+from lightpen.estimation.bundle.disc_diameter import DiameterReading
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.contact.camera_motion import follow_lamps
-from lightpen.estimation.monte_carlo import trials_of
+from lightpen.estimation.monte_carlo import run_trial, trials_of
 from lightpen.estimation.pivot.pivot import contact_matrix, fit_pivot
 from lightpen.estimation.pivot.pivot_groups import find_groups
 from lightpen.estimation.pivot_calibration import calibrate_pivot
@@ -403,8 +404,16 @@ def test_all_parts_of_a_calibration_are_as_before(named: Named) -> None:
 )
 def test_what_trials_are_drawn_from_is_as_before(named: Named) -> None:
     name, calibration = named
+    trials = trials_of(calibration)
+    reading = DiameterReading(trials.pen.diameter, 0.04, 0.02)
+    read = replace(
+        trials,
+        edge_widths=np.full_like(trials.edge_widths, 1.2),
+        priors=replace(trials.priors, reading=reading),
+    )
 
-    assert_as_before(f"trials-{name}", vars(trials_of(calibration)))
+    errors = [run_trial(each, 3) for each in (trials, read)]
+    assert_as_before(f"trials-{name}", {**vars(trials), "errors": errors})
 
 
 @pytest.mark.parametrize("named", ["usual", "restless", "unstated"], indirect=True)

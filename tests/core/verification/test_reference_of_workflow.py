@@ -208,6 +208,7 @@ def test_a_verification_with_pauses_and_points_taken_back(trace: Trace) -> None:
     act.undo()  # nothing yet
     trace.pick_up()
     trace.touch(leant(4)[0])
+    trace.see(trace.holder.away())
     trace.touch(leant(4)[0])  # is known
     trace.touch(leant(4)[1], n_images=3)
     trace.see(trace.holder.away(2))  # broken off

@@ -471,6 +471,9 @@ def test_a_known_sphere_refines_the_tip_or_says_why_not(
     entries = PART.entries(found, setup.instrument)["refinement"]
     assert entries["is_used"] is (error < 1)
     note = PART.tables(found, setup.conditions)[1].notes[-1]
+    without = PartOptions(structs.replace(plan, characteristics=()))
+    reason = PART.measure([(name, off)], setup.conditions, without).assessment.reason
+    assert (reason == note) is (error > 1)
     if error > 1:
         assert found.assessment.grade is not Grade.PASS
         chi_square, n_free = entries["chi_square"], entries["degrees_of_freedom"]
