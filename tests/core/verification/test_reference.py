@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 from tests.reference import assert_as_before, parts_of, text_figures
 
 from lightpen.arrays import FloatArray
@@ -61,6 +62,8 @@ ENDS = PAPER_CONE + np.array([[-75.0, 0.0, 0.0], [75.0, 4.0, 20.0]])
 LIMITS = VerificationLimits(form=0.12)
 PLATE = plate_plan()
 HOLES = Plan("Holes", PLATE.features[:4])
+SOME = Plan("Some", PLATE.features[1:3])
+OF_NO_KIND = Plan("Some", tuple(structs.replace(f, kind=None) for f in SOME.features))
 DENTS = 0.003 * (-1.0) ** np.arange(25)
 DRIFT = np.array([0.004, 0.001, 0.006])
 
@@ -155,6 +158,10 @@ def runs(touching: Touching, ring: Ring) -> Mapping[str, tuple[TaskOptions, Name
             (("", touching(spread(PAPER_CONE + tilted, 4), n_frames=2)),),
         ),
         "part": (PartOptions(HOLES), tuple(plate_runs(touching, HOLES))),
+        "part, recognised": (
+            PartOptions(OF_NO_KIND),
+            tuple(plate_runs(touching, SOME)),
+        ),
         "part, whole": (PartOptions(PLATE), whole),
         "part, not whole": (PartOptions(PLATE), whole[:6]),
         "articulation": (
@@ -181,7 +188,7 @@ CASES = (
     *("circle, not round", "circle, lifted", "circle, uncertain", "circle, another"),
     *("sphere, too large", "sphere, another", "sphere, uncertain", "sphere, not round"),
     *("sphere, lifted", "articulation, one run"),
-    *("part", "part, whole", "part, not whole"),
+    *("part", "part, whole", "part, not whole", "part, recognised"),
 )
 
 
@@ -199,8 +206,7 @@ def conditions(instrument: Instrument) -> Conditions:
 
 def shown(tables: tuple[ResultTable, ...]) -> dict[str, Any]:
     """Return tables by their codes; each quantity apart, whatever its size."""
-    titles = [{"name": table.title.code} for table in tables]
-    return {"titles": titles} | {
+    return {"titles": [table.title for table in tables]} | {
         table.title.code: {
             "columns": [{"name": code_of(each)} for each in table.columns],
             "notes": table.notes,
@@ -281,7 +287,8 @@ def step_of(
     "case",
     [
         *(each for each in COURSES if each != "circle"),
-        *("part", pytest.param("circle", marks=pytest.mark.slow)),
+        *("part", "part, recognised"),
+        pytest.param("circle", marks=pytest.mark.slow),
     ],
 )
 def test_how_a_task_goes_on_is_as_before(

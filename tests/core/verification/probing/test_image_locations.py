@@ -11,6 +11,8 @@ from lightpen.errors import FileError
 from lightpen.formats.simulated_files import mark_simulated
 from lightpen.model.origin import Origin
 from lightpen.model.rig import Rig, rig_of
+from lightpen.record.swings.header import HEADER
+from lightpen.record.swings.journal import JOURNAL
 from lightpen.simulator.swings import paper_camera
 from lightpen.verification.probing.image_locations import runs_at, touch_place
 
@@ -96,3 +98,12 @@ def test_a_place_is_a_run_or_a_folder_of_runs_in_their_order(tmp_path: Path) -> 
     for nowhere in ("empty", "nothing"):
         with pytest.raises(FileError):
             runs_at(str(tmp_path / nowhere))
+
+
+def test_records_in_a_folder_are_its_runs(tmp_path: Path) -> None:
+    record = tmp_path / "record"
+    record.mkdir()
+    for name in (HEADER, JOURNAL):
+        (record / name).touch()
+
+    assert runs_at(str(tmp_path)) == (str(record),)
