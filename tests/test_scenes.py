@@ -68,7 +68,13 @@ def assert_refused(outcome: CompletedProcess[str], words: str) -> None:
     assert outcome.stderr.rstrip().endswith(".")
 
 
-@pytest.fixture(params=HARD_SCENES, ids=" ".join)
+@pytest.fixture(
+    params=[
+        *HARD_SCENES[:2],
+        *(pytest.param(each, marks=pytest.mark.slow) for each in HARD_SCENES[2:]),
+    ],
+    ids=" ".join,
+)
 def hard(request: pytest.FixtureRequest, scene: Scene) -> Path:
     return scene(*request.param)
 

@@ -95,7 +95,9 @@ def test_rims_found_from_the_image_before_are_those_found_anew(look: str) -> Non
     assert abs(np.mean(known.areas / anew.areas) - 1) < 3e-4
 
 
-@pytest.mark.parametrize("look", ["hot-spot", "board"])
+@pytest.mark.parametrize(
+    "look", ["hot-spot", pytest.param("board", marks=pytest.mark.slow)]
+)
 def test_rims_beside_a_shining_board_are_found_from_the_image_before(
     look: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

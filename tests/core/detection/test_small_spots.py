@@ -64,7 +64,9 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
     assert np.mean(flaws > 0) <= 0.1
 
 
-@pytest.mark.parametrize("gains", [(0.4, 3.0), (2.0, 6.0)])
+@pytest.mark.parametrize(
+    "gains", [(0.4, 3.0), pytest.param((2.0, 6.0), marks=pytest.mark.slow)]
+)
 def test_reflections_beside_leds_do_not_flag_them(gains: tuple[float, float]) -> None:
     found = found_on(replace(EASY, width=8.0, gains=gains), 6)
     assert np.mean((found.flaws & ~SpotFlaw.SATURATED) > 0) < 0.03
@@ -102,10 +104,15 @@ def test_small_leds_of_which_a_part_is_hidden_are_flagged(
         (replace(EASY, width=10.0), 0.012),
         (replace(EASY, width=12.0, reflections=(0.1, 0.4)), 0.0105),
         (replace(HARD, width=8.0), 0.026),
-        (replace(HARD, width=8.0, darkening=0.75), 0.031),
-        (replace(HARD, width=14.0), 0.018),
-        (replace(EASY, width=10.0, gains=(2.0, 6.0), bloom=0.15), 0.018),
-        (replace(CLIPPED, width=10.0, gains=(1.2, 3.0)), 0.009),
+        *(
+            pytest.param(panel, limit, marks=pytest.mark.slow)
+            for panel, limit in (
+                (replace(HARD, width=8.0, darkening=0.75), 0.031),
+                (replace(HARD, width=14.0), 0.018),
+                (replace(EASY, width=10.0, gains=(2.0, 6.0), bloom=0.15), 0.018),
+                (replace(CLIPPED, width=10.0, gains=(1.2, 3.0)), 0.009),
+            )
+        ),
     ],
 )
 def test_centers_are_better_than_by_a_gaussian_fit(panel: Panel, limit: float) -> None:
@@ -119,7 +126,10 @@ def test_clipped_leds_that_bloom_have_centers(width: float) -> None:
     assert found.rms < 0.06
 
 
-@pytest.mark.parametrize(("width", "gains"), [(10.0, (2.0, 6.0)), (14.0, (0.4, 4.0))])
+@pytest.mark.parametrize(
+    ("width", "gains"),
+    [pytest.param(10.0, (2.0, 6.0), marks=pytest.mark.slow), (14.0, (0.4, 4.0))],
+)
 def test_regions_beside_each_other_are_measured_once(
     width: float, gains: tuple[float, float]
 ) -> None:

@@ -70,6 +70,7 @@ def test_a_lens_that_folds_the_corners_is_refused_with_advice() -> None:
         require_lens(replace(folding, fx=2000.0, fy=2000.0))
 
 
+@pytest.mark.slow
 def test_a_lens_is_drawn_towards_a_plain_one_where_it_would_fold_the_corners(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

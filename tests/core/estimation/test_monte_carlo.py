@@ -106,6 +106,7 @@ def test_too_few_trials_are_refused(calibration: Calibration) -> None:
         run_monte_carlo(calibration, 5, in_this_process)
 
 
+@pytest.mark.slow
 def test_trials_of_a_seat_that_jitters_differ_by_it(calibration: Calibration) -> None:
     still = replace(trials_of(calibration), jitter=np.zeros((3, 3)))
     shaken = replace(still, jitter=0.02**2 * np.eye(3))
@@ -117,6 +118,7 @@ def test_trials_of_a_seat_that_jitters_differ_by_it(calibration: Calibration) ->
     assert 0.003 < np.std(differences) < 0.1
 
 
+@pytest.mark.slow
 def test_mechanics_move_the_tip_in_a_trial(calibration: Calibration) -> None:
     trials = trials_of(calibration)
     none = 0.0 * trials.mechanics_covariance

@@ -234,7 +234,7 @@ def test_a_drift_is_refused(make_views: MakeViews, camera: Camera) -> None:
         calibrated(replace(make_views(n_views=20), pixels=pixels))
 
 
-@pytest.mark.parametrize("uneven", [0.0, 0.2])
+@pytest.mark.parametrize("uneven", [pytest.param(0.0, marks=pytest.mark.slow), 0.2])
 def test_rotated_images_are_named_also_with_uneven_squares(
     make_views: MakeViews, camera: Camera, uneven: float
 ) -> None:
@@ -298,6 +298,7 @@ def test_no_image_is_called_rotated_for_less_than_a_lens_may_do(
     assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
 
 
+@pytest.mark.slow
 def test_a_skew_that_a_lens_may_have_is_not_blamed(
     make_views: MakeViews, camera: Camera
 ) -> None:

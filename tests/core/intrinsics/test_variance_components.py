@@ -134,6 +134,7 @@ def test_a_lens_field_is_found(make_views: MakeViews) -> None:
     assert np.all(share[2:4] < 0.3), share
 
 
+@pytest.mark.slow
 def test_fields_far_above_the_noise_leave_errors_as_large_as_stated(
     make_views: MakeViews, camera: Camera
 ) -> None:

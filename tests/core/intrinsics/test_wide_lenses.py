@@ -190,7 +190,7 @@ def test_a_lens_that_corners_leave_open_is_not_taken_for_a_changed_camera(
     assert found.held_out_rms < 1.2 * NOISE * 2**0.5
 
 
-@pytest.mark.parametrize("seed", [1000, 1002])
+@pytest.mark.parametrize("seed", [1000, pytest.param(1002, marks=pytest.mark.slow)])
 def test_what_is_drawn_towards_0_is_as_uncertain_as_it_is_off(seed: int) -> None:
     views = held_before(RATIONAL, 24, seed, least=0.08)
 

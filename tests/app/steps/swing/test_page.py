@@ -459,6 +459,7 @@ def test_after_the_verdict_more_can_be_captured(
     assert len(desk.run.status.solution.numbers) == desk.state.n_kept
 
 
+@pytest.mark.slow
 def test_enter_after_pause_does_not_ask_for_more_images_once_the_swing_is_complete(
     qtbot: QtBot, at_verdict: Desk
 ) -> None:
@@ -474,6 +475,7 @@ def test_enter_after_pause_does_not_ask_for_more_images_once_the_swing_is_comple
     assert not isinstance(desk.window.focusWidget(), QAbstractButton)
 
 
+@pytest.mark.slow
 def test_computing_can_be_stopped_and_begun_again(
     qtbot: QtBot, at_verdict: Desk, solving_on: "SolvingOn"
 ) -> None:
@@ -553,6 +555,7 @@ def test_a_lifted_pen_pauses_the_swing_until_it_is_back(
     assert capturing.state.n_kept > n_before
 
 
+@pytest.mark.slow
 def test_a_slip_costs_only_the_images_that_slipped(
     qtbot: QtBot, capturing: Desk
 ) -> None:
@@ -585,6 +588,7 @@ def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
     keep_on(qtbot, capturing)
 
 
+@pytest.mark.slow
 def test_left_and_right_are_learnt_anew_where_they_are_swapped(
     qtbot: QtBot, capturing: Desk
 ) -> None:
@@ -786,6 +790,7 @@ def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     assert old not in {each.folder for each in interrupted(capturing)}
 
 
+@pytest.mark.slow
 def test_finishing_early_gives_a_verdict_that_says_why(
     qtbot: QtBot, capturing: Desk
 ) -> None:

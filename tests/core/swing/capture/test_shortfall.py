@@ -71,6 +71,7 @@ def to_the_right(n: int) -> Swing:
     )
 
 
+@pytest.mark.slow
 def test_the_estimate_of_images_to_come_holds() -> None:
     limit = 0.015
     setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=limit))
