@@ -29,9 +29,9 @@ from lightpen.discovery.scale import MeasuredLength
 from lightpen.discovery.sightings import find_spots
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.image_plans import plan_scene

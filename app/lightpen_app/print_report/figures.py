@@ -8,8 +8,8 @@ from PySide6.QtGui import QColor, QPainter
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
 from lightpen_app.look.arrows import MANY, arrow_lines, arrow_scale, cell_means
 from lightpen_app.look.phrases import share_text

@@ -7,7 +7,8 @@ from PySide6.QtCore import QCoreApplication
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
+from lightpen.estimation.uncertainty.budget import ContributionName
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.decision_rule import decision_rule
 from lightpen.record.results.results import TipChange

@@ -22,7 +22,7 @@ from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.camera_validity import unmodelled_effects_of
-from lightpen.model.decision_rules import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 
 def add_check_camera(parser: argparse.ArgumentParser) -> None:

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from lightpen.commands.archive import parse_date
 from lightpen.commands.arguments import (
+    FORGOTTEN,
     DataFolder,
     add_camera_and_pen,
     add_data,
@@ -19,7 +20,6 @@ T = TypeVar("T")
 
 KINDS = ("pen", "tip", "cone", "camera", "reference")
 NOTHING = "none"  # instead of a value, clears it
-FORGOTTEN = object()
 
 
 def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:

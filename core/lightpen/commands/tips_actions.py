@@ -17,10 +17,9 @@ from lightpen.archive.logbook.tip_status import folder_statuses
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
-from lightpen.commands.arguments import data_of
+from lightpen.commands.arguments import FORGOTTEN, data_of
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
-from lightpen.commands.tips import FORGOTTEN
 from lightpen.detection.observations import observe_images
 from lightpen.errors import ArchiveError, NoArchiveError, UsageError
 from lightpen.estimation.spin import SpinFit, fit_spin

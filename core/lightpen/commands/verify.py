@@ -21,8 +21,8 @@ from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.pen_health import add_verify_pen, add_verify_press
 from lightpen.commands.touched import MeasuredRuns, add_touch_inputs, measure_runs
 from lightpen.errors import UsageError
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.messages import message
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import rule_in_words
 from lightpen.verification.probing.drift_reference import judged_with
 from lightpen.verification.reports.summaries import found_text, touches_text

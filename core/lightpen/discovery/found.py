@@ -11,7 +11,6 @@ from lightpen.discovery.numbering import frame_by, framed
 from lightpen.discovery.scale import with_led_covariance, with_lengths_known
 from lightpen.discovery.starts import KnownLength, farthest_apart
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.disc_normals import (
     across_normals,
     effect_of_normals,
@@ -20,6 +19,7 @@ from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mi
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen, moved, order_of_paper
 from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of

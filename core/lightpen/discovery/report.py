@@ -6,13 +6,13 @@ import numpy as np
 
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.together import Together
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.json_records import plain, record_heading
 from lightpen.intrinsics.distortion import choice_record
 from lightpen.intrinsics.report import PINHOLE
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
 from lightpen.model.assumptions import USUAL
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 TO_MICROMETRES = 1000.0
 OTHER_CAMERA = 3.0  # standard deviations, of the focal length from that of the file

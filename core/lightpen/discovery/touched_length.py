@@ -8,7 +8,7 @@ from lightpen.discovery.found import Discovery
 from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import contradicting_distance
 from lightpen.discovery.scale import CONTRADICTING, SHAPE, MeasuredLength, known_lengths
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.verification.tasks.length import LengthOptions, measure_length
 from lightpen.verification.tasks.task import Conditions
 

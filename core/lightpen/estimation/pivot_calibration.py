@@ -24,8 +24,8 @@ from lightpen.estimation.pivot.pose_conventions import (
     require_usual_reading,
 )
 from lightpen.estimation.statistics.correlation import correlated_covariance
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.messages import Message, message
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 LARGEST_MINORITY = 0.4  # of the poses; with more the tip is ambiguous
 MANY_LEFT_OUT = 0.1  # of the poses

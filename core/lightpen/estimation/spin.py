@@ -21,13 +21,13 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.posture import UPRIGHT_AXIS
 
 MIN_POSES = 10
 MIN_TURN = np.radians(40.0)  # with less, the tilt of the hand hides the axis
 TURN_NOISE = np.radians(1.0)  # bias of a measured turn
 MAX_UNCERTAINTY = np.radians(2.0)  # puts the surface of a 10 mm ball 0.003 mm off
-COVERAGE_FACTOR = 2.0
 MOST_ALIKE = 0.98  # lag-1 autocorrelation that can be distinguished from a drift
 TINY = 1e-30
 

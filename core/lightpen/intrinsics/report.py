@@ -18,7 +18,7 @@ from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.variance_components import MixedFit
 from lightpen.intrinsics.views import BoardTolerances
 from lightpen.model.camera import Camera
-from lightpen.model.decision_rules import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
 
 COLUMNS, ROWS = 4, 3

@@ -7,7 +7,7 @@ import numpy as np
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
 from lightpen.messages import printable
-from lightpen.model.decision_rules import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 PIXEL = 1.0  # length of a screen that its pixel pitch measures
 LARGEST_U = 0.05  # of the length

@@ -12,9 +12,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.features import AXIS, PLACE
 from lightpen.measuring.quantities import Quantity, derive, stacked
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import (
     nearest_rotation,
     rotation_from_vector,

@@ -28,9 +28,9 @@ from lightpen.measuring.plan import Nominal, PlannedCharacteristic
 from lightpen.measuring.quantities import Quantity, derive
 from lightpen.measuring.surfaces import RADIAL, FeatureKind
 from lightpen.measuring.zones import Criterion, fit_zone
+from lightpen.model.expanded_uncertainty import COVERAGE
 
 N_DRAWS = 4000
-COVERAGE = 0.9545  # that k = 2 has of a normal distribution
 PARALLEL = 5.0  # degrees, between axes that are meant to be parallel
 COORDINATES = {Of.X: 0, Of.Y: 1, Of.Z: 2}
 AXIAL = {FeatureKind.LINE, FeatureKind.CYLINDER, FeatureKind.CONE}

@@ -22,12 +22,12 @@ import numpy as np
 from msgspec import structs
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.compensation import surface_of
 from lightpen.measuring.features import fit_feature
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.measuring.touches import PartTouches
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.quantiles import chi_square_quantile
 
 BY_CHANCE = 0.005  # probability of a larger deviation from a known form

@@ -14,13 +14,13 @@ import numpy as np
 
 from lightpen import __version__
 from lightpen.arrays import FloatArray
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.characteristics import Measured
 from lightpen.measuring.features import AXIS, PLACE
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
 from lightpen.measuring.quantities import derive
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 NAMESPACE = "http://qifstandards.org/xsd/qif3"
 VERSION = "3.0.0"

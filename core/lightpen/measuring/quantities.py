@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.measuring.features import Feature
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 STEP = float(np.finfo(float).eps ** (1 / 3))  # of central differences
 

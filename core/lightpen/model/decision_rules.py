@@ -22,7 +22,8 @@ References
 from enum import StrEnum
 from math import inf
 
-COVERAGE_FACTOR = 2.0
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+
 GUARD_FACTOR = 1.65  # one-sided 95 % of a normal distribution
 USUAL_RISK = 0.05
 

@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
 from lightpen.estimation.statistics.workers import local_workers
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.record.swings.solving import Solution
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text

@@ -9,8 +9,8 @@ from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.reports.methods import result_of
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.model.camera import Camera
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rig import Rig
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.failed_swing import FailedSwing

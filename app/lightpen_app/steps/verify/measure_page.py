@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.drift import DRIFT

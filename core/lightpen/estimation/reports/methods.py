@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 Method: TypeAlias = Literal["joint", "two-stage"]
 METHODS: tuple[Method, ...] = ("joint", "two-stage")

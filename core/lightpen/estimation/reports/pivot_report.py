@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry, plain, record_heading
 from lightpen.local_time import local_now
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 
 def pivot_record(

@@ -42,7 +42,7 @@ from lightpen.estimation.reports.calibration_record import (
 from lightpen.estimation.reports.methods import METHODS, Method, result_of
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
+from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.estimation.uncertainty.distance import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.estimation.uncertainty.second_cone import SecondCone
@@ -51,6 +51,7 @@ from lightpen.formats.json_records import THIS_PROGRAM, file_entry, plain
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import SwingLimits
 
 

@@ -9,7 +9,7 @@ from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCal
 from lightpen.estimation.reports.methods import METHODS, Method, MethodResult, result_of
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import Verdict
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.origin import Origin
 
 MAX_NAMED = 5  # images

@@ -58,9 +58,9 @@ from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.quantiles import chi_square_quantile
 
-COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
 BY_CHANCE = 0.01  # probability that independent noise scatters blocks as much

@@ -34,7 +34,6 @@ from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import (
-    COVERAGE_FACTOR,
     IMAGES_SHRINK,
     POSTURES,
     ContributionName,
@@ -42,6 +41,7 @@ from lightpen.estimation.uncertainty.budget import (
     contributions_of,
 )
 from lightpen.model.assumptions import Assumptions
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig

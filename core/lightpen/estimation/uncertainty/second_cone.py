@@ -18,8 +18,9 @@ from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.contact.camera_motion import pose_steadily, without_field
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.contact.single_images import require_fit
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, Budget
+from lightpen.estimation.uncertainty.budget import Budget
 from lightpen.model.camera import Camera
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 

@@ -17,9 +17,10 @@ from lightpen.estimation.reports.calibration_record import (
     InstrumentRecord,
 )
 from lightpen.estimation.running_tip import RunningTip, fit_running_tip
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR, ContributionName
+from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.model.camera import Camera, lens_model_of
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.pen import Pen
 from lightpen.model.posture import directions_of, tilts_of
 

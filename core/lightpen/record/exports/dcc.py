@@ -15,8 +15,8 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from lightpen.estimation.reports.verdict import AXES
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.local_time import local_now
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.decision_rule import decision_rule

@@ -25,9 +25,9 @@ from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.camera_motion import steadied
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.quantiles import normal_quantile

@@ -19,9 +19,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.messages import message
 from lightpen.model.camera import Camera
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.quantiles import normal_quantile
 from lightpen.model.rigid import skew
 from lightpen.record.calibrations.calibrations import CalibrationFile

@@ -21,9 +21,9 @@ from lightpen.estimation.bundle.effects import cone_moves
 from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.joint import JointFit
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.quantiles import chi_square_quantile
 from lightpen.verification.history.led_file import fit_held
 from lightpen.verification.tasks.assessment import (

@@ -19,9 +19,9 @@ from lightpen.detection.fixed_lamps import lamps_among, masked_lights, other_lig
 from lightpen.detection.observations import Observations
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.messages import message
 from lightpen.model.camera import Camera
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,

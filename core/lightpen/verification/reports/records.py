@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.formats.json_records import plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.messages import Message
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.history.pen_health import Growth, PenHealth
 from lightpen.verification.tasks.assessment import VerificationAssessment

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.verification.history.led_file import ImprovedPen
 from lightpen.verification.history.pen_health import PenHealth
 from lightpen.verification.history.press_test import PressTest

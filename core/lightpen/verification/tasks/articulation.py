@@ -24,6 +24,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
 from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.posture import angles_between
 from lightpen.verification.tasks.assessment import (
@@ -71,7 +72,6 @@ from lightpen.verification.tasks.tip_evidence import (
 
 N_POSTURES, N_TOUCHES = 5, 5
 ASTRAY = 8.0  # times the median distance from the middle of all
-COVERAGE = 0.9545  # that k = 2 has of a normal distribution
 UNUSUAL = 0.001  # chance that a correct tip shows more
 N_TRIALS = 1000
 TINY = 1e-12  # mm

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
-from lightpen.model.decision_rules import COVERAGE_FACTOR, Decision
+from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.quantiles import normal_quantile
 

@@ -16,10 +16,10 @@ from msgspec import Meta
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import in_deviations
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.quantiles import chi_quantile, chi_square_quantile
 from lightpen.verification.tasks.assessment import (

@@ -21,9 +21,9 @@ from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
     CHECK_FILES,

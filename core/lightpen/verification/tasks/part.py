@@ -13,7 +13,6 @@ from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.uncertainty.budget import COVERAGE_FACTOR
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.known_forms import Refinement, refine
 from lightpen.measuring.part import MeasuredPart, measure_part
@@ -26,6 +25,7 @@ from lightpen.measuring.report import (
 from lightpen.measuring.surfaces import NAMES
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.tasks.assessment import (
     VerificationAssessment,

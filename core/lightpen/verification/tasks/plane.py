@@ -26,6 +26,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
 from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
     CALIBRATE_AGAIN,
@@ -81,7 +82,6 @@ THIN = 0.2  # of the extent along: less across is a line
 NEW_PLACE = 5.0  # mm
 MAX_FORM = 0.1  # of the extent: what is rougher is no plate
 N_SAMPLES = 500  # of three points each
-COVERAGE = 0.9545  # that k = 2 has of a normal distribution
 
 # The plate of the simulated operator, from the bottom of its cone, mm
 SIMULATED_CENTER = np.array([0.0, -40.0, 0.0])

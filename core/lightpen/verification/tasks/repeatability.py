@@ -16,7 +16,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
-from lightpen.model.decision_rules import COVERAGE_FACTOR, Decision
+from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.quantiles import normal_quantile
 from lightpen.verification.tasks.assessment import (
