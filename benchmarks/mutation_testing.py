@@ -404,14 +404,17 @@ def read_calls(place: Path) -> Calls:
     return Calls(keys, seconds)
 
 
-def is_noticed(mutant: Mutant, calls: Calls, seconds: float) -> bool:
-    """Return whether a test fails, or hangs, with a fault."""
+def is_noticed(
+    mutant: Mutant, calls: Calls, seconds: float, *, has_fault: bool = True
+) -> bool:
+    """Return whether a test fails, or hangs, with a fault, or without as a control."""
     tests = calls.tests_for(mutant, seconds)
     if not tests:
         return False
 
     def run() -> int:
-        sys.meta_path.insert(0, FaultyImport(mutant))
+        if has_fault:
+            sys.meta_path.insert(0, FaultyImport(mutant))
         return run_tests(tests, "-x")
 
     status = in_child(run, 3 * seconds + 20)
@@ -441,6 +444,11 @@ def main() -> None:
         type=Path,
         metavar="FILE",
         help="only those that FILE, printed by an earlier run, lists",
+    )
+    parser.add_argument(
+        "--control",
+        action="store_true",
+        help="run the tests without the faults: all mutants should survive",
     )
     options = parser.parse_args()
     os.chdir(ROOT)
@@ -472,7 +480,7 @@ def main() -> None:
     n_survivors: Counter[str] = Counter()
     for n_tried, mutant in enumerate(mutants, 1):
         package = mutant.file.split("/")[1]
-        if is_noticed(mutant, calls, options.seconds):
+        if is_noticed(mutant, calls, options.seconds, has_fault=not options.control):
             continue
         n_survivors[package] += 1
         print(f"{n_tried}: {description(mutant)}", flush=True)

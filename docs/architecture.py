@@ -139,9 +139,10 @@ def main() -> None:
     parser.add_argument(
         "--write", action="store_true", help="renew docs/architecture.md"
     )
+    options = parser.parse_args()
     measured = measure()
     print(table(measured))
-    if parser.parse_args().write:
+    if options.write:
         PAGE.write_text(
             page(PAGE.read_text(encoding="utf-8"), measured), encoding="utf-8"
         )

@@ -11,10 +11,10 @@ SECRET = "geheim ä 密"
 # Reads it as the program does for an address that names the keyring.
 KEEP_PASSWORD = f"""
 import compiled_modules; compiled_modules.install()
-import keyring; from lightpen.archive.replication.server import _url
+import keyring; from lightpen.archive.replication.server import server_url
 place = "lightpen-trial", "hall_2"
 keyring.set_password(*place, {SECRET!a})
-read = _url("postgresql://hall_2@server/archive?keyring=lightpen-trial").password
+read = server_url("postgresql://hall_2@server/archive?keyring=lightpen-trial").password
 keyring.delete_password(*place)
 print(keyring.get_keyring().name, read == {SECRET!a}, keyring.get_password(*place))
 """

@@ -62,9 +62,9 @@ class Settings(QObject):
     """The settings; missing and invalid values give the default."""
 
     # The `Message` why something is not, or not surely, remembered.
-    troubled = Signal(object)
-    # The `Message` of `troubled` whose cause is gone: they could be written again.
-    relieved = Signal(object)
+    failed = Signal(object)
+    # The `Message` of `failed` whose cause is gone: they could be written again.
+    recovered = Signal(object)
     _written = Signal(object, bool)
 
     def __init__(self, file: Path, parent: QObject | None = None) -> None:
@@ -245,9 +245,9 @@ class Settings(QObject):
         if not is_written:
             QTimer.singleShot(AGAIN_MS, self._write_soon)
         if before is not None and before != fault:
-            self.relieved.emit(before)
+            self.recovered.emit(before)
         if fault is not None and before != fault:
-            self.troubled.emit(fault)
+            self.failed.emit(fault)
 
     def _taken_changes(self, unwritten: Changes) -> Changes:
         """Return the entries to write next; empty without changes."""

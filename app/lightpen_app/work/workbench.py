@@ -90,13 +90,13 @@ class Workbench(QObject):
         self.measuring.changed.connect(self._stream_points)
         for each in probing:
             each.files_changed.connect(self.archive_writer.enter_owed)
-        settings.troubled.connect(self._on_settings_troubled)
-        settings.relieved.connect(self._on_settings_relieved)
+        settings.failed.connect(self._on_settings_failed)
+        settings.recovered.connect(self._on_settings_recovered)
 
     def start(self) -> None:
         """Restore the last selection and open the camera."""
         if self.settings.fault is not None:
-            self._on_settings_troubled(self.settings.fault)
+            self._on_settings_failed(self.settings.fault)
         folder = self.folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
         self._look_for_update()
@@ -180,7 +180,7 @@ class Workbench(QObject):
         if stream.is_heard and status.setup is not None and status.state is not None:
             stream.set_points(points_of(status.setup, status.state))
 
-    def _on_settings_troubled(self, why: Message) -> None:
+    def _on_settings_failed(self, why: Message) -> None:
         self.notifications.notify(SETTINGS, worded(why))
 
     def _look_for_update(self) -> None:
@@ -197,5 +197,5 @@ class Workbench(QObject):
             )
             self.notifications.notify(UPDATE, worded(newest), Tone.GOOD)
 
-    def _on_settings_relieved(self) -> None:
+    def _on_settings_recovered(self) -> None:
         self.notifications.withdraw(SETTINGS)

@@ -210,7 +210,7 @@ def test_a_file_damaged_meanwhile_costs_nothing_that_is_known(
     assert settings.await_saved(TIMEOUT)
     settings.file.write_bytes(b"{")
 
-    with qtbot.waitSignal(settings.troubled) as reported:
+    with qtbot.waitSignal(settings.failed) as reported:
         settings.set_last_station("Hall 3")
 
     assert ". Restore them from a copy, or enter the settings again." in str(
@@ -226,7 +226,7 @@ def test_a_pipe_in_place_of_the_file_is_reported_and_waited_for_by_nobody(
     os.mkfifo(settings.file)
 
     again = Settings(settings.file)
-    with qtbot.waitSignal(again.troubled):
+    with qtbot.waitSignal(again.failed):
         again.set_last_station("Hall 3")
 
     assert "is a pipe or a device" in str(again.fault)
@@ -261,7 +261,7 @@ def test_a_stopped_program_that_holds_the_settings_keeps_nobody_from_saving(
         assert holder.stdout.readline() == b"held\n"
         holder.send_signal(signal.SIGSTOP)
 
-        with qtbot.waitSignal(settings.troubled) as reported:
+        with qtbot.waitSignal(settings.failed) as reported:
             settings.set_station("Hall 3", STATION)
             is_waited_for = settings.file.exists()
 
@@ -321,7 +321,7 @@ def test_settings_that_cannot_be_saved_are_reported_and_saved_when_they_can_be(
     (tmp_path / "file").write_text("not a folder")
     settings = Settings(tmp_path / "file" / "lightpen.json")
 
-    with qtbot.waitSignal(settings.troubled) as reported:
+    with qtbot.waitSignal(settings.failed) as reported:
         settings.set_preferences(PREFERENCES)
     assert re.search(r"Settings not saved: .*lightpen\.json", str(reported.args[0]))
 
@@ -337,14 +337,14 @@ def test_what_could_not_be_saved_is_tried_again_and_taken_back(
     (tmp_path / "file").write_text("not a folder")
     settings = Settings(tmp_path / "file" / "lightpen.json")
     reported: list[object] = []
-    settings.troubled.connect(reported.append)
-    with qtbot.waitSignal(settings.troubled):
+    settings.failed.connect(reported.append)
+    with qtbot.waitSignal(settings.failed):
         settings.set_preferences(PREFERENCES)
 
-    with qtbot.waitSignal(settings.relieved) as relieved:
+    with qtbot.waitSignal(settings.recovered) as withdrawn:
         (tmp_path / "file").unlink()
 
-    assert relieved.args == reported
+    assert withdrawn.args == reported
     assert reopened(settings).preferences() == PREFERENCES
 
 

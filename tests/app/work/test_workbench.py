@@ -297,10 +297,10 @@ def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
     stage.start_again()
     assert stage.sentences
 
-    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
+    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as withdrawn:
         stage.choose(pen_file=chosen.pen_file)
 
-    assert relieved.args == stage.sentences[-1:]
+    assert withdrawn.args == stage.sentences[-1:]
 
 
 def test_choices_that_cannot_be_saved_are_reported_and_in_force_all_the_same(
@@ -577,12 +577,12 @@ def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
     (reported,) = (each for each in stage.sentences if "lost.json" in each)
     found = sample_files(stage.workbench.around, stage.folder / "rig").rig_file
     assert found is not None
-    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
+    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as withdrawn:
         stage.workbench.selection.set_preparation(
             stage.workbench.selection.preparation.with_rig(found)
         )
 
-    assert relieved.args == [reported]
+    assert withdrawn.args == [reported]
 
 
 def test_what_could_not_be_saved_is_taken_back_in_the_language_it_was_reported_in(
@@ -597,7 +597,7 @@ def test_what_could_not_be_saved_is_taken_back_in_the_language_it_was_reported_i
     LanguageSwitch(qapp).set_language("zh_CN")
     config.unlink()
 
-    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as relieved:
+    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as withdrawn:
         stage.choose(names=replace(OTHER, operator="Eve"))
 
-    assert relieved.args == stage.sentences
+    assert withdrawn.args == stage.sentences

@@ -78,10 +78,10 @@ class InterruptedControl(QObject):
         panel.close_requested.connect(self._on_close_requested)
         workbench.run.open_requested.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
-        workbench.run.refused.connect(self._on_run_troubled)
+        workbench.run.refused.connect(self._on_run_refused)
         for probing in (workbench.verification, workbench.measuring):
             probing.changed.connect(self._on_verification_changed)
-            probing.refused.connect(self._on_verification_troubled)
+            probing.refused.connect(self._on_verification_refused)
 
     def search(self) -> None:
         """Search for interrupted swings and verifications in the background."""
@@ -246,7 +246,7 @@ class InterruptedControl(QObject):
             self._resumed = None
             self.step_requested.emit("swing")
 
-    def _on_run_troubled(self) -> None:
+    def _on_run_refused(self) -> None:
         self._resumed = self._reviewed = None
 
     def _on_discard_requested(self, folder: Path) -> None:
@@ -300,7 +300,7 @@ class InterruptedControl(QObject):
                 self._panel.set_waiting("")
                 self.step_requested.emit(key)
 
-    def _on_verification_troubled(self) -> None:
+    def _on_verification_refused(self) -> None:
         if self._continued is not None:
             self._continued = None
             self._panel.set_waiting("")

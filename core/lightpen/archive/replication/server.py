@@ -42,7 +42,7 @@ def open_server(address: str) -> Database:
     ``?sslrootcert=FILE&passfile=FILE``. ``keyring=SERVICE`` names the service under
     which the system keyring has the password of the user.
     """
-    url = _url(address)
+    url = server_url(address)
     try:
         engine = create_engine(url, connect_args=dict(_CALLING))
         event.listen(engine, "connect", _ask_to_notice)
@@ -55,7 +55,11 @@ def open_server(address: str) -> Database:
     return update_tables(database)
 
 
-def _url(address: str) -> URL:
+def server_url(address: str) -> URL:
+    """Return the URL of the driver for an address of `open_server`, with the password.
+
+    Raises `ArchiveError` for an address that is none of PostgreSQL.
+    """
     try:
         url = make_url(address)
         if url.get_backend_name() != "postgresql":

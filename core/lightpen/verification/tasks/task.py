@@ -1,7 +1,9 @@
 """Verification tasks: the definition for command line, session and window.
 
 A module of this package makes one `VerificationTask`; `lightpen.verification.tasks.
-registry` lists them. Nothing else switches on the kind of a task.
+registry` lists them. Two tasks are treated apart by other modules: the drift check, as
+the session visits its point between the other tasks, and the part, which has a step of
+the window to itself. Nothing else switches on the kind of a task.
 """
 
 from collections.abc import Callable, Sequence

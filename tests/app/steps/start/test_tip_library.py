@@ -277,9 +277,9 @@ def test_a_retired_tip_is_no_choice_and_typed_it_leads_no_further(desk: Desk) ->
 
 @pytest.mark.slow
 def test_a_damaged_library_is_reported_until_it_is_mended(desk: Desk) -> None:
-    reported, relieved = list[str](), list[str]()
+    reported, withdrawn = list[str](), list[str]()
     desk.workbench.notifications.raised.connect(lambda text, _: reported.append(text))
-    desk.workbench.notifications.withdrawn.connect(relieved.append)
+    desk.workbench.notifications.withdrawn.connect(withdrawn.append)
     desk.add(TIP)
     (file,) = library_files(desk.data)
     sound = file.read_bytes()
@@ -291,7 +291,7 @@ def test_a_damaged_library_is_reported_until_it_is_mended(desk: Desk) -> None:
     file.write_bytes(sound)
     desk.workbench.library.refresh()
     desk.settle()
-    assert relieved == reported[-1:]
+    assert withdrawn == reported[-1:]
 
 
 # The dialog
