@@ -13,7 +13,6 @@ PAGES = sorted(
     for pattern in ("*.md", "docs/*.md", "installer/*.md", "resources/**/*.md")
     for path in ROOT.glob(pattern)
 )
-HELP = ROOT / "resources" / "lightpen_resources" / "help"
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)")
 
 
@@ -28,8 +27,6 @@ def anchors(page: Path) -> set[str]:
 def test_every_link_leads_to_a_file_and_to_a_heading(page: Path) -> None:
     for place, anchor in LINK.findall(page.read_text("utf-8")):
         linked = page.parent / place if place else page
-        if page.parent.parent == HELP and not linked.exists():
-            linked = HELP / "en" / place  # as the help window does
         assert linked.exists(), place
         if anchor:
             assert anchor in anchors(linked), f"{place}#{anchor}"
