@@ -77,6 +77,19 @@ def test_the_same_images_count_once(
     assert (sigmas(twice) < 0.9 * own).any()
 
 
+@pytest.mark.parametrize("is_camera", [True, False])
+def test_either_file_tells_that_the_images_are_its_own(
+    files: tuple[Camera, Pen], calibrated: Callable[..., Calibration], is_camera: bool
+) -> None:
+    camera, pen = files
+    if is_camera:
+        pen = replace(pen, found=None)
+    else:
+        camera = replace(camera, found=None)
+
+    assert warned(calibrated(camera, pen, STATION.pixels))
+
+
 def test_a_part_of_the_images_is_recognised_and_other_images_are_not(
     files: tuple[Camera, Pen], calibrated: Callable[..., Calibration]
 ) -> None:

@@ -272,6 +272,9 @@ def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
     assert verdict.reason.code == Code.LED_DISPLACED
     assert verdict.reason.values["led"] == 9
     assert verdict.reason.values["distance"] == pytest.approx(3.0, abs=0.05)
+    with_another = replace(calibration.leds, displaced=(2, 9))
+    other = judge(replace(calibration, leds=with_another), SwingLimits())
+    assert other.reason.values["led"] == 9  # the one that is farther off
     doubts = [each for each in warnings_of(calibration) if "LED 9 is " in each.text()]
     assert len(doubts) == 1
     assert repeats(doubts[0], verdict.reason)  # it is not reported twice
