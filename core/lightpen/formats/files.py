@@ -188,7 +188,7 @@ def sha256(path: Path) -> str:
 
 def start_sha256(path: Path, n_bytes: int | None) -> str:
     """Return the digest of the first bytes of a file; of all if None; as `sha256`."""
-    import hashlib  # 3 ms that a start of the program need not take
+    import hashlib  # imported here: it takes 3 ms
 
     digest = hashlib.sha256()
     try:

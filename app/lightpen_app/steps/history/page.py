@@ -77,7 +77,7 @@ class HistoryPage(Page):
         self.changed.emit()
 
     def _make_content(self) -> "HistoryContent":
-        # With the archive, a quarter of a second that the start need not take.
+        # Imported here: with the archive it takes 0.25 s.
         from lightpen_app.steps.history.content import HistoryContent
 
         content = HistoryContent(self._workbench)

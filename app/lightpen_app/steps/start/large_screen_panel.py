@@ -43,7 +43,7 @@ class LargeScreenPanel(QWidget):
         logbook = self._logbook
 
         def read(_: Report) -> "Trend":
-            # With the archive, a quarter of a second that the start need not take.
+            # Imported here: with the archive it takes 0.25 s.
             from lightpen.archive.history.queries import EntryFilter
             from lightpen.verification.history.trend import trend_of
 
