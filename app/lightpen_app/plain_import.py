@@ -1,10 +1,10 @@
-"""Python's own import instead of that of PySide."""
+"""Python's own import in place of PySide's hook."""
 
 import builtins
 
 
 def use_plain_import() -> None:
-    """Take back what PySide does after each import.
+    """Remove PySide's hook from the import function.
 
     It reads the source of the module for the sake of `__feature__`, which is not used
     here; that is a fifth of the time of all imports.

@@ -71,7 +71,7 @@ class _Recording:
 
 
 class DiscoveryRun(QObject):
-    """Records and solves a swing of a pen of which nothing is known."""
+    """Records and solves a swing of an unknown pen."""
 
     changed = Signal()  # `state` is different
     found_changed = Signal()  # the result has changed

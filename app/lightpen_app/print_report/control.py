@@ -50,7 +50,7 @@ class ReportContent:
 
 
 def read_calibration_file(file: Path) -> ReportContent:
-    """Read what a report contains.
+    """Read the content of the report of a calibration.
 
     Raises `FileError` if the calibration is not the one that was entered, `UsageError`
     if the file holds none, or not all that is put on paper.
@@ -72,7 +72,7 @@ class KeptVerification(NamedTuple):
 
 
 def read_kept_verification(path: Path) -> KeptVerification:
-    """Read what the report of a verification, as it was entered, contains."""
+    """Read the content of the report of an archived verification."""
     file = with_content(path)
     done = read_verification(file.content or b"", path)
     data = data_folder_of_verification(path)
@@ -100,7 +100,7 @@ class PrintReportControl(QObject):
         self._reading = LatestJob(self)
 
     def show(self, find: Callable[[], Path]) -> None:
-        """Show the record on paper of the file that a function finds on the disk."""
+        """Show the report of the file that a function finds on the disk."""
         self._read(lambda: read_calibration_file(find()), self._show)
 
     def show_verification(self, path: Path) -> None:

@@ -196,7 +196,7 @@ def file_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
 def input_blocks(
     files: Sequence[tuple[str, str, str]], n_observations: int
 ) -> Iterable[Block]:
-    """Return what each file is, its name and hash; of the images how many there are."""
+    """Return kind, name and hash of each file, and the number of images."""
     yield heading(translate("paper", "Input files"))
     yield from table(
         [

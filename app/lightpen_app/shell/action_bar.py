@@ -95,7 +95,7 @@ class ActionBar(Translated, QFrame):
         self._status.setVisible(bool(self._visible_status()))
 
     def set_room(self, room: SizeClass) -> None:
-        """Take less of a window that has little."""
+        """Use less space in a small window."""
         self.setMinimumHeight(LOW_HEIGHT if room.is_low else HEIGHT)
         side = room.margin
         self._layout.setContentsMargins(side, GRID, side, GRID)
@@ -126,7 +126,7 @@ class ActionBar(Translated, QFrame):
 
 
 class _MainButton(PushButton):
-    """A double click is one: the second is of what another page has by then."""
+    """Treats a double click as one: the second could press another page's button."""
 
     @override
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

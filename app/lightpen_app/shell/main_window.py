@@ -240,7 +240,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return self._sidebar.steps()
 
     def words(self) -> tuple[str, ...]:
-        """Return the texts of the window without those of the page."""
+        """Return the texts of the window outside the page."""
         texts = (
             self._sidebar.subject(),
             *self._area.words(),
@@ -491,7 +491,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self.page().run_main_action()
 
     def _on_advance_pressed(self) -> None:
-        """Do as a presenter's remote asks, unless someone must be at the screen."""
+        """Obey a presenter's remote, unless someone must be at the screen."""
         if self.page().main_action().at_screen:
             words = self.tr("Press this button at the computer.")
             self._action_bar.set_status(

@@ -131,7 +131,7 @@ class PageArea(QFrame):
         self._stack.addWidget(page)
 
     def show_page(self, page: QWidget) -> None:
-        """Show a page; only that one may ask for room."""
+        """Show a page; only that one contributes to the size of the window."""
         before = self._stack.currentWidget()
         if before is not None:
             _let_ask(before, False)
@@ -159,7 +159,7 @@ class PageArea(QFrame):
 
 
 def _let_ask(page: QWidget, asks: bool) -> None:
-    """Have a page ask for room, or not."""
+    """Let a page contribute to the size of the window, or ignore its size."""
     policy = QSizePolicy.Policy
     wish = policy.Preferred if asks else policy.Ignored
     page.setSizePolicy(wish, wish)

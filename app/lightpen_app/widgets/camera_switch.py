@@ -11,7 +11,7 @@ N_CAMERAS = 2
 
 
 class CameraSwitch(Translated, QWidget):
-    """A button for each camera, of which one is pressed."""
+    """A button for each camera; one is pressed."""
 
     value_changed = Signal(int)  # index of the camera to show
 

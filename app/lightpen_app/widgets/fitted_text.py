@@ -14,7 +14,7 @@ WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
 class FittedText(QWidget):
-    """Words that shrink only where they would not fit.
+    """Text that shrinks only where it would not fit.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class FittedText(QWidget):
         self._ask_room()
 
     def _ask_room(self) -> None:
-        """Ask for so much height that no words are smaller than can be read."""
+        """Request the height of the minimum font size."""
         if not self._least or not self.width():
             return
         metrics = QFontMetricsF(font(self._least, bold=self._bold))

@@ -81,7 +81,7 @@ class ImageView(Translated, QWidget):
     def set_half(
         self, half: Image, size: QSize, markers: Sequence[Marker] = ()
     ) -> None:
-        """Show an image that is `pooled` already; ``size`` is that of the whole."""
+        """Show an image already `pooled`; ``size`` is the size of the whole image."""
         self._show(half, size, tuple(markers))
 
     def clear(self) -> None:

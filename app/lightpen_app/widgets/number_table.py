@@ -105,7 +105,7 @@ class NumberTable(QTableWidget):
         ]
 
     def _share_width(self) -> None:
-        """Make the columns equally wide, where there is little room as they need."""
+        """Make the columns equally wide, or as needed where there is little room."""
         heads, needed = self.horizontalHeader(), self._needed()
         spare = self.viewport().width() - sum(needed)
         is_short = self.viewport().width() < len(needed) * max(needed, default=0)

@@ -144,7 +144,7 @@ class OperatorView(Translated, QWidget):
         return letters_for(self._distance_m, _dots_per_inch(self.screen()))
 
     def open_beside(self, window: QWidget) -> None:
-        """Fill a screen other than that of the given window, if there is one."""
+        """Fill a screen other than the one of the given window, if there is one."""
         other = other_screen(window.screen(), QGuiApplication.screens())
         self.setScreen(other)
         self.setGeometry(QRect(other.geometry()))

@@ -178,7 +178,7 @@ class PostureDial(Translated, QWidget):
         self._draw_turn(painter, bar, colors)
 
     def _drawn_ground(self, colors: Colors) -> QPixmap:
-        """Return camera and fields, of which only those that changed are drawn anew."""
+        """Return a picture of camera and fields; only changed ones are drawn anew."""
         value, scale = self._value, self.devicePixelRatio()
         legend = self.tr("images\nneeded") if value.n_full < value.n_fields else ""
         shows = (

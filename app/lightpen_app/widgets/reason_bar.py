@@ -130,7 +130,7 @@ class ReasonBar(AskingBar):
         give_focus(self._edit)
 
     def refuse(self) -> None:
-        """Ask once more where the answer did not do; all but the password stays."""
+        """Ask once more after an insufficient answer; all but the password stays."""
         if not self._is_given:
             return
         self._is_given = False

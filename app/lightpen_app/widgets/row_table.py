@@ -30,7 +30,7 @@ class TitledModel(QAbstractTableModel):
         raise NotImplementedError
 
     def side(self, column: int) -> Qt.AlignmentFlag | None:
-        """Return the horizontal alignment of a title; None for that of the view."""
+        """Return the horizontal alignment of a title; None for the view's."""
 
     def hint(self, column: int) -> str | None:
         """Return the tool tip of a title, if it has one."""

@@ -119,7 +119,7 @@ class StateBanner(QWidget):
         self._ask_room()
 
     def _ask_room(self) -> None:
-        """Ask for so much height that a long sentence is not too small to read."""
+        """Request the height at which a long sentence has the minimum font size."""
         beside = 1.1 * self._word_size + max(0.33 * self._word_size, 2 * GRID)
         width = self.width() - 4 * GRID - ceil(beside)
         metrics = QFontMetricsF(font(TextSize.SMALL))

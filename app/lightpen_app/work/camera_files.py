@@ -63,7 +63,7 @@ class FilesOfCameras(QObject):
             self._keep(now, serials)
 
     def _keep(self, now: Preparation, serials: tuple[str, ...]) -> None:
-        """Store the files in use, unless they are those of another camera."""
+        """Store the files in use, unless they belong to another camera."""
         if len(serials) > 1:
             rig = "" if now.rig_file is None else str(now.rig_file.path)
             if rig:

@@ -126,7 +126,7 @@ class Job(QObject):
 
 
 class LatestJob(QObject):
-    """Runs one job at a time; of an earlier one nothing is reported any more."""
+    """Runs one job at a time; an earlier job reports nothing any more."""
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)

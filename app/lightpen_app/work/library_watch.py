@@ -75,11 +75,11 @@ class LibraryWatch(QObject):
 
     @property
     def library(self) -> Library:
-        """The library as it was read last."""
+        """The library as last read."""
         return self._statuses.library
 
     def set_rule(self, rule: DueRule) -> None:
-        """Let tips be due by another rule."""
+        """Set the calibration interval."""
         if rule != self._rule:
             self._rule = rule
             self.refresh()
@@ -103,7 +103,7 @@ class LibraryWatch(QObject):
             with suppress(ArchiveError):  # which the runner reports
                 opened = logbook.opened()
                 opened.enter_owed()
-                # A fifth of a second, which the start need not take.
+                # Imported here: it takes 0.2 s.
                 from lightpen.archive.logbook.tip_status import statuses
 
                 return statuses(opened.database, opened.chain, rule, library, now())

@@ -1,4 +1,4 @@
-"""Images and events from the threads of a camera to that of the GUI."""
+"""Images and events, passed from camera threads to the GUI thread."""
 
 from dataclasses import dataclass
 from threading import Lock
@@ -52,7 +52,7 @@ class Mailbox(QObject):
 
 
 class QueuedListener(QObject):
-    """Forwards events from the threads of a camera to that of the GUI.
+    """Forwards events from camera threads to the GUI thread.
 
     Its public signals are emitted on the thread of the GUI, so that blocking them
     there is enough to receive none.
@@ -79,7 +79,7 @@ class QueuedListener(QObject):
     # On the threads of the camera
 
     def on_image(self, image: LiveImage) -> None:
-        """Leave an image for the GUI."""
+        """Put an image into the mailbox of the GUI."""
         if image.camera != self.camera:
             return
         pixels = image.frame.image

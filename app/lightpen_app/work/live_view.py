@@ -290,7 +290,7 @@ class LiveView(QObject):
             self._operator.seat()
 
     def configure(self, settings: CameraSettings) -> None:
-        """Ask the camera for other settings, for which it stops for a moment."""
+        """Request other settings; the camera stops briefly to apply them."""
         if self._live is not None:
             self._live.worker(self._chosen).configure(settings)
 

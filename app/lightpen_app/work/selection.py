@@ -106,7 +106,7 @@ class Selection(QObject):
         self._follow(before)
 
     def forget_unread(self) -> None:
-        """Know that no file of the station is still to be read."""
+        """Note that no file of the station is still to be read."""
         self._unread = FilePaths()
 
     def set_choices(self, choices: VerificationChoices) -> None:

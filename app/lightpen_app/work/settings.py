@@ -162,7 +162,7 @@ class Settings(QObject):
         self._save("last", {"export folder": folder})
 
     def laboratory(self) -> Laboratory | None:
-        """Return the laboratory that was named last, or that of this computer."""
+        """Return the last named laboratory, by default that of the machine settings."""
         try:
             return in_shape(self._content["last"]["laboratory"], Laboratory)
         except (KeyError, DamagedError):

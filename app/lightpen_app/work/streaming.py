@@ -62,7 +62,7 @@ class Streaming(QObject):
         self._follow()
 
     def choose(self, preparation: Preparation) -> None:
-        """Know which pen and tip are chosen, and with which files."""
+        """Set the selected pen and tip, and their files."""
         is_same = _what_counts(preparation) == _what_counts(self._preparation)
         self._preparation = preparation
         if not is_same:

@@ -160,7 +160,7 @@ def _quietly(act: Callable[[], object]) -> None:
 
 
 def _harvester(producer: str) -> Any:
-    """Return a harvester with the producer, or with those of the system.
+    """Return a harvester with the given producer, or with all of the system.
 
     Raises `DeviceNotFound` if there is no producer, or none of them loads.
     """

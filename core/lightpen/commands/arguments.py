@@ -92,7 +92,7 @@ def add_data(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
 
 
 def data_of(options: argparse.Namespace) -> Path:
-    """Return the data folder that was chosen, or that of the program."""
+    """Return the chosen data folder, by default that of the program."""
     folder: Path = options.data_folder() if options.data is None else options.data
     return folder
 
@@ -224,5 +224,5 @@ def limits_by(options: argparse.Namespace) -> VerificationLimits:
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add where the record is written."""
+    """Add the option for the file of the record."""
     add_file(parser, "--json", "FILE", "write the record as JSON")

@@ -337,7 +337,7 @@ def _require_one_each(
 
 
 def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
-    """Refuse folders that are called as the cameras, but in another order."""
+    """Refuse folders that are named like the cameras, but in another order."""
     folders = [Path(place).name.casefold() for place in places]
     cameras = [name.casefold() for name in names]
     if folders != cameras and sorted(folders) == sorted(cameras):

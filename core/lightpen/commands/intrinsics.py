@@ -185,7 +185,7 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
 
 
 def _board(options: argparse.Namespace) -> tuple[Board, BoardTolerances]:
-    """Return the board in mm, as far as it was measured, and its tolerances."""
+    """Return the board in mm, with its measured scale if any, and its tolerances."""
     board, scale = parse_board(options.board), options.scale_sigma
     check = None
     if options.measured:

@@ -90,7 +90,7 @@ class _Windows(NamedTuple):
     ln_sharpness: _Reals  # (N,), expected
 
     def of(self, chosen: BoolArray) -> "_Windows":
-        """Return those of some discs."""
+        """Return the windows of some discs."""
         return _Windows(*(getattr(self, name)[chosen] for name in self._fields))
 
 
@@ -215,7 +215,7 @@ def _cost(
     values: _Reals,
     model: _Model,
 ) -> _Reals:
-    """Return the weighted squares of residuals and of what priors hold, (N,)."""
+    """Return the weighted squared residuals of pixels and priors, (N,)."""
     squares = np.einsum("np,np->n", weights, model.residuals**2)
     off = (values[:, SHARPNESS] - ln_sharpness) / SHARPNESS_PRIOR
     slopes = slope_weight * (values[:, SLOPES] ** 2).sum(axis=1)
@@ -223,7 +223,7 @@ def _cost(
 
 
 def _correlated(pulls: FloatArray) -> float:
-    """Return by what variances grow as pixels beside each other err alike, as by JPEG.
+    """Return the factor on variances by noise correlated between pixels (JPEG).
 
     ``pulls`` (N, S, S) are those of the pixels at a coordinate of the centre.
     """
@@ -233,7 +233,7 @@ def _correlated(pulls: FloatArray) -> float:
 
 
 def _misshapen(values: FloatArray) -> FloatArray:
-    """Return by how much more than usual each shape differs from the median, (N,).
+    """Return the distance of each shape from the median beyond the usual, (N,).
 
     Light beside a disc distorts its shape and shifts its centre by about as much.
     """
@@ -295,7 +295,7 @@ def _model(windows: _Windows, values: _Reals) -> _Model:
 
 
 def _variances(windows: _Windows, model: _Model) -> _Reals:
-    """Return the variances of pixels by how far they usually are off the model."""
+    """Return the variances of pixels by their usual residuals."""
     light = np.maximum(model.light, 0)
     tops = np.minimum(light.max(axis=1, keepdims=True), windows.full)
     shown = windows.used & ~windows.clipped

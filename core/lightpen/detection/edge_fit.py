@@ -104,7 +104,7 @@ class _Ellipses(NamedTuple):
         return (sums + differences) / 2, np.abs(sums - differences) / 2
 
     def of(self, chosen: BoolArray) -> "_Ellipses":
-        """Return those of some discs."""
+        """Return the ellipses of some discs."""
         return _Ellipses(self.centers[chosen], self.roots[chosen])
 
 

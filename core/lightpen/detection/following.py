@@ -45,7 +45,7 @@ def follow_spots(
     translation: FloatArray,
     areas: FloatArray,
 ) -> Followed | None:
-    """Return labels and pose of an image by those of the image before.
+    """Return labels and pose of an image, given those of the image before.
 
     None where anything but small motion is seen.
 

@@ -320,7 +320,7 @@ def _advice(
 
 
 def _require_right_hand(spots: list[Spots], camera: Camera, pen: Pen) -> None:
-    """Refuse a mirrored pen, of which only the asymmetric LEDs are not found."""
+    """Refuse a mirrored pen; only its asymmetric LEDs are not found."""
     mirrored = diagnose_mirror(spots, camera, pen)
     if mirrored:
         raise CalibrationError(mirrored)

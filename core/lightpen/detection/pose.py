@@ -255,7 +255,7 @@ def start_poses(
 
 @dataclass(frozen=True, eq=False)
 class CameraReprojection:
-    """Those of discs in the images of a camera; radius 0 means projected centres."""
+    """Reprojection errors of discs in one camera; radius 0: of projected centres."""
 
     camera: Camera
     leds: FloatArray

@@ -76,7 +76,7 @@ class DiscMoments(NamedTuple):
 
 
 def is_ellipse(moments: DiscMoments, relative_noise: float) -> bool:
-    """Return whether sampling, blur and noise explain how a region is no ellipse."""
+    """Return whether sampling, blur and noise explain the deviation from an ellipse."""
     radius = moments.radius
     _, minor = moments.axes
     loss = ROUNDNESS_LOSS + ROUNDNESS_LOSS_BY_BLUR * (moments.edge_width / minor) ** 2

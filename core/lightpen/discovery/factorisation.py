@@ -99,7 +99,7 @@ def _metric_upgrade(a: FloatArray, b: FloatArray, least: float) -> FloatArray:
 
 
 def _product(p: FloatArray, q: FloatArray) -> FloatArray:
-    """Return coefficients of p^T M q in the six numbers of a symmetric M, (N, 6)."""
+    """Return the coefficients of p^T M q by the six elements of M, (N, 6)."""
     x, y, z = p.T
     u, v, w = q.T
     return np.stack(

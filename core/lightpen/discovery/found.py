@@ -51,7 +51,7 @@ class Discovery:
 
     @property
     def has_free_frame(self) -> bool:
-        """Whether the frame may be chosen: it is not that of the paper's layout."""
+        """Whether the frame can be chosen: the LEDs lack the layout of the paper."""
         up = self.pen.leds.mean(axis=0) - self.tip_pen
         return order_of_paper(self.pen.leds, up) is None
 
@@ -148,7 +148,7 @@ def _camera_before(start: Camera, marks: FloatArray) -> FoundCamera:
 
 
 def _with_length_found(pen: Pen) -> Pen:
-    """Return a pen whose scale, known by two cones, holds without these images, too."""
+    """Return a pen with its scale, known by two cones, as a prior of other images."""
     assert pen.found is not None
     assert pen.scale_sigma is not None
     first, second, length = farthest_apart(pen.leds)

@@ -221,7 +221,7 @@ def _are_alike(one: Start, other: Start) -> bool:
 def _require_one_pen(
     pieces: Pieces, seed: Seed, size: tuple[int, int], known: Camera | None
 ) -> None:
-    """Refuse tracks of which a part fits alone, as those of one of two pens.
+    """Refuse tracks of two pens: a part of them fits much better alone.
 
     The tracks of two bodies span subspaces of their own [1]_.
 
@@ -315,7 +315,7 @@ class _Trial:
 
 
 def camera_prior(camera: Camera, known: Camera | None) -> CameraPrior:
-    """Return the prior of a camera: its file, or that of any camera."""
+    """Return the prior of the given camera file, or of any camera."""
     if known is None:
         return any_camera(camera)
     return CameraPrior.of(known, prior_of_camera(known, USUAL).covariance)

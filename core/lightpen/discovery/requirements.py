@@ -55,7 +55,7 @@ def require_enough(sightings: Sightings) -> None:
 
 
 def require_no_second_pen(found: Labelled) -> None:
-    """Refuse images in which more moves beside a pen that is seen whole."""
+    """Refuse images with moving spots beside a pen that is seen whole."""
     n_leds = (found.spots >= 0).sum(axis=1)
     is_whole = n_leds >= np.quantile(n_leds, 0.75)
     n_others = int(np.median(found.unexplained[is_whole].sum(axis=1)))
@@ -167,7 +167,7 @@ def require_sketched(lengths: Sequence[KnownLength], sketch: Pen) -> None:
 
 
 def require_certain(discovery: Discovery, sightings: Sightings) -> None:
-    """Refuse a swing that hardly determines tip or camera, or much of which is left."""
+    """Refuse a swing with weak tip or camera, or with many excluded images."""
     calibration = discovery.calibration
     n_used = int(calibration.used.sum())
     n_images = sum(len(each) >= MIN_LEDS for each in sightings.centers)

@@ -87,7 +87,7 @@ def nearest_pair(leds: FloatArray, length: float) -> tuple[int, int, float]:
 
 
 def with_lengths_known(pen: Pen, lengths: Sequence[KnownLength]) -> Pen:
-    """Return a pen of which nothing is known but lengths, for the adjustment.
+    """Return a pen with wide priors for all but known lengths, for the adjustment.
 
     Its LEDs have a wide covariance; along the change of a length it is that of the
     length. The lengths are those during the swing, so the pen does not expand.

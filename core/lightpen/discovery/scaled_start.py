@@ -73,7 +73,7 @@ def numbered(found: Labelled, request: Request) -> Labelled:
 
 
 def _are_in_place_of_others(leds: FloatArray, seen: IntArray) -> BoolArray:
-    """Return which LEDs (L, 3) only show, beside one seen more, where that does not."""
+    """Return which LEDs (L, 3) duplicate a near one that is seen more often, (L,)."""
     n_seen = seen.sum(axis=0)
     apart = np.linalg.norm(leds[:, None] - leds, axis=2)
     is_near = apart < APART * apart.max()

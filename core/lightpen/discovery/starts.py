@@ -83,7 +83,7 @@ def held_camera(camera: Camera) -> CameraPrior:
 
 
 def free_focal_length(camera: Camera) -> CameraPrior:
-    """Return the prior of a camera of which the focal length alone is unknown."""
+    """Return the prior of a camera with only the focal length unknown."""
     covariance = np.zeros((len(camera.intrinsics),) * 2)
     covariance[:2, :2] = (UNKNOWN * camera.fx) ** 2
     return CameraPrior.of(camera, covariance)
@@ -339,7 +339,7 @@ def _damped_step(N: FloatArray, b: FloatArray, damping: float) -> FloatArray:
 def _moved(
     state: BundleState, step: FloatArray, turns: FloatArray
 ) -> BundleState | None:
-    """Return the state after a step; None where it is none."""
+    """Return the state after a step; None if it is impossible."""
     camera = state.rig.cameras[0]
     intrinsics = camera.intrinsics
     intrinsics = intrinsics + step[N_CONE : N_CONE + len(intrinsics)]

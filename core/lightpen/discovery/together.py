@@ -192,7 +192,7 @@ def _compared(others: Discovery, last: Discovery) -> HeldOut:
 
 
 def _values(each: Discovery, frame: Discovery) -> FloatArray:
-    """Return the parameters, (q,), with the LEDs turned onto those of another."""
+    """Return the parameters, (q,), in the frame of another discovery."""
     at = each.parameters
     R, t = fit_rigid(each.pen.leds, frame.pen.leds)
     values = np.empty(at.number)
@@ -214,7 +214,7 @@ def _prior_information(each: Discovery) -> FloatArray:
 
 
 def _prior_values(each: Discovery) -> FloatArray:
-    """Return the parameters, (q,), with camera and discs as the priors have them."""
+    """Return the parameters, (q,), with camera and discs at their prior means."""
     values = _started_at(each, _values(each, each))
     if each.lens_choice is not None:  # else the camera is that of a file
         values[each.parameters.cameras[0]] = any_camera(each.camera).intrinsics
@@ -222,7 +222,7 @@ def _prior_values(each: Discovery) -> FloatArray:
 
 
 def _started_at(each: Discovery, values: FloatArray) -> FloatArray:
-    """Return parameters with camera and discs as the adjustment began with them."""
+    """Return the parameters, (q,), with camera and discs at their initial values."""
     start, values = each.calibration.bundle.unknowns.start, values.copy()
     values[each.parameters.cameras[0]] = start.rig.cameras[0].intrinsics
     values[each.parameters.diameter] = start.pen.diameter
@@ -230,7 +230,7 @@ def _started_at(each: Discovery, values: FloatArray) -> FloatArray:
 
 
 def _not_negative(information: FloatArray) -> FloatArray:
-    """Return information without directions in which rounding leaves less than none."""
+    """Return information, (q, q), without eigenvalues below 0 by rounding."""
     units = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(information / np.outer(units, units))
     scaled = units[:, None] * vectors
@@ -238,14 +238,14 @@ def _not_negative(information: FloatArray) -> FloatArray:
 
 
 class _Parts(NamedTuple):
-    """Covariance of a discovery, (q, q) each: of its own, and as all share it."""
+    """Covariance of a discovery, (q, q) each: its own part, and the part of all."""
 
     own: FloatArray
     shared: FloatArray
 
 
 def _parted(each: Discovery, beyond_fit: FloatArray) -> _Parts:
-    """Part by the lengths and by what all have beyond the fit of the tip, (3, 3)."""
+    """Split off the covariance by lengths and by tip errors beyond the fit, (3, 3)."""
     at, lengths = each.parameters, _length_rows(each)
     beyond = np.zeros_like(each.covariance)
     beyond[at.tip, at.tip] = beyond_fit

@@ -148,7 +148,7 @@ def without_lamps(
 
 @dataclass(frozen=True, eq=False)
 class _Tracks:
-    """Tracks that may go on: where they were last or would be, and their last spot."""
+    """Open tracks: their last or predicted positions, and their last spot."""
 
     last: FloatArray
     step: FloatArray
@@ -253,7 +253,7 @@ def _common_shift(
 def _moved(
     predicted: FloatArray, there: FloatArray, spots: FloatArray, match: IntArray
 ) -> FloatArray:
-    """Return the predictions moved as those that have a spot."""
+    """Return the predictions moved by the shift or affine map of those with a spot."""
     found = match >= 0
     n = int(found.sum())
     if n == 0:
@@ -277,7 +277,7 @@ def _moved(
 
 
 def _range(pixels: FloatArray) -> FloatArray:
-    """Return how far pieces go, (P,), px; NaN of those without a spot."""
+    """Return the extent of pieces, (P,), px; NaN without a spot."""
     known = np.isfinite(pixels[..., 0]).any(axis=0)
     ranges = np.full(pixels.shape[1], np.nan)
     low = np.where(np.isfinite(pixels), pixels, np.inf).min(axis=0)

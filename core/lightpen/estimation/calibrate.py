@@ -179,7 +179,7 @@ class Calibration:
 
     @cached_property
     def tip_frames(self) -> TipFrames | None:
-        """The tip in the frame of the file and in that of the LEDs as they are."""
+        """The tip in the frame of the LED file and in the frame of the actual LEDs."""
         return tip_frames(self.bundle, self.leds, self.joint.tip_pen)
 
     @property
@@ -247,7 +247,7 @@ class _Inputs(NamedTuple):
 def _before_images(
     rig: Rig, pen: Pen, observations: Sequence[Observations], assumptions: Assumptions
 ) -> _Inputs:
-    """Return rig and pen without what their files found from the same images."""
+    """Return rig and pen without what their files state by these same images."""
     cameras, shares = list(rig.cameras), False
     for c, seen in enumerate(observations):
         if cameras[c].is_found_from(seen.pixels):

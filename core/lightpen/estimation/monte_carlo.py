@@ -307,6 +307,6 @@ def _drawn(covariance: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def _symmetric_root(covariance: FloatArray) -> FloatArray:
-    """Return the root whose sign no library chooses: the same draws everywhere."""
+    """Return the symmetric square root: the same draws with every library."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

@@ -53,7 +53,7 @@ class PivotCalibration:
 
     @property
     def correlation_factor(self) -> float:
-        """Variance of tip and pivot over that of independent noise, on average."""
+        """Variance inflation of tip and pivot by correlated residuals, on average."""
         independent = np.linalg.inv(self.fit.covariance)
         return float(np.trace(independent @ self.covariance)) / 6
 
@@ -129,7 +129,7 @@ _BOTH_TAKEN = message("pivot.both-taken")
 
 
 def _parted(groups: PoseGroups, consequence: Message, max_runs: int) -> Message:
-    """Return which poses belong together, and the consequence."""
+    """Return the message on two groups of poses, and the consequence."""
     first, second = (_names(groups.group == name, max_runs) for name in (1, 2))
     if groups.has_two_tips:
         return message(

@@ -58,7 +58,7 @@ def read_update(file: Path) -> Update | None:
 
 
 def _numbers(version: str) -> tuple[int, ...]:
-    """Return the numbers of a release; those of a candidate are of its release."""
+    """Return the numbers of a release, of a candidate those of its release."""
     release = re.match(r"\d+(?:\.\d+)*", version)
     if release is None:
         raise ValueError(version)

@@ -58,7 +58,7 @@ def parse_own_json(data: bytes, shape: type[T]) -> T:
 
 
 def parse_checked(data: bytes, shape: type[T]) -> T:
-    """Parse a text and verify its checksum, which it must have."""
+    """Parse a text and verify its required checksum."""
     if not has_checksum(data):
         raise DamagedError("There is no checksum.")
     return parse_own_json(data, shape)

@@ -36,7 +36,7 @@ RANGES = {
 
 @dataclass(frozen=True, eq=False)
 class PenContent:
-    """The content of a pen file, mm; None for what it does not state."""
+    """The content of a pen file, mm; None where it states nothing."""
 
     leds: FloatArray
     normals: FloatArray | None

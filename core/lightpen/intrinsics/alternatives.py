@@ -190,7 +190,7 @@ def _differ(groups: _Groups) -> bool:
 
 
 def _are_two_cameras(groups: _Groups) -> bool:
-    """Return whether more differs than zoom and focus of one camera may."""
+    """Return whether two cameras differ by more than zoom and focus of one."""
     one, other = groups.cameras
     longer, at = max(one.image_size), groups.fits[0].of_intrinsics(0)
     known = np.sum([fit.covariance[at, at] for fit in groups.fits], axis=0)
@@ -345,7 +345,7 @@ def _turned(
 
 
 def _with_turned(views: Views, which: BoolArray) -> Views:
-    """Return the views, some images of which are turned by 180 degrees."""
+    """Return the views with the chosen images turned by 180 degrees."""
     turned = np.array(views.image_sizes[0]) - 1.0 - views.pixels
     pixels = np.where(which[:, None, None, None], turned, views.pixels)
     return replace(views, pixels=pixels)
@@ -357,7 +357,7 @@ def _best_groups(
     near: Camera,
     apart: BoolArray | None = None,
 ) -> _Groups | None:
-    """Return the best of some ways of taking the views for those of two cameras."""
+    """Return the best of several splits of the views into those of two cameras."""
     alone = _fitted(views, tolerances, near)
     order = np.arange(views.n_views)
     starts = [order >= views.n_views // 2, order % 2 == 0]

@@ -17,7 +17,7 @@ USUAL_SIDES = 10.0, 3000.0  # mm, of a board
 
 
 def released_tolerances(stated: BoardTolerances) -> BoardTolerances:
-    """Return tolerances by which the views show how the board is."""
+    """Return tolerances wide enough for the views to determine the board."""
     return BoardTolerances(RELEASED_MM, RELEASED, stated.scale)
 
 

@@ -46,12 +46,12 @@ class BoardFit:
 
     @property
     def board_points(self) -> FloatArray:
-        """Points of the board as it was found to be, (N, 3), mm."""
+        """Points of the board with its estimated shape, (N, 3), mm."""
         return board_points(self.board, self.state.shape) + self.state.offsets
 
     @property
     def rms(self) -> float:
-        """Distance of the points from where they should be, px rms."""
+        """Distance of observed from modelled points, px rms."""
         squares = np.square(self.residuals).sum(axis=-1)
         return float(np.sqrt(np.nanmean(squares)))
 
@@ -68,7 +68,7 @@ class BoardFit:
         return intrinsics_at(self.state.cameras)[camera]
 
     def prior_of(self, camera: int) -> FloatArray:
-        """Return the information that was assumed of a camera's intrinsics."""
+        """Return the prior information of a camera's intrinsics, (4 + n, 4 + n)."""
         at = self.of_intrinsics(camera)
         return self.prior[at, at]
 

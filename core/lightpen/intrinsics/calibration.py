@@ -301,7 +301,7 @@ def _fit_unfolded(
 
 
 def _before(views: Views, camera: Camera) -> Views:
-    """Return the views without points so far off the axis that they may be behind."""
+    """Return the views without points that may be behind the camera."""
     with np.errstate(invalid="ignore"):
         off = np.linalg.norm(camera.unproject(views.pixels[:, 0]), axis=-1)
     is_far = off > FARTHEST
@@ -358,7 +358,7 @@ def _refuse_bent(views: Views, tolerances: BoardTolerances, flat: BoardFit) -> N
 
 
 def _parted(views: Views, kept: BoolArray) -> tuple[Views, tuple[str, ...]]:
-    """Return some of the views, and the names of the others."""
+    """Return the chosen views, and the names of the others."""
     others = zip(views.names, kept, strict=True)
     return views.chosen(kept), tuple(name for name, keep in others if not keep)
 

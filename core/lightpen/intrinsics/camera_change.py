@@ -125,7 +125,7 @@ def _most_significant(
 
 
 def changed_camera(camera: Camera, change: CameraChange) -> Camera:
-    """Return a camera whose covariance holds that it is as before or as after."""
+    """Return a camera whose covariance includes the change."""
     added = np.outer(change.difference, change.difference) / 4
     field, covariance = camera.lens_field, camera.covariance
     if field is not None and field.intrinsics_covariance is not None:

@@ -145,7 +145,7 @@ def _model(n_coefficients: int, own: float, others: tuple[Message, ...]) -> Mess
 
 
 def _other_model(n_coefficients: int, rms: float) -> Message:
-    """Return the message on a model that was tried, too."""
+    """Return the message on a model that was tried besides."""
     match n_coefficients:
         case 5:
             return message("held-out.five", held_out=rms)
@@ -249,7 +249,7 @@ def is_wide(camera: Camera, pixels: FloatArray) -> bool:
 def _converted(
     views: Views, tolerances: BoardTolerances, fitted: BoardFit, n_coefficients: int
 ) -> "_Drawn | None":
-    """Return the fit of another lens model than that of a fit."""
+    """Return the fit with another lens model, started from a fit."""
     near = convert_lens(fitted.state.cameras[0], n_coefficients)
     most = ALIKE * fitted.rms
     return None if near is None else _fit_whole(views, tolerances, near, most)
@@ -268,7 +268,7 @@ def _rational(
 def _fit_whole(
     views: Views, tolerances: BoardTolerances, near: Camera, most: float = np.inf
 ) -> "_Drawn | None":
-    """Return the fit that does not fold the image, the prior as weak as it may be.
+    """Return the fit with the weakest prior that does not fold the image.
 
     Just the strongest one if the residuals are more than `most` without any, px rms.
     """
@@ -337,7 +337,7 @@ def fit_determined(
 
 
 def rms_together(errors: FloatArray, views: Views) -> float:
-    """Return the error of all points, px rms, from that of each view."""
+    """Return the error of all points, px rms, given the error of each view."""
     counts = views.seen.sum(axis=(1, 2))
     return float(np.sqrt(np.average(errors**2, weights=counts)))
 

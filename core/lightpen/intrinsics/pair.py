@@ -233,7 +233,7 @@ def _require_fit(views: Views, camera: Camera, name: str) -> None:
 
 
 def _as_alone(views: Views, alone: tuple[CameraCalibration, ...]) -> Views:
-    """Return the views without what was left out of those of each camera alone."""
+    """Return the views without the points that the fit of each camera excluded."""
     pixels = views.pixels.copy()
     for c, each in enumerate(alone):
         rows = {name: v for v, name in enumerate(views.names)}
@@ -379,7 +379,7 @@ def _means(pixels: FloatArray) -> FloatArray:
 
 
 def _message_on_moved(views: Views, fitted: BoardFit, usual: float) -> Message | None:
-    """Return the message on views of which the cameras disagree.
+    """Return the message on views in which the cameras disagree.
 
     ``usual`` are the residuals of a camera alone, px rms.
     """

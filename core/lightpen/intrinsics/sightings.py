@@ -116,7 +116,7 @@ def _from_front(points: FloatArray, board: Board) -> FloatArray:
 def _numbered(
     grey: npt.NDArray[np.uint8], points: FloatArray, board: Board
 ) -> FloatArray:
-    """Return corners from that end of the board where the first square is dark.
+    """Return corners numbered from the end of the board with a dark first square.
 
     The ways of searching begin at either end; where both ends look the same, as one
     of them had it.

@@ -36,7 +36,7 @@ class BoardPoses(NamedTuple):
     translations: FloatArray
 
     def chosen(self, which: BoolArray) -> "BoardPoses":
-        """Return those of some of the views, (V,)."""
+        """Return the poses of some views, (V,)."""
         return BoardPoses(self.rotations[which], self.translations[which])
 
 

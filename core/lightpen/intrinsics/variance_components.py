@@ -100,7 +100,7 @@ _Found = dict[float, list[tuple[Design, _Solution]]]  # by length
 
 
 def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
-    """Return a fit (by noise alone) with effects of board, lens and single views."""
+    """Return a fit with random effects of board, lens and views, from one without."""
     longer = max(max(size) for size in views.image_sizes)
     n_cameras = len(fitted.state.cameras)
     noise = max(fitted.sigma, 1e-6)
@@ -389,7 +389,7 @@ def _averaged(
 
 
 def without_fields(views: Views, fields: tuple[LensField | None, ...]) -> Views:
-    """Return the views as lenses without residual fields have them."""
+    """Return the views with the residual fields of the lenses removed."""
     pixels = views.pixels.copy()
     for c, field in enumerate(fields):
         if field is not None:

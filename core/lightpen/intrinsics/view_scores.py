@@ -28,7 +28,7 @@ class ViewScores:
     def without(
         self, weights: FloatArray, at: slice, difference: FloatArray
     ) -> "ViewScores":
-        """Return the scores of views after a change that they have a share in.
+        """Return the scores of views after a change in which they have a share.
 
         Parameters
         ----------
@@ -48,7 +48,7 @@ class ViewScores:
 
     @property
     def clustering(self) -> float:
-        """Scatter of the scores, over what the components make of it."""
+        """Scatter of the scores over its expectation by the components."""
         n = self.scores.shape[1]
         S = self.covariance[:n, :n]
         found = np.einsum("vi,ij,vj->", self.scores, S, self.scores)

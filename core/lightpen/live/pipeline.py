@@ -65,7 +65,7 @@ Sink: TypeAlias = Callable[[LiveImage], None]
 
 
 class LiveListener(Protocol):
-    """Listener, called on the pipeline's thread or on that of a camera."""
+    """Listener, called on the thread of the pipeline or of a camera."""
 
     def on_image(self, image: LiveImage) -> None:
         """Handle a processed image."""
@@ -357,7 +357,7 @@ class Live:
             self._listener.on_image(image)
 
     def _next_frame(self) -> Frame | None:
-        """Return the next image, with that of the other camera at its moment."""
+        """Return the next image, of two cameras the next simultaneous pair."""
         try:
             if len(self._workers) == 1:
                 return self._workers[0].next_frame(LONGEST_WAIT)

@@ -125,7 +125,7 @@ def align_points(points: Sequence[Quantity], nominals: FloatArray) -> Alignment:
 def tie(
     then: Sequence[Quantity], now: Sequence[Quantity], inputs: FloatArray
 ) -> Alignment:
-    """Return the motion that brings datum points touched again to where they were.
+    """Return the motion that brings datum points, probed again, back into place.
 
     The part or the camera was moved in between. The origins of the same features before
     and after count. Both touches of each point are uncertain, and the motion carries

@@ -146,7 +146,7 @@ def _side(
 
 
 def _by_cosines(planned: PlannedFeature, cosines: FloatArray, positive: Side) -> Side:
-    """Return the side that most directions say, given that of positive cosines."""
+    """Return the side of most directions; ``positive`` is that of cosines above 0."""
     known = cosines[np.isfinite(cosines)]
     share = float(np.mean(known > 0))
     if MIXED < share < 1 - MIXED:

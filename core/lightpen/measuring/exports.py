@@ -45,7 +45,7 @@ def _csv(part: MeasuredPart) -> str:
 
 
 def _qdas(part: MeasuredPart) -> str:
-    """Return a characteristic and its value for each of those of the plan."""
+    """Return the plan's characteristics and their values as Q-DAS."""
     name, when = printable(part.plan.name), f"{local_now():%d.%m.%Y/%H:%M:%S}"
     lines = [f"K0100 {len(part.results)}", f"K1001 {name}", f"K1002 {name}"]
     for i, result in enumerate(part.results, start=1):

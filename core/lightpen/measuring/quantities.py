@@ -25,7 +25,7 @@ class Quantity:
     by_inputs: FloatArray  # (M, P)
 
     def covariance(self, inputs: FloatArray) -> FloatArray:
-        """Return the covariance (M, M), from that of the inputs (P, P)."""
+        """Return the covariance (M, M), given the covariance of the inputs (P, P)."""
         return np.asarray(self.by_inputs @ inputs @ self.by_inputs.T)
 
     def uncertainty(self, inputs: FloatArray) -> FloatArray:

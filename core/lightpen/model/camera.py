@@ -266,7 +266,7 @@ class Camera:
         raise CalibrationError("camera.distortion-folds")
 
     def _unproject_fisheye(self, distorted: FloatArray) -> PointMap:
-        """Return the same of distorted normalised points of a fisheye."""
+        """Return undistorted points and derivative of distorted points of a fisheye."""
         distances = np.linalg.norm(distorted, axis=-1)
         found = fisheye.angles(self.distortion, distances)
         if np.any(np.isnan(found) & ~np.isnan(distances)):

@@ -83,7 +83,7 @@ def angles(coefficients: FloatArray, distances: FloatArray) -> FloatArray:
 
 
 def is_within(coefficients: FloatArray, distances: FloatArray) -> BoolArray:
-    """Tell which distances are those of directions up to `WIDEST`.
+    """Tell which distances belong to directions up to `WIDEST`.
 
     All are, where the coefficients fold the image before; `angles` tells where.
     """

@@ -47,7 +47,7 @@ class LensField:
     def of(
         cls, width: int, height: int, amplitude: float, length: float
     ) -> "LensField":
-        """Return the field that nothing was measured of, its mean 0."""
+        """Return the prior field before any measurement, its mean 0."""
         columns, rows = (
             min(max(ceil((side - 1) / (SPACING * length)) + 1, FEWEST), MOST)
             for side in (width, height)

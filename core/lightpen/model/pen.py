@@ -280,7 +280,7 @@ def _layout(leds: FloatArray) -> IntArray | None:
 
 
 def _layout_behind(leds: FloatArray, back: IntArray) -> IntArray | None:
-    """Return `_layout` if its back line is that of the LEDs `back`."""
+    """Return `_layout` if the LEDs ``back`` are its back line."""
     front = np.setdiff1d(np.arange(10), back)
     origin = leds[front].mean(axis=0)
     normal = np.linalg.svd(leds[front] - origin)[2][2]
@@ -328,7 +328,7 @@ def _is_right_handed(leds: FloatArray) -> bool:
 
 
 def _out_of_order(order: IntArray) -> FileError:
-    """Return the error about LEDs of which number ``order[j] + 1`` is in place j."""
+    """Return the error on swapped numbers: LED ``order[j] + 1`` is in place j."""
     wrong = np.flatnonzero(order != np.arange(10))
     if len(wrong) == 2:
         return FileError(

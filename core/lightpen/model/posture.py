@@ -45,7 +45,7 @@ def rotations_of(
 def moved_from(
     upright: FloatArray, tilts: FloatArray, directions: FloatArray, turns: FloatArray
 ) -> FloatArray:
-    """Return the rotations of cam_from_pen, (N, 3, 3), from that (3, 3) of upright."""
+    """Return rotations cam_from_pen, (N, 3, 3), moved from the upright one, (3, 3)."""
     zero = np.zeros_like(tilts)
     axes = np.stack([-np.sin(directions), zero, np.cos(directions)], axis=-1)
     leant = rotation_from_vector(axes * tilts[:, None])

@@ -46,7 +46,7 @@ def marks_of(pixels: FloatArray) -> FloatArray:
 
 
 def are_shared(marks: FloatArray, pixels: FloatArray) -> bool:
-    """Return whether several images with centres (N, L, 2) are those of the marks."""
+    """Return whether the marks occur in several images with centres (N, L, 2)."""
     n_shared = sum(
         bool(np.any(np.abs(image[:, None] - marks).max(axis=-1) < SAME))
         for image in pixels

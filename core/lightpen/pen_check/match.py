@@ -95,7 +95,7 @@ class PenMatch:
 
 
 def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:
-    """Return views with that of another image, the newest last.
+    """Return the views with another image, the newest last.
 
     It takes the place of a view that is alike, and of the oldest if there are too many;
     smeared images and those with too few spots are passed over.

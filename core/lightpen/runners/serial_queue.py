@@ -38,7 +38,7 @@ class SerialQueue:
         self._acts.put(act)
 
     def ask_and_wait(self, act: Act) -> None:
-        """Have something done, and return when it is, or when the queue has ended."""
+        """Queue a function; wait until it has run or the queue has ended."""
         is_done = Event()
 
         def act_and_signal() -> None:
@@ -176,7 +176,7 @@ class Task:
 
 
 class StartThread(Protocol):
-    """Has something computed elsewhere; see `SerialQueue.start`."""
+    """Starts a computation in the background; see `SerialQueue.start`."""
 
     def __call__(
         self,

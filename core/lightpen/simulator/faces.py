@@ -87,7 +87,7 @@ class Ring:
     def brightness(
         self, u: LightArray, v: LightArray, towards: FloatArray
     ) -> LightArray:
-        """Return the brightness; parameters are those of `HotSpot.brightness`."""
+        """Return the brightness; parameters as of `HotSpot.brightness`."""
         passage = 0.5 + 0.5 * np.tanh((np.hypot(u, v) - self.inner) / self.softness)
         return _single(self.middle + (1 - self.middle) * passage)
 

@@ -31,7 +31,7 @@ class OperatorPresence:
 
     @property
     def has_other_choices(self) -> bool:
-        """Return whether the selection differs from that of the current swing."""
+        """Return whether the choices differ from those of the current swing."""
         if self.choices is None or self.begun_with is None:
             return False
         return not self.begun_with.swings_like(self.choices)

@@ -96,7 +96,7 @@ class Preparation:
         return replace(self, assumptions=assumptions, temperature_day=_today())
 
     def with_assumptions(self, assumptions: Assumptions) -> Self:
-        """Return a copy with other assumptions; a new temperature is that of today."""
+        """Return a copy with other assumptions; a new temperature is dated today."""
         before, temperature = self.assumptions_today, assumptions.temperature_c
         changed = replace(self, assumptions=assumptions)
         if temperature == before.temperature_c:

@@ -143,7 +143,7 @@ class FrameCounters:
     last: Stats | None = None  # of the camera at the last image
 
     def after(self, stats: Stats) -> Self:
-        """Return the counters after an image, with those of the camera at that time."""
+        """Return the counters after an image, given the camera's counters."""
         last = self.last
         if last is None:
             return type(self)(self.total, stats)
@@ -219,7 +219,7 @@ class SwingRecorder:
         return sha256(encode_png(frame.image)).hexdigest() in self._known
 
     def discard(self) -> None:
-        """Note that the swing was left for good."""
+        """Record that the swing was discarded."""
         self._writer.conclude(DISCARDED)
 
     def close(self) -> None:

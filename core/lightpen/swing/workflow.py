@@ -112,7 +112,7 @@ class SwingWorkflow:
         return self._status
 
     def recover(self) -> None:
-        """Pause after an internal error, with the swing as it was.
+        """Pause after an internal error; the swing is unchanged.
 
         Images are ignored until the status changes: all of them may cause it.
         """

@@ -112,7 +112,7 @@ class VerificationWorkflow:
         return self._status
 
     def recover(self) -> None:
-        """Carry on after a bug, paused: the next image may have it again."""
+        """Continue after an internal error, paused, as the next image may repeat it."""
         self._task.drop()
         status = replace(self._status, reading=ReadingState.NOTHING, is_paused=True)
         refusal = BUG if status.tip is None else status.refusal
@@ -159,7 +159,7 @@ class VerificationWorkflow:
         self._read_tip()
 
     def touch_anew(self, task: AnyTask) -> None:
-        """Do one task again; the result before stays in the archive."""
+        """Repeat one task; its previous result stays in the archive."""
         status, setup, state = self._status, self._status.setup, self._status.state
         if setup is not None and state is not None:
             if task is PART:

@@ -34,7 +34,7 @@ WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 
 
 class LivePanel(Translated, QWidget):
-    """Shows images and how they come."""
+    """Shows live images and the frame counters."""
 
     camera_chosen = Signal(int)  # index of the camera to show
 
@@ -75,7 +75,7 @@ class LivePanel(Translated, QWidget):
         self._retranslate()
 
     def set_cameras(self, n_cameras: int, shown: int) -> None:
-        """Offer to show one of so many cameras; which is shown, from 0."""
+        """Set the number of cameras to choose from, and the one shown, from 0."""
         self._switch.setVisible(n_cameras > 1)
         if shown != self._shown:
             self._forget()

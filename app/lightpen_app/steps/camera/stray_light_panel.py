@@ -97,7 +97,7 @@ class StrayLightPanel(Translated, QGroupBox):
         return self._draw.isChecked()
 
     def end_drawing(self) -> None:
-        """Let the mask be drawn no longer."""
+        """End drawing of the mask."""
         self._draw.setChecked(False)
 
     def uncover(self) -> None:
@@ -105,7 +105,7 @@ class StrayLightPanel(Translated, QGroupBox):
         self._cover.setChecked(False)
 
     def feed(self, seen: LiveImage) -> None:
-        """Take part of an image for the search that is on, if one is."""
+        """Pass an image to the search, if one is in progress."""
         search = self._search
         if search is None or search.is_over:
             return

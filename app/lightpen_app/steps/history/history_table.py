@@ -63,7 +63,7 @@ class HistoryModel(TitledModel):
         self._asked: set[int] = set()
 
     def set_lines(self, n_lines: int, first: Sequence[Line]) -> None:
-        """Show other entries, of which the newest are known."""
+        """Show other entries; the newest are read already."""
         self.beginResetModel()
         self._n_lines = n_lines
         self._blocks.clear()

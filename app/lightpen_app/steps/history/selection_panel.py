@@ -98,7 +98,7 @@ class SelectionPanel(Translated, QWidget):
         return self._limits
 
     def set_value(self, selected: Sequence[StoredEntry], trend: Trend) -> None:
-        """Show the selected entries and those of the trend."""
+        """Show the selected entries and the entries of the trend."""
         self._selected = tuple(filter(has_tip, selected))
         self._trend = trend
         self._retranslate()
@@ -216,7 +216,7 @@ class SelectionPanel(Translated, QWidget):
         self._verdict.set_value(StatusMessage(text, *mark))
 
     def _show_touched(self, touched: RepeatedPoint | None) -> None:
-        """Show the scatter of a fixed point beside that of the tips."""
+        """Show the scatter of a fixed point beside the scatter of the tips."""
         self._touched.setVisible(touched is not None)
         if touched is None:
             self._touched.clear()

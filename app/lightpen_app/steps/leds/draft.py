@@ -137,7 +137,7 @@ class LedDraft(QObject):
         self.open(PenDraft() if file is None else PenDraft.of(file.pen), None)
 
     def open(self, draft: PenDraft, invalid_file: Path | None) -> None:
-        """Show a draft as it was opened."""
+        """Show the draft of a newly opened or saved file."""
         if draft != self._state.draft:  # else it is what was saved now
             self.edits.clear()
         self._state = replace(self._state, opened=draft, invalid_file=invalid_file)

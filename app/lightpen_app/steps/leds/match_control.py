@@ -94,7 +94,7 @@ class PenWatch(QObject):
 
 
 class MatchControl(QObject):
-    """Shows live images in its panel, with how the pen of the table fits them."""
+    """Shows live images in its panel, and how the pen of the table fits them."""
 
     def __init__(
         self,
@@ -126,14 +126,14 @@ class MatchControl(QObject):
         self._region()
 
     def stop(self) -> None:
-        """Leave the images to the pen in use."""
+        """Stop; detect the pen in use again."""
         self._is_shown = False
         self.watch.stop()
         if self._leds.state.is_pending and not self._run.status.is_capturing:
             self._live.set_region(self._selection.preparation.region)
 
     def doubt(self) -> str:
-        """Return why the table may be that of another pen; empty if it fits."""
+        """Return why the table may belong to another pen; empty if it fits."""
         camera, pen = self._selection.preparation.camera, self._leds.state.check.sought
         match = self.watch.last_match(camera, pen)
         return self._panel.doubt_of(match)
@@ -190,5 +190,5 @@ class MatchControl(QObject):
 
 
 def _differ(swung: Pen, pen: Pen | None) -> bool:
-    """Return whether the LEDs of a table differ from those of the swing."""
+    """Return whether the LEDs of a table differ from the LEDs of the swing."""
     return pen is None or not np.array_equal(swung.leds, pen.leds)

@@ -154,7 +154,7 @@ class MatchPanel(Translated, QGroupBox):
             self._refresh()
 
     def set_aside(self, is_aside: bool) -> None:
-        """Set whether another pen, that of a swing, is being detected."""
+        """Set whether the pen of a swing is being detected instead."""
         if is_aside != self._is_aside:
             self._is_aside = is_aside
             self._refresh()
@@ -272,7 +272,7 @@ class MatchPanel(Translated, QGroupBox):
         return remarks
 
     def _mendable(self) -> list[Finding | None]:
-        """Return the findings that a click can mend, in their places."""
+        """Return the findings that a click can correct, in their places."""
         if self._match is None or self._why_none or not self._can_mend:
             return []
         return [

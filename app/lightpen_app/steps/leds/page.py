@@ -29,7 +29,7 @@ SHARES, VAST_SHARES = (40, 29, 31), (26, 32, 42)  # of table, pen in space and i
 
 
 class LedsPage(ResponsiveLayout, Page):
-    """Opens, shows, mends and saves the LED file.
+    """Opens, shows, corrects and saves the LED file.
 
     The table shows a draft. The live match follows it at once; a swing needs a file, so
     a draft that differs from the file in use must be saved before the next step.
@@ -166,7 +166,7 @@ class LedsPage(ResponsiveLayout, Page):
         self._share_room()
 
     def _share_room(self) -> None:
-        """Divide the width; on a vast page the table has all it needs by less."""
+        """Divide the width; on a very large page the table gets its full width."""
         shares = VAST_SHARES if self._room.is_vast else SHARES
         panels = self._table, self._space, self._match
         for panel, share in zip(panels, shares, strict=True):

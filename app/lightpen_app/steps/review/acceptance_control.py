@@ -1,4 +1,4 @@
-"""The questions before a tip is accepted with doubts, taken back or swung again."""
+"""Questions before a doubtful tip is accepted, revoked or measured again."""
 
 from PySide6.QtCore import QObject
 

@@ -72,7 +72,7 @@ class DetailTabs(QTabWidget):
                 self._show_solution(panel.content())
 
     def pictures(self) -> "list[NamedPicture]":
-        """Return all plots for saving, including those of hidden tabs."""
+        """Return all plots for saving, also of hidden tabs."""
         for panel in self._panels:
             self._show_solution(panel.content())
         cards = chain.from_iterable(panel.content().cards() for panel in self._panels)

@@ -359,7 +359,7 @@ def _decoded(solution: Solution, number: int, camera: int, report: Report) -> _D
 
 
 def _ring(x: float, y: float, led: int, fits: bool, takes_part: bool) -> Marker:
-    """Return the marker of an LED; one that the fit left out is crossed."""
+    """Return the marker of an LED; one excluded from the fit is crossed."""
     tone = (Tone.GOOD if fits else Tone.WARN) if takes_part else Tone.ACTIVE
     return Marker(x, y, RING, str(led), tone, crossed=not fits)
 

@@ -133,7 +133,7 @@ class PlotCard(Translated, QFrame):
 
 
 class PlotGrid(QWidget):
-    """Plots side by side, of which one can be enlarged to fill the place of all."""
+    """Plots side by side; one can be enlarged to the whole area."""
 
     saved = Signal(str)  # as of any of the cards
     failed = Signal(str)

@@ -168,7 +168,7 @@ class ResidualsPanel(PlotsPanel):
         rms: FloatArray,
         mean: FloatArray,
     ) -> None:
-        """Draw residuals (N, 2), px, at points (N, 2), and those of the LEDs."""
+        """Draw residuals (N, 2), px, at points (N, 2), and the residuals by LED."""
         self._arrows.set_data(camera.image_size, points, residuals)
         self._dots.set_data(residuals[:, 0], residuals[:, 1])
         self._histogram.set_data(residuals.ravel())

@@ -218,7 +218,7 @@ def _tip_value(outcome: ReviewedResult) -> TipValue:
 
 
 def _postures(coverage: Coverage) -> DialValue:
-    """Return a dial of which each field is full that the images have."""
+    """Return a dial with each field full that has an image."""
     turns = coverage.turns
     return DialValue(
         counts=coverage.counts.astype(np.int64),

@@ -135,7 +135,7 @@ class LinePlot(NamedPlot):
     def set_data(
         self, x: FloatArray, *values: FloatArray, until: float = np.inf
     ) -> None:
-        """Show values (N,) of each curve over x (N,), of which it shows up to a limit.
+        """Show values (N,) of each curve over x (N,), shown up to a limit.
 
         The CSV file holds them all.
         """

@@ -91,7 +91,7 @@ def review_page_state(
 
 
 def differs(before: SwingStatus, now: SwingStatus) -> bool:
-    """Return whether the review shows something else by another status."""
+    """Return whether two statuses give different reviews."""
     return (
         before.solution,
         before.failure,

@@ -28,7 +28,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 class _AssumedNumber(NamedTuple):
-    """A field: its unit, of which so many are one of the core's, and its range."""
+    """A number field: its unit, units per unit of the core, and its range."""
 
     name: str
     unit: str

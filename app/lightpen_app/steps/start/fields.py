@@ -195,7 +195,7 @@ class PointField(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> FloatArray | None:
-        """Return the point (3,), mm; None for that of the LED file."""
+        """Return the point (3,), mm; None for the point of the LED file."""
         if self._from_file.isChecked():
             return None
         return np.array([field.value() for field in self._fields])

@@ -192,7 +192,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
             self._stop_editing()
 
     def show_refused(self, asked: RequestedChange, fault: str) -> bool:
-        """Say why it was not; return whether that is still waited for."""
+        """Show why a change was refused; return whether it was still pending."""
         if asked is not self._asked:
             return False
         self._asked = None

@@ -100,7 +100,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._refresh()
 
     def show_fault(self, fault: str) -> None:
-        """Say why nothing was set."""
+        """Show why nothing was saved."""
         self._is_signed = False
         self._fault.set_value(StatusMessage.fault(fault))
         self._supervisor.clear_password()

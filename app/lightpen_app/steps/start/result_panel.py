@@ -137,7 +137,7 @@ class LastResultPanel(Translated, QGroupBox):
             self._retranslate()
 
     def set_status(self, status: TipStatus | None) -> None:
-        """Mark a tip that must not be measured with; None where that is not known."""
+        """Mark a tip that must not be used for measuring; None if unknown."""
         self._marked = None if status is TipStatus.VALID else status
         self._standing.set_value(status_message(self._marked))
 

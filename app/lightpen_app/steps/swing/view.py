@@ -41,7 +41,7 @@ ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
 
 
 class SwingView(ResponsiveLayout, Translated, QWidget):
-    """Shows a swing at one moment."""
+    """Shows a snapshot of a swing."""
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
     large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
@@ -124,7 +124,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             self.dial.set_value(value.dial)
 
     def set_state(self, state: SwingPageState) -> None:
-        """Show all of a swing at one moment."""
+        """Show a snapshot of a swing."""
         self.set_value(state.value, state.note, is_verdict=state.is_verdict)
         self._warning.set_value(state.warning)
         self._pen.set_value(state.stand)

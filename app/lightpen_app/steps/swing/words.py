@@ -59,7 +59,7 @@ _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
 
 
 class SwingWords(QObject):
-    """Puts a moment of a swing into words, signs and numbers."""
+    """Puts a snapshot of a swing into words, signs and numbers."""
 
     def operator_value(self, moment: SwingViewState) -> OperatorValue:
         """Return the content of page and operator view."""

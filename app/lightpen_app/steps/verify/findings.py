@@ -68,7 +68,7 @@ def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> Di
 
 
 def ring_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> RingValue:
-    """Return the touches of a ring, those of the last run once it is done."""
+    """Return the touches of a ring, once done those of the last run."""
     found = state.found_by(CIRCLE)
     if found is None:
         fit = ring_fit(state.progress(setup, task).points)
@@ -258,7 +258,7 @@ def figures_of(table: ResultTable) -> Figures:
 
 
 def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:
-    """Return a dial of which each field is full that was touched in."""
+    """Return a dial with each field full that has a probed point."""
     counts = np.zeros((3, 8), dtype=np.int64)
     for each in touched:
         ring, sector = field_of(each)

@@ -176,7 +176,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
             self.open_plan(Path(name))
 
     def open_plan(self, path: Path) -> None:
-        """Read a plan and measure by it, or tell why that is impossible."""
+        """Read a plan and measure by it, or report why that is impossible."""
         job = Job(lambda _: read_plan(path), self)
         job.succeeded.connect(self.choose)
         job.start(

@@ -107,7 +107,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._retranslate()
 
     def set_value(self, view: VerifyView) -> None:
-        """Show another moment of the verification."""
+        """Show another snapshot of the verification."""
         operator = view.operator
         self._instruction.set_text(operator.instruction)
         self._hint.set_text(operator.hint, bold=False)

@@ -74,7 +74,7 @@ class SurfaceField(ChoiceField):
 
 
 class TaskForm(Translated, QWidget):
-    """Shows whether a task is chosen, and its options."""
+    """Shows whether a task is selected, and its options."""
 
     value_changed = Signal()  # the user chose otherwise
 
@@ -115,7 +115,7 @@ class TaskForm(Translated, QWidget):
         self._retranslate()
 
     def value(self) -> VerificationChoices:
-        """Return all options, with those of this task."""
+        """Return the options of all tasks, with the entries of this form."""
         is_chosen = self._is_chosen.isChecked()
         choices = self._value.with_task(self._task, is_chosen=is_chosen)
         values = {name: field.chosen() for name, field in self._fields.items()}

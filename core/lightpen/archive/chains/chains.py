@@ -48,7 +48,7 @@ def chain_head(database: Database, chain: str) -> ChainHead:
 
 
 def delivered_number(database: Database, chain: str) -> int:
-    """Return the number of the last entry of a chain that a server was given."""
+    """Return the number of the last entry of a chain delivered to a server."""
     wanted = select(CHAINS.c.delivered).where(CHAINS.c.chain == chain)
     with database.reading() as connection:
         return connection.execute(wanted).scalar_one_or_none() or 0

@@ -45,7 +45,7 @@ class CopyResult:
 
 
 def own_chain(database: Database) -> str:
-    """Return the own chain of a database; it begins with the first call.
+    """Return the own chain of a database; the first call begins it.
 
     With it begins its station key.
     """

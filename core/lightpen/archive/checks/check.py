@@ -181,7 +181,7 @@ def _rows_after(database: Database, chain: str, number: int) -> Sequence[Row[Any
 
 
 def _strays(database: Database) -> Iterator[Message]:
-    """Yield the entries of a file that are of no chain."""
+    """Yield the entries of a file that belong to no chain."""
     if database.file is None:  # where a foreign key prevents it
         return
     known = select(CHAINS.c.chain)

@@ -67,7 +67,7 @@ def with_recomputed(
 
 
 def _is_recorded(entry: StoredEntry, data: Path) -> bool:
-    """Return whether an entry is of an accepted tip whose file is as it was entered."""
+    """Return whether an entry accepts a tip whose file has not changed since."""
     event = entry.entry.event
     if event.kind is not Kind.ACCEPTED or event.result is None:
         return False

@@ -64,7 +64,7 @@ class Timestamp:
 
 
 def authority(address: str = "", certificate: Path | None = None) -> Authority:
-    """Return the authority that is given, else that of the computer."""
+    """Return the given authority; by default that of the machine settings."""
     settings = machine_settings()
     if certificate is None and settings.timestamp_certificate:
         certificate = Path(settings.timestamp_certificate)
@@ -103,7 +103,7 @@ def with_timestamps(
     data: Path,
     certificate: Path | None = None,
 ) -> ArchiveCheckResult:
-    """Verify the timestamps of a data folder; return the check with what is wrong.
+    """Verify the timestamps of a data folder; return the check with its findings.
 
     The certificate is that of the authority, as `Authority.certificate`; None for that
     of the computer. Without one signatures are not verified, which is a note.
@@ -153,7 +153,7 @@ class _Client:
         self._verifiers = [] if certificate is None else self._made(certificate)
 
     def ask(self, address: str, entry: StoredEntry) -> bytes:
-        """Return the answer of an authority, which is to the question."""
+        """Return the response of an authority; refuse one with another nonce."""
         query = (
             self._package.TimestampRequestBuilder()
             .data(entry.text.encode())

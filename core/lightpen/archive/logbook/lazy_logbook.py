@@ -22,7 +22,7 @@ SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
 
 
 def server_address() -> str:
-    """Return the address of the server: of the variable, else that of the computer."""
+    """Return the server address by environment variable or machine settings."""
     return os.environ.get(SERVER, "") or machine_settings().archive_server
 
 
@@ -100,9 +100,8 @@ class LazyLogbook:
     def _open(self) -> "Logbook | None":
         with self._lock:
             if self._opened is None and not self._is_closed:
-                from lightpen.archive.logbook.logbook import (
-                    Logbook,  # a quarter of a second
-                )
+                # Imported here: it takes 0.25 s.
+                from lightpen.archive.logbook.logbook import Logbook
 
                 self._opened = Logbook(self._data, self._server)
             return self._opened

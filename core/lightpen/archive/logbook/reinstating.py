@@ -24,7 +24,7 @@ from lightpen.record.swings.names import Names
 def require_restorable(
     database: Database, chain: str, entry: StoredEntry, data: Path
 ) -> None:
-    """Refuse an entry that is not of a chain, or whose result is not as it was."""
+    """Refuse an entry of another chain, or one whose result file has changed."""
     number = entry.entry.number
     there = batch_of(database, chain, number - 1)[:1]
     if [each.sha256 for each in there] != [entry.sha256]:

@@ -95,7 +95,7 @@ def _kept_password(service: str, user: str) -> str:
 
 
 def _without_password(url: URL) -> str:
-    """Return an address fit to be shown: its options may hold the password, too."""
+    """Return an address for display, without its password and options."""
     user = f"{url.username}@" if url.username else ""
     place = f"{url.host or 'localhost'}:{url.port}" if url.port else url.host or ""
     return printable(f"postgresql://{user}{place}/{url.database or ''}")

@@ -135,7 +135,7 @@ def open_file(path: Path) -> Database:
 
 
 def look_into(path: Path) -> Database:
-    """Open the archive in a file to be read only; nothing about it changes.
+    """Open the archive in a file read-only; nothing about it changes.
 
     Raises `NoArchiveError` if it is missing or nothing was ever entered.
     """
@@ -246,7 +246,7 @@ def update_tables(database: Database) -> Database:
 
 @contextmanager
 def _given_up_in_time(connection: Connection) -> Iterator[None]:
-    """End the line to a server that does not answer in time, so that waiting ends."""
+    """Close the connection to a server that does not answer in time."""
     line = connection.connection.dbapi_connection
     assert line is not None
     with socket.fromfd(line.fileno(), socket.AF_INET, socket.SOCK_STREAM) as end:
@@ -266,7 +266,7 @@ def _shut_down(end: socket.socket) -> None:
 
 
 def _found_version(connection: Connection) -> str | None:
-    """Return of which version the tables are; None where there are none."""
+    """Return the version of the tables; None if there are none."""
     if not inspect(connection).has_table(VERSION_TABLE):
         return None
     return connection.execute(select(_VERSION.c.version_num)).scalar_one_or_none()

@@ -147,7 +147,7 @@ def _spot_triples(
 
 @lru_cache(maxsize=MAX_SPOTS)
 def _triples_of(n: int) -> IntArray:
-    """Return the triples of n items, those of low numbers first.
+    """Return the index triples of n items, low numbers first.
 
     So a triple draws the same lot whatever other images an image is labelled with.
     """

@@ -190,7 +190,7 @@ def track_spots(
 
 
 def _is_five(spots: Spots, labels: Labels, pen: Constellation) -> bool:
-    """Return whether an image that was refused shows five whole spots and no others."""
+    """Return whether a refused image shows five whole spots and no others."""
     refused = labels.reason in (LabelStatus.TOO_FEW, LabelStatus.NO_FIT)
     n_whole = np.count_nonzero(spots.flaws & UNWHOLE == 0)
     return bool(refused and n_whole == FEWEST_LEDS < pen.min_leds)

@@ -116,7 +116,7 @@ def _triangle_frame(points: FloatArray) -> FloatArray:
 def _simple_root(
     c3: FloatArray, c2: FloatArray, c1: FloatArray, c0: FloatArray
 ) -> FloatArray:
-    """Return of each cubic the real root that lies farthest from the others."""
+    """Return the real root of each cubic that lies farthest from the others."""
     b, c, d = c2 / c3, c1 / c3, c0 / c3
     q = (b * b - 3 * c) / 9
     r = (b * (2 * b * b - 9 * c) + 27 * d) / 54

@@ -67,7 +67,7 @@ class Adjustment:
     effects: tuple[SearchedEffect, ...]
 
     def shift_from(self, other: Bundle) -> FloatArray:
-        """Return (tip_pen, cone_rig) of the estimate less another fit's, (6,), mm."""
+        """Return the change of (tip_pen, cone_rig) from another fit, (6,), mm."""
         one, there = self.bundle.state, other.state
         return np.concatenate(
             [one.tip_pen - there.tip_pen, one.cone_rig - there.cone_rig]
@@ -76,7 +76,7 @@ class Adjustment:
 
 @dataclass(frozen=True, eq=False)
 class _ConsistentFit:
-    """A fit with contradicted numbers released from their priors.
+    """A fit with contradicted parameters released from their priors.
 
     Of the candidates, unlikely mechanics are held at 0.
     """

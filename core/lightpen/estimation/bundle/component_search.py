@@ -23,7 +23,7 @@ ROUNDS = 3  # of finding each component beside the others
 def find_components(
     unknowns: Unknowns, information: FloatArray, right: FloatArray, before: Components
 ) -> Components:
-    """Estimate the components jointly, given those of the pass before.
+    """Estimate the components jointly, given those of the previous pass.
 
     ``information`` (p, p) and ``right`` (p,) are of images and measurements.
     """
@@ -64,7 +64,7 @@ def _found_once(
 
 
 def _likely_effect(effect: Effect, found: EffectComponent) -> EffectComponent:
-    """Return a component that the images support beyond what is stated; else that."""
+    """Return the component if the images support more than the stated size; else it."""
     if found.is_supported and found.sigma > effect.stated:
         return found
     return found._replace(sigma=effect.stated, covariance=effect.prior)
@@ -136,7 +136,7 @@ def _found_leds(
 
 
 def _likely(found: Component, stated: float = 0.0) -> Component:
-    """Return a component if it is significant enough to be fitted, else none."""
+    """Return a component if it is significant; else one of standard deviation 0."""
     if found.sigma > stated and found.exceeds(FITTED):
         return found
     return NONE._replace(expected_sigma=found.expected_sigma)

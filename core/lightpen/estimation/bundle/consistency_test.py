@@ -117,7 +117,7 @@ class FileFit:
         return max(self._inconsistent(()).values(), default=0.0)
 
     def estimate_without(self, i: int, released: tuple[int, ...]) -> ImageEstimate:
-        """Estimate a number without its prior, some others released, too."""
+        """Estimate a number without its prior and the priors of the released ones."""
         by, prior = self.numbers[i].by, self._prior_variance(i)
         others = tuple(j for j in released if j != i)
         free = self._solved((*others, i))

@@ -58,7 +58,7 @@ class FoundEffect:
 
     @property
     def message(self) -> Message:
-        """The message to the user: what it is, how large, what to do."""
+        """The message to the user: kind and size of the effect, and the remedy."""
         if self.name in _TIMES:
             finding = _TIMES[self.name](self.size, self.interval_ms)
         else:

@@ -35,7 +35,7 @@ class SearchedEffect:
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of (tip, cone) by what the effect may be, (6, 6), mm^2."""
+        """Covariance of (tip, cone) by the possible size of the effect, (6, 6)."""
         G = self.by_unknowns
         return np.asarray(G @ self.component.expected @ G.T)
 

@@ -166,7 +166,7 @@ def is_supported(gain: float) -> bool:
 
 
 def held(effect: Effect) -> EffectComponent:
-    """Return the component of an effect that is held at 0, or at what is stated."""
+    """Return the component of an effect held at 0, or at its stated size."""
     gain = np.inf if effect.is_exact else 0.0
     return EffectComponent(effect.stated, gain, effect.prior, effect.prior)
 
@@ -200,7 +200,7 @@ def size_of(effect: Effect, S: FloatArray, right: FloatArray) -> EffectComponent
 
 
 def prior_of(effects: Sequence[Effect]) -> FloatArray:
-    """Return the covariance of the unknowns of several effects by their priors."""
+    """Return the prior covariance of the unknowns of several effects."""
     number = sum(effect.number for effect in effects)
     prior, first = np.zeros((number, number)), 0
     for effect in effects:
@@ -363,7 +363,7 @@ def lens_and_timing(
 def _timing(
     pixels: FloatArray, used: BoolArray, cameras: tuple[Camera, ...]
 ) -> list[Effect]:
-    """Return what happens later than the image of the first camera, if the pen moves.
+    """Return the effects of delays between LEDs, cameras and rows, if the pen moves.
 
     Images between which the pen does not move evenly on the whole tell nothing of it.
     """

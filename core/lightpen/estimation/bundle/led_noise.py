@@ -23,7 +23,7 @@ POWERS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 def find_center_noise(
     residuals: FloatArray, used: BoolArray, sigmas: FloatArray
 ) -> FloatArray | None:
-    """Return the noise of centres over that of a usual one, (N, C, L); None if equal.
+    """Return the noise of centres, 1 for a usual one, (N, C, L); None if equal.
 
     ``sigmas`` (N, C, L) are standard deviations by the detector, px; NaN where not
     seen. The residuals (N, C, L, 2) are in px.
@@ -45,7 +45,7 @@ def find_center_noise(
 def find_led_noise(
     residuals: FloatArray, used: BoolArray, sigma: float, weights: FloatArray
 ) -> FloatArray | None:
-    """Return the noise of each LED over that of a usual one, (C, L); None if equal.
+    """Return the noise of each LED, 1 for a usual one, (C, L); None if equal.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ def thermal_growth(pen: Pen, assumptions: Assumptions) -> float:
 
 
 def _warmth(pen: Pen, assumptions: Assumptions) -> float:
-    """Return the temperature of the pen less that of its measurement, K."""
+    """Return the temperature difference of the pen from its measurement, K."""
     if assumptions.temperature_c is None:
         return 0.0
     measured = pen.temperature_c

@@ -170,7 +170,7 @@ def follow_lamps(lamps: FloatArray) -> CameraPath | None:
 
 
 def _share_of_pen(camera: Camera, path: CameraPath, posed: PosedImages) -> float:
-    """Return the share of the lamps' shift that the tip shows, too."""
+    """Return the shift of the tip over that of the lamps, by least squares."""
     pivot = posed.pivot
     by_lamps = path.shifts[posed.fitted] * pivot.pivot_cam[2] / camera.fx
     by_pen = pivot.residuals[:, :2]

@@ -180,7 +180,7 @@ class ContactModel:
 
     @classmethod
     def of(cls, camera: Camera, pen: Pen, pixels: FloatArray) -> "ContactModel":
-        """Return that of one camera, which saw pixels (N, L, 2)."""
+        """Return the model of one camera with centres ``pixels`` (N, L, 2), px."""
         return cls(rig_of(camera), pen, pixels[:, None])
 
     def at(

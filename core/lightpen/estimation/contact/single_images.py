@@ -44,7 +44,7 @@ class PosedImages:
 
 
 def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedImages:
-    """Fit the pose of each image and exclude those of another tip.
+    """Fit the pose of each image and exclude images of another tip.
 
     Raises `CalibrationError` if the images do not determine the tip.
     """

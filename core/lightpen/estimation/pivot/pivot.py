@@ -281,7 +281,7 @@ def agreeing_solution(
 
 
 def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
-    """Return the solution of the sample to which a share of the poses is nearest."""
+    """Return the solution, (6,), mm, of the sample that fits a share of poses best."""
     n_poses = len(equations.rotations)
     rng = default_rng(0)  # the same poses give the same tip
     size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))

@@ -107,7 +107,7 @@ def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
 def propagated_covariance(
     rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
 ) -> FloatArray:
-    """Return the covariance of (tip_pen, cone_cam) by that of poses, (6, 6), mm^2.
+    """Return the covariance of (tip_pen, cone_cam), given that of poses, (6, 6), mm^2.
 
     Its arguments are those of `lightpen.estimation.pivot.pivot.tip_covariances`.
     """

@@ -241,7 +241,7 @@ def halves_agree(halves: SplitHalfCheck) -> bool:
 
 
 def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
-    """Judge a calibration by what its tip is worth, not by its residuals alone.
+    """Judge a calibration by the uncertainty of its tip and by its residuals.
 
     Only images that show the pen count, copies once. What else there is depends on how
     long a camera ran before and after, and a swing that is captured does not keep it.

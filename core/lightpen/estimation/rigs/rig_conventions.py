@@ -109,7 +109,7 @@ def require_usual_rig(
 
 
 def _distance(stated: _Places, found: _Places) -> _Distance:
-    """Return that of the camera that lies farthest."""
+    """Return the deviation of the camera that is farthest from its stated place."""
     turns = stated.rotations @ np.swapaxes(found.rotations, 1, 2)
     angles = np.linalg.norm(vector_from_rotation(turns), axis=1)
     lengths = np.linalg.norm(stated.translations - found.translations, axis=1)

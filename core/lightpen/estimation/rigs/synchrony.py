@@ -62,7 +62,7 @@ class PenRotations:
         )
 
     def completed(self, other: "PenRotations", rotation: FloatArray) -> "PenRotations":
-        """Return these, completed by those of a camera rotated by `rotation`."""
+        """Return these; a camera rotated by ``rotation`` fills the gaps."""
         new = other.known & ~self.known
         return PenRotations(
             np.where(new[:, None, None], rotation.T @ other.rotations, self.rotations),

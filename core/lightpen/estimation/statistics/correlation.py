@@ -81,7 +81,7 @@ def correlated_covariance(
 
 @dataclass(frozen=True, eq=False)
 class _SpectrumFit:
-    """Restricted log likelihood of a spectrum, and the score's covariance by it."""
+    """Restricted log likelihood of a spectrum, and the covariance of the score."""
 
     likelihood: float
     score: FloatArray

@@ -86,7 +86,7 @@ def find_beside(
     others: FloatArray,
     stated: float = 0.0,
 ) -> Component:
-    """Find the standard deviation of k moves of n unknowns that have other errors, too.
+    """Find the std. deviation of k of n unknowns that also have other errors.
 
     Parameters
     ----------

@@ -350,7 +350,7 @@ def drift_variance(bundle: Bundle) -> float:
 
 
 def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]:
-    """Return the covariances by seat modes beyond the form error, and by it, (6, 6)."""
+    """Return covariances (6, 6) by seat modes: beyond the form error, and by it."""
     at = bundle.layout.whole_seat
     gain = bundle.covariance[:6, at] @ bundle.prior_information[at, at]
     known = _by_forms(bundle, [form_error**2] * len(MODE_COUNTS))
@@ -404,7 +404,7 @@ def _prior_variance(bundle: Bundle, at: slice) -> float:
 
 
 def compare_halves(joint: JointFit) -> SplitHalfCheck:
-    """Compare the tip of the odd images with that of the even ones."""
+    """Compare the tip by odd images with the tip by even images."""
     steps, covariances = [], []
     for first in (0, 1):
         S = joint.information[first::2].sum(axis=0)

@@ -35,7 +35,7 @@ class NormalEffect(NamedTuple):
     information: FloatArray
 
     def covariance(self, of_turn: FloatArray) -> FloatArray:
-        """Return the covariance (p, p) by that of the turn, (2, 2), rad^2."""
+        """Return the covariance (p, p), from the turn's covariance (2, 2), rad^2."""
         return np.asarray(self.gain @ of_turn @ self.gain.T)
 
 

@@ -294,7 +294,7 @@ def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
 
 
 def _shift_from(bundle: Bundle, priors: Priors) -> FloatArray:
-    """Return (tip, cone) of the estimate less those of this fit, (6,), mm."""
+    """Return the change of (tip, cone) from this fit to the estimate, (6,), mm."""
     shrunk, likely = shrunk_priors(bundle, priors), likely_effects(bundle)
     if shrunk is priors and likely == bundle.unknowns.effects:
         return np.zeros(6)

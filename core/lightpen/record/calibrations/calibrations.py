@@ -93,7 +93,7 @@ class CalibrationFile:
 
     @property
     def is_of_rig(self) -> bool:
-        """Whether several cameras were used; the frames are then those of all."""
+        """Whether several cameras were used; frames then have detections of each."""
         return self.calibration.rig is not None
 
     @property
@@ -106,7 +106,7 @@ class CalibrationFile:
 
     @property
     def camera_sha256(self) -> str:
-        """SHA-256 of the camera file, of a rig that of the first camera."""
+        """SHA-256 of the camera file, for a rig of the first camera's."""
         return self.calibration.inputs.camera.sha256
 
     @property

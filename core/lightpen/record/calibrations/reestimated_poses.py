@@ -1,4 +1,4 @@
-"""The images of a calibration posed again, by what its file states and nothing else.
+"""Poses of a calibration's images estimated again, from its file alone.
 
 Camera and pen are as the calibration left them, so that the poses, and what is left of
 each LED, are those of its fit but for the cone that holds the tip in one place. LEDs
@@ -41,7 +41,7 @@ class ReestimatedPoses:
 
 
 def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
-    """Pose the images of a calibration again.
+    """Estimate the poses of a calibration's images again.
 
     None of several cameras or two cones, and where the file does not keep enough.
     """
@@ -88,7 +88,7 @@ def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
 
 
 def _camera(fitted: InstrumentRecord, pixels: FloatArray) -> Camera:
-    """Return the camera; of its images no more is known than where LEDs were."""
+    """Return the camera; its image size is the extent of the LED centres."""
     fx, fy, cx, cy, *distortion = fitted.intrinsics
     width, height = np.ceil(np.nanmax(pixels, axis=(0, 1))).astype(int).tolist()
     return Camera(
@@ -119,7 +119,7 @@ def _first(rotations: FloatArray) -> int | None:
 
 
 def _uncertainties(calibration: CalibrationRecord, running: RunningTip) -> FloatArray:
-    """Return U (k = 2) of a running tip, (M, 3), mm; the last is that of the record."""
+    """Return U (k = 2) of a running tip, (M, 3), mm, ending at the recorded U."""
     alone = np.sqrt(np.diagonal(running.covariances, axis1=1, axis2=2))
     variances = {
         share.name: np.square(share.standard_uncertainty_mm)

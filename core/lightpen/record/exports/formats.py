@@ -110,7 +110,7 @@ def _text(file: CalibrationFile) -> str:
 
 
 def _slicer(file: CalibrationFile) -> str:
-    """Return an ITK transform that 3D Slicer opens as that of the tip to the pen.
+    """Return an ITK transform that 3D Slicer reads as pen_from_tip.
 
     ITK's axes point left and to the back where Slicer's point right and to the front,
     and Slicer takes its transforms to go from the parent: of a shift only the last

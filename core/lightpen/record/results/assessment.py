@@ -97,7 +97,7 @@ def assess(
 def _limits_in_force(
     archive: FolderArchive, names: Names, recorded: SwingLimits
 ) -> SwingLimits:
-    """Return the limits set for a station now; those of the swing where there are none.
+    """Return the limits set for a station now; without any, those of the swing.
 
     Those of the swing are in a file that anybody can edit, and may be older.
     """

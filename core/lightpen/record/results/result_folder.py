@@ -190,7 +190,7 @@ class FolderArchive:
         return None
 
     def all_files(self) -> tuple[Path, ...]:
-        """Return the files of all results and takings back, the oldest first."""
+        """Return the files of all results and revocations, the oldest first."""
         roots = reversed(self._roots())
         return tuple(file for root in roots for file in reversed(numbered_files(root)))
 

@@ -1,4 +1,4 @@
-"""An accepted calibration, the taking back of one, and how each is written.
+"""Accepted calibrations and revocations, and their files.
 
 A result is one JSON object. Its first entries, the head, say who accepted what and
 when, and which swing it comes from; they end with their checksum. The last entry,

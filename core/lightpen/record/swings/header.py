@@ -109,7 +109,7 @@ class Header(Struct, frozen=True, kw_only=True):
 
     @property
     def nominal_tip(self) -> FloatArray | None:
-        """Tip by design in place of that of the pen file, pen frame, (3,), mm."""
+        """Tip by design in place of the pen file's, pen frame, (3,), mm."""
         tip = self.nominal_tip_mm
         return None if tip is None else np.array(tip, dtype=np.float64)
 
@@ -176,7 +176,7 @@ def header_copies(header: Header) -> Mapping[str, FileCopy]:
 
 
 def copy_name(stem: str, file: FileCopy) -> str:
-    """Return the file of a copy, from the folder of its record."""
+    """Return the file of a copy, relative to its record."""
     return stem + Path(file.name).suffix.lower()
 
 

@@ -221,12 +221,12 @@ def unacknowledged_images(record: Record) -> tuple[str, ...]:
 
 
 def images_folder(c: int) -> str:
-    """Return the folder of the images of the c-th camera, from that of its record."""
+    """Return the image folder of the c-th camera, relative to the record."""
     return IMAGES if c == 0 else f"{IMAGES}-{c + 1}"
 
 
 def image_name(number: int, c: int = 0) -> str:
-    """Return the file of an image of the c-th camera, from the folder of its record."""
+    """Return the image file of the c-th camera, relative to the record."""
     return f"{images_folder(c)}/{number:06d}.png"
 
 

@@ -49,7 +49,7 @@ def files_beside(place: str) -> FilesBeside:
 
 
 def is_simulated_recording(place: str) -> bool:
-    """Return whether recorded images or those of a recorded swing were simulated."""
+    """Return whether images, or those of a recorded swing, were simulated."""
     folder = Path(place)
     if is_simulated(folder):
         return True

@@ -45,7 +45,7 @@ def take_image(
 def with_new(
     setup: SwingSetup, rotations: FloatArray, detection: PenDetection
 ) -> FloatArray:
-    """Return the postures (M, 3, 3), with that of the detection if it is new."""
+    """Return the postures (M, 3, 3), the one of the detection added if new."""
     if not _is_new(rotations, detection, setup.limits.spacing):
         return rotations
     return np.concatenate([rotations, detection.rotation[None]])

@@ -108,7 +108,7 @@ def pause(state: SwingState) -> SwingState:
 
 
 def resume(state: SwingState) -> SwingState:
-    """Return the swing going on after the user's pause, from finding the seat.
+    """Return the swing resumed after the user's pause, from finding the seat on.
 
     Of recorded images the next one is read.
     """

@@ -141,7 +141,7 @@ def improve_pen(
 
 
 def _require_unchanged(calibrations: Sequence[CalibrationFile], pen: Pen) -> None:
-    """Refuse swings of before and after an LED moved: no one file is of both."""
+    """Refuse swings before and after an LED moved: no LED file fits both."""
     health = examine_pen(calibrations, None, pen.leds)
     if not health.moved:
         return
@@ -171,7 +171,7 @@ def _known_before(
 
 
 def _with_marks(found: FoundT | None, marks: Sequence[FloatArray]) -> FoundT | None:
-    """Return what was known before, for the images with these marks, too."""
+    """Return the prior knowledge with the marks of more images it was found from."""
     if found is None:
         return None
     return replace(found, marks=np.concatenate([found.marks, *marks]))

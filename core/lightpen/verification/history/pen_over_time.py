@@ -47,7 +47,7 @@ class PenOverTime:
 
     @property
     def poolable(self) -> tuple[CalibrationFile, ...]:
-        """The newest swings that a better LED file can be made of, the oldest first."""
+        """The newest swings usable for an improved LED file, the oldest first."""
         alike = [
             swing
             for swing in self.swings

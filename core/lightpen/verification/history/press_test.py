@@ -101,7 +101,7 @@ def press_test(usual: Calibration, firm: Calibration) -> PressTest:
 def _difference(
     usual: Calibration, firm: Calibration, instrument: Instrument
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the change of (tip, cone), its covariance, and that by compliance."""
+    """Return the change of (tip, cone), its covariance, and its share by compliance."""
     fits = [fit_held(each, instrument.rig, instrument.pen) for each in (usual, firm)]
     before, after = (np.r_[fit.tip_pen, fit.cone_cam] for fit in fits)
     # Effect of an unmodelled move of the cone on tip and cone.

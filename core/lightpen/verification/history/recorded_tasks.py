@@ -1,4 +1,4 @@
-"""Verifications read back from their JSON, where something else builds on them."""
+"""Verifications read back from their JSON, for use in other computations."""
 
 from pathlib import Path
 from typing import Annotated, TypeVar

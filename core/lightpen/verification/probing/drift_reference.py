@@ -43,7 +43,7 @@ class LampImages:
     distances: tuple[float, ...] = ()  # of the pen along the view, mm
 
     def then(self, other: "LampImages") -> "LampImages":
-        """Return both, the other ones after these."""
+        """Return these images followed by others."""
         return LampImages(
             (*self.lights, *other.lights), (*self.distances, *other.distances)
         )
@@ -56,7 +56,7 @@ class LampObservations:
     cameras: tuple[LampImages, ...] = ()
 
     def then(self, other: "LampObservations") -> "LampObservations":
-        """Return these images of the reference, followed by those of another one."""
+        """Return these observations followed by others, camera by camera."""
         if not (self.cameras and other.cameras):
             return self if self.cameras else other
         both = zip(self.cameras, other.cameras, strict=True)

@@ -80,7 +80,7 @@ def viewers_of_rig(file: RigFile) -> PenCameras:
 
 
 def read_viewers(camera_file: Path | None, rig_file: Path | None) -> PenCameras | None:
-    """Read a camera file or a rig file; None of neither."""
+    """Read a camera file or a rig file; None for any other file."""
     if rig_file is not None:
         return viewers_of_rig(read_rig(rig_file))
     if camera_file is not None:

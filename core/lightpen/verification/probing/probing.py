@@ -190,7 +190,7 @@ def read_rules(is_still: bool, n_frames: int) -> ProbingRules:
 def taken_again(
     instrument: Instrument, rules: ProbingRules, state: ProbingState, still: StillFrames
 ) -> ProbingState:
-    """Return the touches with one more that was taken before, if it counts as new."""
+    """Return the touches with an earlier one added again, if it counts as new."""
     frame = still.frames[0]
     tip_cam = frame.rotation @ instrument.tip_pen + frame.translation
     place = TipObservation(frame, tip_cam, np.zeros((3, 3)))
@@ -244,7 +244,7 @@ def _has_left(rest: tuple[TipObservation, ...], seen: TipObservation) -> bool:
 def _differs(
     seen: TipObservation, before: TipObservation, turn: float, distance: float
 ) -> bool:
-    """Return whether the pen turned or moved by so much: rad, mm."""
+    """Return whether the pen turned, rad, or its tip moved, mm, by at least so much."""
     rotations = seen.frame.rotation[None], before.frame.rotation[None]
     way = float(np.linalg.norm(seen.tip_cam - before.tip_cam))
     return bool(angles_between(*rotations)[0, 0] >= turn or way >= distance)

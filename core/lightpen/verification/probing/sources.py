@@ -73,7 +73,7 @@ def lamp_drift_of(
 def instrument_of(
     calibration: CalibrationFile, viewers: PenCameras, pen: Pen, pen_file: Path
 ) -> Instrument:
-    """Return the instrument that a calibration of the same pen left.
+    """Return the instrument as adjusted by a calibration of the same pen.
 
     Before other cameras than those of the calibration, tip and LEDs are as the swing
     left them and the cameras are as their files have them.
@@ -109,7 +109,7 @@ def instrument_of(
 
 
 def _fitted_rig(viewers: PenCameras, fitted: InstrumentRecord) -> Rig:
-    """Return the cameras as a swing left them."""
+    """Return the cameras as adjusted by a swing."""
     one = viewers.rig.cameras[0]  # whose images are as large
     of_files = dict(enumerate(viewers.rig.cameras))
     others = fitted.other_cameras
@@ -196,7 +196,7 @@ def touches_of(
 
 
 def require_leds_fit(name: str, touches: Sequence[ProbedPoint]) -> None:
-    """Reject touches whose median residual is larger than that of this pen can be."""
+    """Reject touches with a median residual that is too large for this pen."""
     rms = float(np.median([touch.rms for touch in touches]))
     if rms > MAX_RMS:
         raise CalibrationError(

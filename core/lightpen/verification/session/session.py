@@ -285,7 +285,7 @@ def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> Probing
 
 
 def with_touch(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:
-    """Measure again with the last point; drop it if it can be none of the task."""
+    """Measure again with the last point; drop it if it cannot be one of the task."""
     points = measure_touches(setup.instrument, state.touching.taken)
     state = replace(state, touches=points)
     screening = _screened(setup, state, task)

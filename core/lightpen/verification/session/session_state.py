@@ -132,7 +132,7 @@ class SessionState:
         )
 
     def _cones(self) -> tuple[FloatArray, ...]:
-        """Return the probed cones, of which a point may be a repetition."""
+        """Return the cones probed so far; a point in one may be a repetition."""
         found = self.found_by(FIXED_POINT)
         cones = [visit[0].point_cam for visit in self.visits[:1]]
         return tuple(cones if found is None else [*cones, found.calibrated.mean])

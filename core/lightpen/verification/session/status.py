@@ -43,7 +43,7 @@ class SessionEventKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class VerificationStatus:
-    """A verification from the current tip to its verdict; nothing of it is changed."""
+    """Immutable snapshot of a verification, from the current tip to its verdict."""
 
     tip: CurrentTip | None = None
     setup: SessionSetup | None = None  # None until the tip is read

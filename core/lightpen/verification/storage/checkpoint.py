@@ -186,7 +186,7 @@ class UnlistedRecords:
 
 
 def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRecords:
-    """Return the files written after that of a verification."""
+    """Return the files written after the file of a verification."""
     session = under_way.began.isoformat(timespec="seconds")
     since: list[tuple[str, str]] = []
     for file in numbered_files(folder):

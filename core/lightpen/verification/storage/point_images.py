@@ -219,7 +219,7 @@ def is_held_on(rules: ProbingRules, state: SessionState) -> bool:
 
 
 def new_record(root: Path, names: Names, header: Header) -> NewRecord:
-    """Make a folder for the images of a run below that of the verifications."""
+    """Make a folder for the images of a run in the verifications folder."""
     return NewRecord(make_record_folder(root / TOUCHES, names, header.created), header)
 
 

@@ -61,7 +61,7 @@ from lightpen.verification.tasks.registry import task_of
 
 @dataclass(frozen=True, eq=False)
 class ResumedVerification:
-    """A verification as it was when it was interrupted."""
+    """State of a verification at its interruption."""
 
     under_way: VerificationCheckpoint
     tip: CurrentTip

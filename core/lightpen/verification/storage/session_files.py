@@ -121,7 +121,7 @@ class SessionKeeping:
         self._keep(done)
 
     def add_again(self, before: SessionState, state: SessionState) -> bool:
-        """Store the results of points that were measured again; return if there are."""
+        """Store results of points measured again; return whether there are any."""
         again = [
             kind
             for kind, found in state.found.items()

@@ -72,7 +72,7 @@ class Drift(Found):
 
     @property
     def share(self) -> FloatArray:
-        """Standard uncertainty by it of a point measured meanwhile, (3,), mm."""
+        """Standard uncertainty by the drift for points probed meanwhile, (3,), mm."""
         return np.asarray(np.abs(self.moves).max(axis=0) / np.sqrt(3))
 
 

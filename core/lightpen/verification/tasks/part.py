@@ -117,7 +117,7 @@ class Part(Found):
 
 
 def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
-    """Measure a part by its plan, as far as it was probed.
+    """Measure a part by its plan, up to the features probed so far.
 
     Runs are named after features, or in the order of the plan. Raises
     `CalibrationError` if the touches of a feature are too few, show no side or do not

@@ -161,7 +161,7 @@ def measure_touches(
 def with_tip(
     touch: ProbedPoint, instrument: Instrument, tip_pen: FloatArray
 ) -> ProbedPoint:
-    """Return a touch as another place (3,) of the tip in the pen would have it."""
+    """Return a touch recomputed with another tip (3,), pen frame, mm."""
     moved = touch.rotation @ (tip_pen - instrument.tip_pen)
     return replace(touch, point_cam=touch.point_cam + moved)
 

@@ -229,7 +229,7 @@ def _assessment(
     tip: TipEvidence,
     limits: VerificationLimits,
 ) -> VerificationAssessment:
-    """Judge size, tip and form; the limit of the diameter is twice that of a radius."""
+    """Judge size, tip and form; a diameter has twice the limit of a radius."""
     error, uncertainty, limit = size.error, size.uncertainty, 2 * limits.radius
     if abs(error) > ANOTHER * size.certified:
         another = message(

@@ -1,4 +1,4 @@
-"""What the tasks share that probe a ring, a sphere or a plate at many points."""
+"""Common parts of the tasks that probe a ring, a sphere or a plate."""
 
 from collections.abc import Callable, Sequence
 
@@ -37,7 +37,7 @@ def lie_near(distances: FloatArray) -> BoolArray:
 def split_points(
     points: Sequence[ProbedPoint], are_near: BoolArray
 ) -> tuple[Points, Points]:
-    """Return the points on a surface, and those off it."""
+    """Part the points into those on a surface and those off it."""
     pairs = list(zip(points, are_near, strict=True))
     near = tuple(point for point, is_near in pairs if is_near)
     return near, tuple(point for point, is_near in pairs if not is_near)
@@ -55,7 +55,7 @@ def simulated_ranges(root: FloatArray, n_rows: int = 1) -> FloatArray:
 
 
 def form_by_noise(covariance: FloatArray, n_rows: int = 1) -> float:
-    """Return the largest form, mm, that an ideal surface shows, but by chance.
+    """Return the quantile of the form that noise gives an ideal surface, mm.
 
     ``covariance`` is that of its residuals, mm^2; see `simulated_ranges`.
     """
@@ -108,7 +108,7 @@ def residuals_so_far(
     residuals_of: Callable[[FloatArray], FloatArray],
     least: int,
 ) -> tuple[ResultTable, ...]:
-    """Return the residuals of all points, as soon as there are so many."""
+    """Return the residuals of all points, once there are at least ``least``."""
     if len(points) < least:
         return (ResultTable(title),)
     try:
