@@ -159,7 +159,7 @@ def _sound_images(folder: Path) -> set[int]:
 
 def _taken_out_is_one_edit(data: Path, reported: list[str]) -> bool:
     record: Record = open_record(data / RECORDS / "swing")
-    out = tuple(sorted(record.taken_out))
+    out = tuple(sorted(record.excluded))
     return out in {(1, 3), (2, 4, 5)} or (not reported and out == (2,))
 
 

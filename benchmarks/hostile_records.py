@@ -89,7 +89,7 @@ def make_data(folder: Path) -> Data:
     with RecordWriter.create(swing, record_header(preparation)) as writer:
         for i in range(N_IMAGES):
             writer.append(IMAGE, pixels[i], R[i], t[i], i / 20)
-        writer.set_taken_out({2: "excluded"})
+        writer.set_excluded({2: "excluded"})
     archive = FolderArchive(folder)
     for x in (1.0, 2.0):
         archive.store(small_result(x, swing))

@@ -31,7 +31,7 @@ from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.writing import (
     RecordWriter,
     make_record_folder,
-    note_taken_out,
+    note_excluded,
 )
 from lightpen_app.work.settings_store import Content, load, save
 
@@ -80,7 +80,7 @@ def take_out(data: Path) -> None:
     """Put back what is out, and take out others, in one edit."""
     for n in count():
         out = EDITS[n % 2]
-        note_taken_out(data / RECORDS / "swing", dict.fromkeys(out, "excluded"))
+        note_excluded(data / RECORDS / "swing", dict.fromkeys(out, "excluded"))
         tell(n)
 
 

@@ -13,7 +13,7 @@ from benchmarks.small_records import SECOND_CONE
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.own_json import with_checksum
-from lightpen.record.swings.writing import note_taken_out
+from lightpen.record.swings.writing import note_excluded
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
@@ -109,7 +109,7 @@ def test_images_that_were_taken_out_stay_out(
     lightpen: Run, swung: Callable[..., Path], tmp_path: Path
 ) -> None:
     folder = Path(shutil.copytree(swung(), tmp_path / "swing"))
-    note_taken_out(folder, {3: "taken out", 7: "taken out"})
+    note_excluded(folder, {3: "taken out", 7: "taken out"})
     record = tmp_path / "tip.json"
     printed = lightpen("calibrate", folder, "--json", record).stdout
     shutil.rmtree(folder)

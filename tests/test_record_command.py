@@ -18,7 +18,7 @@ from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import image_name, open_record
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.solving import solve_record
-from lightpen.record.swings.writing import note_taken_out
+from lightpen.record.swings.writing import note_excluded
 
 Run = Callable[..., CompletedProcess[str]]
 N_IMAGES = 20
@@ -139,7 +139,7 @@ def test_both_methods_can_be_asked_for(
 def test_images_taken_out_are_named_with_their_reason(
     calibrated: Calibrated, folder: Path
 ) -> None:
-    note_taken_out(folder, {2: "taken out", 9: "taken out", 5: "tip slipped"})
+    note_excluded(folder, {2: "taken out", 9: "taken out", 5: "tip slipped"})
     fields, text = calibrated(folder)
     frames = {frame["file"]: frame for frame in fields["frames"]}
 
@@ -158,9 +158,9 @@ def test_taking_out_and_putting_back_gives_the_tip_of_before(
     calibrated: Calibrated, untouched: dict[str, Any], folder: Path
 ) -> None:
     before = untouched["tip_pen_mm"]
-    note_taken_out(folder, {4: "taken out"})
+    note_excluded(folder, {4: "taken out"})
     without = calibrated(folder)[0]["tip_pen_mm"]
-    note_taken_out(folder, {})
+    note_excluded(folder, {})
 
     assert calibrated(folder)[0]["tip_pen_mm"] == before != without
 

@@ -61,7 +61,7 @@ def capture_image(
     # The image last: if the disk fails before, state and record both go without it.
     for event in transition.events:
         if event.what is SwingEventKind.SLIPPED and event.numbers:
-            writer.take_out(event.numbers, Reason.SLIPPED)
+            writer.exclude(event.numbers, Reason.SLIPPED)
     for event in transition.events:
         if event.what is SwingEventKind.KEPT:
             writer.append(

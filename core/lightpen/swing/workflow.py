@@ -35,7 +35,7 @@ from lightpen.record.swings.solving import Solution, solve_again, solve_record
 from lightpen.record.swings.writing import (
     RecordWriter,
     make_record_folder,
-    note_taken_out,
+    note_excluded,
 )
 from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, Task
@@ -258,7 +258,7 @@ class SwingWorkflow:
         self._task.drop()
         self._close_record()
         self._faults.trying(lambda: discard_swing(folder))
-        self._wanted = first.solution.taken_out
+        self._wanted = first.solution.excluded
         self._publish(replace(first, pressed=pressed), SwingEvent(SwingEventKind.DONE))
 
     def _heading_for(self, swing: Resumable) -> float | None:
@@ -446,21 +446,21 @@ class SwingWorkflow:
         """End the capture with the present images."""
         self._change(finish)
 
-    def take_out(self, numbers: Iterable[int]) -> None:
+    def exclude(self, numbers: Iterable[int]) -> None:
         """Exclude images and compute the tip again."""
         self._want({**self._wanted, **dict.fromkeys(numbers, str(Reason.TAKEN_OUT))})
 
-    def put_back(self, numbers: Iterable[int]) -> None:
+    def include(self, numbers: Iterable[int]) -> None:
         """Include images again and compute the tip again."""
         back = set(numbers)
         self._want({n: why for n, why in self._wanted.items() if n not in back})
 
-    def _want(self, taken_out: Mapping[int, str]) -> None:
+    def _want(self, excluded: Mapping[int, str]) -> None:
         """Solve without these images, now or after the present computation."""
         status = self._status
         if status.solution is None or status.result is not None or status.is_reading:
             return
-        self._wanted = taken_out
+        self._wanted = excluded
         if not self._task.is_there:
             self._solve_again(status.solution)
 
@@ -495,7 +495,7 @@ class SwingWorkflow:
             return
         self._task.drop()
         if self._status.solution is not None:
-            self._wanted = self._status.solution.taken_out
+            self._wanted = self._status.solution.excluded
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _on_solved(self, solved: tuple[Solution, SwingAssessment]) -> None:
@@ -508,16 +508,16 @@ class SwingWorkflow:
         assert folder is not None
         assert state is not None
         if before is None:
-            self._wanted = solution.taken_out
-        elif before.taken_out != solution.taken_out:
+            self._wanted = solution.excluded
+        elif before.excluded != solution.excluded:
             try:
-                note_taken_out(folder, solution.taken_out)
+                note_excluded(folder, solution.excluded)
             except LightpenError as error:
                 self._keep_solution(before, error.message)
                 return
         self._faults.end()
         verdict = assessment.verdict
-        goes_on = self._wanted != solution.taken_out
+        goes_on = self._wanted != solution.excluded
         activity = Activity.SOLVING if goes_on else Activity.NONE
         status = replace(
             status,
@@ -547,7 +547,7 @@ class SwingWorkflow:
                 status, message(Code.NO_TIP, why=failed.causes[0]), passed=False
             )
             return
-        if set(self._tried) > set(solution.taken_out):
+        if set(self._tried) > set(solution.excluded):
             why = message("swing.images-stay-in", why=why)
         self._keep_solution(solution, why)
 
@@ -556,7 +556,7 @@ class SwingWorkflow:
         if self._wanted != self._tried:  # the user continued meanwhile
             self._solve_again(solution)
             return
-        self._wanted = solution.taken_out
+        self._wanted = solution.excluded
         self._faults.report(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 

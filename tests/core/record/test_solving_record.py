@@ -27,7 +27,7 @@ from lightpen.record.swings.solving import (
     solve_again,
     solve_record,
 )
-from lightpen.record.swings.writing import RecordWriter, note_taken_out
+from lightpen.record.swings.writing import RecordWriter, note_excluded
 from lightpen.simulator.swings import PAPER_TIP
 
 N_IMAGES = 20
@@ -68,13 +68,13 @@ def test_two_solutions_of_a_record_are_the_same_to_the_last_digit(folder: Path) 
 def test_images_taken_out_give_the_same_tip_at_once_and_from_the_disk(
     folder: Path,
 ) -> None:
-    taken_out = {3: "taken out", 7: "tip slipped"}
-    at_once = solve_again(solve_record(open_record(folder)), taken_out)
-    note_taken_out(folder, taken_out)
+    excluded = {3: "taken out", 7: "tip slipped"}
+    at_once = solve_again(solve_record(open_record(folder)), excluded)
+    note_excluded(folder, excluded)
     from_disk = solve_record(open_record(folder))
 
     assert_same(at_once, from_disk)
-    assert at_once.taken_out == from_disk.taken_out == taken_out
+    assert at_once.excluded == from_disk.excluded == excluded
     assert at_once.calibration.reasons[2] is Reason.TAKEN_OUT
     assert at_once.calibration.reasons[6] is Reason.SLIPPED
     assert at_once.calibration.used.sum() == N_IMAGES - 2
@@ -83,9 +83,9 @@ def test_images_taken_out_give_the_same_tip_at_once_and_from_the_disk(
 @pytest.mark.slow
 def test_images_put_back_give_the_tip_of_before(folder: Path) -> None:
     before = solve_record(open_record(folder))
-    note_taken_out(folder, {1: "taken out", 2: "taken out"})
+    note_excluded(folder, {1: "taken out", 2: "taken out"})
     fewer = solve_record(open_record(folder))
-    note_taken_out(folder, {})
+    note_excluded(folder, {})
 
     assert_same(solve_again(fewer, {}), before)
     assert_same(solve_record(open_record(folder)), before)
@@ -163,7 +163,7 @@ def test_too_few_images_left_leave_the_solution_as_it_is(folder: Path) -> None:
     ):
         solve_again(solution, all_but_five)
 
-    assert solution.taken_out == {}
+    assert solution.excluded == {}
 
 
 def test_numbers_of_images_that_are_not_there_take_nothing_out(folder: Path) -> None:
@@ -173,9 +173,9 @@ def test_numbers_of_images_that_are_not_there_take_nothing_out(folder: Path) -> 
 
 
 def test_noting_what_is_noted_already_leaves_the_record_untouched(folder: Path) -> None:
-    note_taken_out(folder, {5: "taken out"})
+    note_excluded(folder, {5: "taken out"})
     before = (folder / JOURNAL).read_bytes()
-    note_taken_out(folder, {5: "taken out"})
+    note_excluded(folder, {5: "taken out"})
 
     assert (folder / JOURNAL).read_bytes() == before
 

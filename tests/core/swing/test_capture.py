@@ -224,7 +224,7 @@ def test_slipped_images_are_taken_out_of_the_record(tmp_path: Path) -> None:
     record = open_record(wizard.folder)
 
     assert wizard.state.n_dropped[Reason.SLIPPED] > 0
-    assert set(record.taken_out.values()) == {"tip slipped"}
+    assert set(record.excluded.values()) == {"tip slipped"}
     np.testing.assert_array_equal(record.numbers, wizard.state.kept.numbers)
 
 
@@ -273,7 +273,7 @@ def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
 
     with monkeypatch.context() as patch:
         patch.setattr("lightpen.swing.swing_recorder.advance_swing", slipped_and_kept)
-        patch.setattr(RecordWriter, "take_out", fail)
+        patch.setattr(RecordWriter, "exclude", fail)
         with pytest.raises(FileError, match="No space left"):
             wizard.run(4)
     assert wizard.writer.next_number == wizard.state.next_number == 4

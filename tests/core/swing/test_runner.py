@@ -220,8 +220,8 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
         SwingWorkflow.set_aside,
     ):
         runner.ask(act)
-    runner.ask(lambda workflow: workflow.take_out([1]))
-    runner.ask(lambda workflow: workflow.put_back([1]))
+    runner.ask(lambda workflow: workflow.exclude([1]))
+    runner.ask(lambda workflow: workflow.include([1]))
     station.see()
 
     assert station.witness.reported == []
@@ -455,7 +455,7 @@ def test_a_swing_that_was_changed_since_it_was_read_is_refused_and_nothing_begin
 ) -> None:
     swing = read_resumable(interrupted)
     with RecordWriter.resume(swing.record) as writer:
-        writer.take_out([1], "by somebody else")
+        writer.exclude([1], "by somebody else")
     station.runner.ask(lambda workflow: workflow.go_on(swing))
     station.wait_until(lambda: len(station.witness.faults) == 1)
 

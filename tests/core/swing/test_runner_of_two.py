@@ -84,9 +84,9 @@ def test_running_fit_and_solution_are_of_both_cameras(
     assert files == ["camera.yaml", "camera-2.yaml"]
     assert len(again["inputs"]["observations"]) == 2 * N_IMAGES
 
-    station.runner.ask(lambda workflow: workflow.take_out([3]))
+    station.runner.ask(lambda workflow: workflow.exclude([3]))
     station.wait_until(
-        lambda: not station.status.is_solving and 3 in station.solution.taken_out
+        lambda: not station.status.is_solving and 3 in station.solution.excluded
     )
     for images in station.solution.calibration.cameras:
         assert not images.used[2]

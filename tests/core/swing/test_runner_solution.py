@@ -61,16 +61,16 @@ def test_so_it_is_after_taking_images_out_and_putting_some_back(
     solved: "Station", command: Command
 ) -> None:
     before = solved.tip
-    solved.runner.ask(lambda workflow: workflow.take_out([2, 5, 9]))
+    solved.runner.ask(lambda workflow: workflow.exclude([2, 5, 9]))
     solved.wait_until_solved()
     without = solved.tip
-    solved.runner.ask(lambda workflow: workflow.put_back([5]))
+    solved.runner.ask(lambda workflow: workflow.include([5]))
     solved.wait_until_solved()
     assert len({tuple(tip) for tip in (before, without, solved.tip)}) == 3
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
-    assert set(open_record(solved.record_folder).taken_out) == {2, 9}
+    assert set(open_record(solved.record_folder).excluded) == {2, 9}
 
-    solved.runner.ask(lambda workflow: workflow.put_back([2, 9]))
+    solved.runner.ask(lambda workflow: workflow.include([2, 9]))
     solved.wait_until_solved()
     assert solved.tip == before == command(solved.record_folder)["tip_pen_mm"]
 
@@ -88,12 +88,12 @@ def test_images_taken_out_in_quick_succession_all_count(
     solved: "Station", command: Command
 ) -> None:
     for number in range(1, 8):
-        solved.runner.ask(partial(SwingWorkflow.take_out, numbers=[number]))
-    solved.runner.ask(lambda workflow: workflow.put_back([4]))
+        solved.runner.ask(partial(SwingWorkflow.exclude, numbers=[number]))
+    solved.runner.ask(lambda workflow: workflow.include([4]))
     solved.wait_until_solved()
 
-    assert set(solved.solution.taken_out) == {1, 2, 3, 5, 6, 7}
-    assert set(open_record(solved.record_folder).taken_out) == {1, 2, 3, 5, 6, 7}
+    assert set(solved.solution.excluded) == {1, 2, 3, 5, 6, 7}
+    assert set(open_record(solved.record_folder).excluded) == {1, 2, 3, 5, 6, 7}
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
     event_kinds = solved.witness.event_kinds
     assert event_kinds[-1] in (SwingEventKind.DONE, SwingEventKind.FAILED)
@@ -104,10 +104,10 @@ def test_images_taken_out_in_quick_succession_all_count(
 def test_too_few_images_left_keep_the_solution_and_the_record(
     solved: "Station",
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.take_out([1]))
+    solved.runner.ask(lambda workflow: workflow.exclude([1]))
     solved.wait_until_solved()
     before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
-    solved.runner.ask(lambda workflow: workflow.take_out(range(1, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.exclude(range(1, N_IMAGES)))
     solved.wait_until_solved()
 
     assert solved.solution is before
@@ -120,18 +120,18 @@ def test_too_few_images_left_keep_the_solution_and_the_record(
     )
     assert solved.witness.reliefs == []
     # what failed is not asked for again
-    solved.runner.ask(lambda workflow: workflow.take_out([2]))
+    solved.runner.ask(lambda workflow: workflow.exclude([2]))
     solved.wait_until_solved()
-    assert set(solved.solution.taken_out) == {1, 2}
+    assert set(solved.solution.excluded) == {1, 2}
     assert solved.witness.reliefs == solved.witness.faults
 
 
 def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.take_out(range(1, N_IMAGES)))
-    solved.runner.ask(lambda workflow: workflow.put_back(range(4, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.exclude(range(1, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.include(range(4, N_IMAGES)))
     solved.wait_until_solved()
 
-    assert set(solved.solution.taken_out) == {1, 2, 3}
+    assert set(solved.solution.excluded) == {1, 2, 3}
     assert solved.witness.faults == []
 
 
@@ -139,7 +139,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     before = solved.solution
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.wait_until_solved()
     journal.with_name("elsewhere").rename(journal)
 
@@ -148,7 +148,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     assert "does not exist" in sentence
     assert "stay in" not in sentence
     assert solved.witness.reliefs == []
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.wait_until_solved()
     assert solved.witness.reliefs == [sentence]
 
@@ -213,17 +213,17 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
     solved: "Station",
 ) -> None:
     before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.cancel())
     solved.see()
     assert not solved.status.is_solving
-    solved.runner.ask(lambda workflow: workflow.take_out([7]))
+    solved.runner.ask(lambda workflow: workflow.exclude([7]))
     solved.wait_until_solved()
 
-    assert before.taken_out == {}
-    assert set(solved.solution.taken_out) == {7}
+    assert before.excluded == {}
+    assert set(solved.solution.excluded) == {7}
     assert journal in (solved.record_folder / JOURNAL).read_bytes()
-    assert set(open_record(solved.record_folder).taken_out) == {7}
+    assert set(open_record(solved.record_folder).excluded) == {7}
 
 
 # After the verdict
@@ -249,7 +249,7 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_is_reported_once(
 def test_more_images_can_be_captured_after_the_verdict(
     solved: "Station", command: Command
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.wait_until_solved()
     solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
@@ -260,7 +260,7 @@ def test_more_images_can_be_captured_after_the_verdict(
     solved.solve()
 
     assert solved.n_recorded == N_IMAGES + 1
-    assert set(solved.solution.taken_out) == {3}
+    assert set(solved.solution.excluded) == {3}
     assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
 
 
@@ -301,12 +301,12 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
 def test_more_images_can_be_captured_while_a_wish_is_computed(
     solved: "Station",
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
     solved.keep(1)
 
-    assert open_record(solved.record_folder).taken_out == {}
+    assert open_record(solved.record_folder).excluded == {}
     assert solved.status.solution is None
 
 
@@ -316,19 +316,19 @@ def test_images_that_cannot_be_read_again_leave_the_solution_and_no_wish(
     before = solved.solution
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.capture_more())
     # while they are read nothing is taken out
-    solved.runner.ask(lambda workflow: workflow.take_out([4]))
+    solved.runner.ask(lambda workflow: workflow.exclude([4]))
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
     solved.wait_until(lambda: solved.status.activity is Activity.NONE)
     journal.with_name("elsewhere").rename(journal)
     assert solved.solution is before
     assert not solved.status.is_capturing
 
-    solved.runner.ask(lambda workflow: workflow.take_out([7]))
+    solved.runner.ask(lambda workflow: workflow.exclude([7]))
     solved.wait_until_solved()
-    assert set(solved.solution.taken_out) == {7}
+    assert set(solved.solution.excluded) == {7}
 
 
 def test_a_solved_swing_is_set_aside_with_its_images(solved: "Station") -> None:
@@ -415,7 +415,7 @@ def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
 
 
 def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.take_out([3]))
+    solved.runner.ask(lambda workflow: workflow.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
     solved.wait_until_solved()
 
@@ -497,7 +497,7 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
     solution, result = in_force.solution, in_force.status.result
     journal = (in_force.record_folder / JOURNAL).read_bytes()
     runner = in_force.runner
-    runner.ask(lambda workflow: workflow.take_out([1]))
+    runner.ask(lambda workflow: workflow.exclude([1]))
     runner.ask(lambda workflow: workflow.accept("It is seen to."))
     for act in (
         SwingWorkflow.solve,

@@ -55,8 +55,8 @@ class ImagesPanel(Translated, QWidget):
     """
 
     # list of int: numbers of images
-    take_out_requested = Signal(list)
-    put_back_requested = Signal(list)
+    exclude_requested = Signal(list)
+    include_requested = Signal(list)
     # Message on a saved plot, or on a failure to save it.
     saved = Signal(str)
     failed = Signal(str)
@@ -73,8 +73,8 @@ class ImagesPanel(Translated, QWidget):
 
         # Widgets
         self._table = ImageTable()
-        self._take_out = PushButton()
-        self._put_back = PushButton()
+        self._exclude = PushButton()
+        self._include = PushButton()
         self._undo = UndoButtons(self._steps, self)
         self._count = text_label(TextSize.SMALL, Tone.QUIET)
         self._view = ResidualView()
@@ -90,7 +90,7 @@ class ImagesPanel(Translated, QWidget):
         layout.addWidget(self._table, 0, 0, 4, 1)
         layout.addWidget(self._switch, 4, 0)  # the image is too narrow for it
         layout.addWidget(self._count, 5, 0)
-        horizontal_layout(layout, (self._take_out, 1), (self._put_back, 1), at=(6, 0))
+        horizontal_layout(layout, (self._exclude, 1), (self._include, 1), at=(6, 0))
         layout.addWidget(self._undo, 7, 0)
         layout.addWidget(self._view, 0, 1)
         layout.addWidget(self._caption, 1, 1)
@@ -105,14 +105,14 @@ class ImagesPanel(Translated, QWidget):
         self._table.selection_changed.connect(self._refresh_buttons)
         self._switch.value_changed.connect(self._on_choice_changed)
         self._misfits.number_chosen.connect(self._table.choose)
-        self._misfits.limit_set.connect(self._leave_out)
-        self._take_out.clicked.connect(self._on_take_out_clicked)
-        self._put_back.clicked.connect(self._on_put_back_clicked)
+        self._misfits.limit_set.connect(self._exclude_images)
+        self._exclude.clicked.connect(self._on_exclude_clicked)
+        self._include.clicked.connect(self._on_include_clicked)
         self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
         self._card.saved.connect(self.saved)
         self._card.failed.connect(self.failed)
-        self._shortcut(QKeySequence.StandardKey.Delete, self._take_out.click)
-        self._shortcut(Qt.Key.Key_Insert, self._put_back.click)
+        self._shortcut(QKeySequence.StandardKey.Delete, self._exclude.click)
+        self._shortcut(Qt.Key.Key_Insert, self._include.click)
 
         self._retranslate()
 
@@ -171,8 +171,8 @@ class ImagesPanel(Translated, QWidget):
         shortcut.activated.connect(act)
 
     def _retranslate(self) -> None:
-        self._take_out.setText(self.tr("Exclude"))
-        self._put_back.setText(self.tr("Include"))
+        self._exclude.setText(self.tr("Exclude"))
+        self._include.setText(self.tr("Include"))
         self._misfits.set_axes(
             Axes(self.tr("RMS / px (x: excluded)"), self.tr("image"))
         )
@@ -204,21 +204,25 @@ class ImagesPanel(Translated, QWidget):
 
     def _refresh_buttons(self) -> None:
         rows = self._table.selected()
-        why_not_out, why_not_back = self._why_locked, self._why_locked
+        why_not_exclude, why_not_include = self._why_locked, self._why_locked
         if not rows:
-            why_not_out = why_not_back = why_not_out or self.tr("No image is selected.")
+            why_not_exclude = why_not_include = why_not_exclude or self.tr(
+                "No image is selected."
+            )
         elif not any(row.is_used for row in rows):
-            why_not_out = why_not_out or self.tr("Already excluded")
-        if not why_not_back and not any(row.is_taken_out for row in rows):
-            why_not_back = self._why_not_back(rows[0])
-        self._take_out.set_why_not(
-            why_not_out, self.tr("Exclude the selected images and recompute (Delete)")
+            why_not_exclude = why_not_exclude or self.tr("Already excluded")
+        if not why_not_include and not any(row.can_be_included for row in rows):
+            why_not_include = self._why_not_include(rows[0])
+        self._exclude.set_why_not(
+            why_not_exclude,
+            self.tr("Exclude the selected images and recompute (Delete)"),
         )
-        self._put_back.set_why_not(
-            why_not_back, self.tr("Include the selected images and recompute (Insert)")
+        self._include.set_why_not(
+            why_not_include,
+            self.tr("Include the selected images and recompute (Insert)"),
         )
 
-    def _why_not_back(self, row: ImageRow) -> str:
+    def _why_not_include(self, row: ImageRow) -> str:
         if row.is_used:
             return self.tr("Already included")
         text = self.tr("Excluded automatically: {0}")
@@ -316,8 +320,8 @@ class ImagesPanel(Translated, QWidget):
         for widget in (
             self._table,
             self._count,
-            self._take_out,
-            self._put_back,
+            self._exclude,
+            self._include,
             self._undo,
             self._view,
             self._caption,
@@ -329,16 +333,18 @@ class ImagesPanel(Translated, QWidget):
         layout.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
         layout.setRowStretch(0, 0 if enlarged else VIEW_SHARE)
 
-    def _on_take_out_clicked(self) -> None:
-        self._leave_out([row.number for row in self._table.selected() if row.is_used])
+    def _on_exclude_clicked(self) -> None:
+        self._exclude_images(
+            [row.number for row in self._table.selected() if row.is_used]
+        )
 
-    def _on_put_back_clicked(self) -> None:
+    def _on_include_clicked(self) -> None:
         rows = self._table.selected()
-        numbers = [row.number for row in rows if row.is_taken_out]
-        self._do(self.put_back_requested, self.take_out_requested, numbers)
+        numbers = [row.number for row in rows if row.can_be_included]
+        self._do(self.include_requested, self.exclude_requested, numbers)
 
-    def _leave_out(self, numbers: list[int]) -> None:
-        self._do(self.take_out_requested, self.put_back_requested, numbers)
+    def _exclude_images(self, numbers: list[int]) -> None:
+        self._do(self.exclude_requested, self.include_requested, numbers)
 
     def _do(
         self, wish: SignalInstance, opposite: SignalInstance, numbers: list[int]

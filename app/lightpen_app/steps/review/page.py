@@ -214,8 +214,8 @@ class ReviewPage(Page):
 
     def _on_images_made(self, images: "ImagesPanel") -> None:
         self._refresh_words()
-        images.take_out_requested.connect(self._take_out)
-        images.put_back_requested.connect(self._put_back)
+        images.exclude_requested.connect(self._exclude)
+        images.include_requested.connect(self._include)
 
     def _on_cancel_clicked(self) -> None:
         self._runner.ask(lambda workflow: workflow.cancel())
@@ -223,11 +223,11 @@ class ReviewPage(Page):
     def _capture_more(self) -> None:
         self._runner.ask(lambda workflow: workflow.capture_more())
 
-    def _take_out(self, numbers: list[int]) -> None:
-        self._runner.ask(lambda workflow: workflow.take_out(numbers))
+    def _exclude(self, numbers: list[int]) -> None:
+        self._runner.ask(lambda workflow: workflow.exclude(numbers))
 
-    def _put_back(self, numbers: list[int]) -> None:
-        self._runner.ask(lambda workflow: workflow.put_back(numbers))
+    def _include(self, numbers: list[int]) -> None:
+        self._runner.ask(lambda workflow: workflow.include(numbers))
 
     def _next_tip(self) -> str:
         """Return the tip that can be swung at once, as it is chosen by now."""

@@ -201,5 +201,5 @@ def _images_of(record: Record) -> tuple[int, ...]:
 
 def _require_same_images(record: Record, solution: Solution) -> None:
     is_same = record.all_numbers.tolist() == solution.numbers.tolist()
-    if not is_same or set(record.taken_out) != set(solution.taken_out):
+    if not is_same or set(record.excluded) != set(solution.excluded):
         raise FileError("acceptance.changed", folder=record.folder)

@@ -18,7 +18,7 @@ class ImageRow:
     misfit: float  # rms residual with the tip in the cone, px; NaN without the pen
     n_leds: int  # LEDs that were seen, by all cameras together
     reason: Reason  # for not using it; `Reason.NONE` for a used one
-    is_taken_out: bool  # by the user, who may include it again
+    can_be_included: bool  # excluded by the user, or as slipped
 
     @property
     def is_used(self) -> bool:
@@ -42,7 +42,7 @@ def worst_first(solution: Solution) -> tuple[ImageRow, ...]:
             misfit=float(misfits[i]),
             n_leds=int(n_leds[i]),
             reason=solution.calibration.reasons[i],
-            is_taken_out=int(solution.numbers[i]) in solution.taken_out,
+            can_be_included=int(solution.numbers[i]) in solution.excluded,
         )
         for i in order.tolist()
     )

@@ -97,7 +97,7 @@ class Record:
     folder: Path
     header: Header
     images: tuple[RecordedImage, ...]  # acknowledged ones, in order of capture
-    taken_out: Mapping[int, str]  # numbers of images that do not take part, and why
+    excluded: Mapping[int, str]  # numbers of images that do not take part, and why
     verdict: str | None  # the last one; None if the swing was interrupted
     more: tuple[int, int] | None  # number of images requested after a verdict
     length: int  # length of the journal that was read, bytes
@@ -105,7 +105,7 @@ class Record:
     @property
     def used_images(self) -> tuple[RecordedImage, ...]:
         """The images that take part."""
-        return tuple(i for i in self.images if i.number not in self.taken_out)
+        return tuple(i for i in self.images if i.number not in self.excluded)
 
     @property
     def all_numbers(self) -> IntArray:
@@ -160,7 +160,7 @@ def open_record(folder: Path) -> Record:
 def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) -> Record:
     """Return the record of the journal's lines."""
     images: list[RecordedImage] = []
-    taken_out: dict[int, str] = {}
+    excluded: dict[int, str] = {}
     verdict, more = None, None
     for line in lines:
         match line:
@@ -168,14 +168,14 @@ def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) ->
                 images.append(_recorded_image(folder, line))
                 verdict = None
             case OutLine():
-                taken_out.update(dict.fromkeys(line.numbers, line.reason))
+                excluded.update(dict.fromkeys(line.numbers, line.reason))
             case ExcludedLine():
-                taken_out = {n: why for why, ns in line.reasons.items() for n in ns}
+                excluded = {n: why for why, ns in line.reasons.items() for n in ns}
             case VerdictLine():
                 verdict = line.verdict
             case MoreLine():
                 more = line.min_images, line.max_images
-    return Record(folder, header, tuple(images), taken_out, verdict, more, length)
+    return Record(folder, header, tuple(images), excluded, verdict, more, length)
 
 
 def record_files(record: Record) -> tuple[Path, ...]:

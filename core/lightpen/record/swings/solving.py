@@ -40,7 +40,7 @@ class Solution:
     source: RecordSource
     numbers: IntArray  # (N,), of the images, in the record
     observations: Observations  # detections in all N images, accepted or not
-    taken_out: Mapping[int, str]  # numbers of images that do not take part, and why
+    excluded: Mapping[int, str]  # numbers of images that do not take part, and why
     calibration: Calibration
     # (N, C, L, 2), observed less modelled centres with tip in the cone, px; an image
     # that is left out is turned as fits it best; NaN where an LED or pen was not seen
@@ -96,17 +96,17 @@ def solve_record(
             sources, pairing, found.rig, found.pen, report, found.masks
         )
     timed = tuple(replace(each, interval_ms=record.interval_ms) for each in seen)
-    return _solved(found, record.all_numbers, timed, record.taken_out)
+    return _solved(found, record.all_numbers, timed, record.excluded)
 
 
-def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
+def solve_again(solution: Solution, excluded: Mapping[int, str]) -> Solution:
     """Solve with other images excluded, from the same detections.
 
-    ``taken_out`` has the numbers of all images that are not to take part, and why.
+    ``excluded`` has the numbers of all images that are not to take part, and why.
     Raises `CalibrationError` if the rest does not determine the tip.
     """
     seen = (solution.observations, *solution.others)
-    return _solved(solution.source, solution.numbers, seen, taken_out)
+    return _solved(solution.source, solution.numbers, seen, excluded)
 
 
 def load_image(solution: Solution, number: int, camera: int = 0) -> Image:
@@ -146,12 +146,12 @@ def _solved(
     source: RecordSource,
     numbers: IntArray,
     seen: tuple[Observations, ...],
-    taken_out: Mapping[int, str],
+    excluded: Mapping[int, str],
 ) -> Solution:
     reasons = {
-        index: _reason(taken_out[number])
+        index: _reason(excluded[number])
         for index, number in enumerate(numbers.tolist())
-        if number in taken_out
+        if number in excluded
     }
     calibration = calibrate_rig(
         source.rig or rig_of(source.camera),
@@ -163,7 +163,7 @@ def _solved(
         source=source,
         numbers=numbers,
         observations=seen[0],
-        taken_out=dict(taken_out),
+        excluded=dict(excluded),
         calibration=calibration,
         residuals=_all_residuals(source, seen, calibration),
         others=seen[1:],

@@ -191,17 +191,17 @@ class RecordWriter:
         _sync_folder(path.parent)
         return sha256(data).hexdigest()
 
-    def take_out(self, numbers: Sequence[int], reason: str) -> None:
+    def exclude(self, numbers: Sequence[int], reason: str) -> None:
         """Leave images out of the calibration; they stay on the disk."""
         self._write_line(OutLine(tuple(numbers), str(reason)))
 
-    def set_taken_out(self, taken_out: Mapping[int, str]) -> None:
+    def set_excluded(self, excluded: Mapping[int, str]) -> None:
         """Exclude exactly these images from the calibration, each with a reason.
 
         It is one line, so that a kill leaves all of an edit or nothing.
         """
         reasons: dict[str, tuple[int, ...]] = {}
-        for number, reason in sorted(taken_out.items()):
+        for number, reason in sorted(excluded.items()):
             reasons[reason] = (*reasons.get(reason, ()), number)
         self._write_line(ExcludedLine(reasons))
 
@@ -253,12 +253,12 @@ def make_record_folder(root: Path, names: Names, now: datetime) -> Path:
     return folder
 
 
-def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
+def note_excluded(folder: Path, excluded: Mapping[int, str]) -> None:
     """Note the numbers of all images of a record that take no part, and why."""
     record = open_record(folder)
     with RecordWriter.resume(record) as writer:
-        if record.taken_out != taken_out:
-            writer.set_taken_out(taken_out)
+        if record.excluded != excluded:
+            writer.set_excluded(excluded)
 
 
 def _own_journal(folder: Path, length: int) -> FileIO:

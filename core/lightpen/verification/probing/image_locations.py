@@ -119,7 +119,7 @@ def _recorded_touches(record: Record) -> tuple[RecordedTouch, ...] | None:
     """Return the touch of each image of a verification; None for a swing."""
     if not any(image.touch for image in record.images):
         return None
-    out = record.taken_out
+    out = record.excluded
     return tuple(
         RecordedTouch(0 if i.number in out else i.touch, i.approach_cam)
         for i in record.images

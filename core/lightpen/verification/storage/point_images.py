@@ -171,13 +171,13 @@ class PointImages:
         self._writer = RecordWriter.resume(record)
         self._open, self._folder = run, record.folder
         self._numbers = {touch_image_name(i.number): i.number for i in record.images}
-        for number in record.taken_out:
+        for number in record.excluded:
             self._numbers.pop(touch_image_name(number), None)
         self._touch = 1 + max((image.touch for image in record.images), default=0)
 
     def _take_out(self, names: list[str]) -> None:
         if names and self._writer is not None:
-            self._writer.take_out([self._numbers[name] for name in names], NOT_COUNTED)
+            self._writer.exclude([self._numbers[name] for name in names], NOT_COUNTED)
             for name in names:
                 del self._numbers[name]
 

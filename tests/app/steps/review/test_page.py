@@ -425,7 +425,7 @@ def put_in_force(
 def slip(swing: Path) -> None:
     """Note of an image that the tip slipped in it."""
     with RecordWriter.resume(open_record(swing)) as writer:
-        writer.take_out([SLIPPED], Reason.SLIPPED)
+        writer.exclude([SLIPPED], Reason.SLIPPED)
 
 
 # What is shown
@@ -1137,9 +1137,9 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
 ) -> None:
     may_solve = Event()
 
-    def solve(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
+    def solve(solution: Solution, excluded: Mapping[int, str]) -> Solution:
         assert may_solve.wait(PATIENCE_MS / 1000)
-        return solve_again(solution, taken_out)
+        return solve_again(solution, excluded)
 
     monkeypatch.setattr("lightpen.swing.workflow.solve_again", solve)
     before = tip(workbench).copy()
@@ -1157,7 +1157,7 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
 
     assert table(page).number() == number
     assert not np.array_equal(tip(workbench), before)
-    assert open_record(workbench.run.records_folder / "swing").taken_out == {
+    assert open_record(workbench.run.records_folder / "swing").excluded == {
         number: "taken out"
     }
     assert not button(page, "Exclude").isEnabled()
@@ -1286,7 +1286,7 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
     assert "at least 6" in reported.args[0]
     assert count(page) == included(N_IMAGES)
     np.testing.assert_array_equal(tip(workbench), before)
-    assert open_record(workbench.run.records_folder / "swing").taken_out == {}
+    assert open_record(workbench.run.records_folder / "swing").excluded == {}
     assert not button(page, "Undo").isEnabled()
 
 

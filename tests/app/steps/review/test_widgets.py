@@ -141,7 +141,7 @@ def test_a_question_is_answered_once(qtbot: QtBot, answer: str, signal: str) -> 
 
 
 def row(number: int, misfit: float, reason: Reason = Reason.NONE) -> ImageRow:
-    return ImageRow(number, misfit, 10, reason, is_taken_out=bool(reason))
+    return ImageRow(number, misfit, 10, reason, can_be_included=bool(reason))
 
 
 def test_the_current_image_stays_current_when_the_order_changes(qtbot: QtBot) -> None:

@@ -43,7 +43,7 @@ from lightpen.record.swings.solving import (
     solve_again,
     solve_record,
 )
-from lightpen.record.swings.writing import RecordWriter, note_taken_out
+from lightpen.record.swings.writing import RecordWriter, note_excluded
 from lightpen.simulator.swings import swing_poses
 from lightpen.swing_messages import Code
 
@@ -495,7 +495,7 @@ def test_a_swing_accepted_twice_has_one_result(case: Case) -> None:
 
 def test_other_images_of_a_swing_are_another_result(case: Case) -> None:
     case.accept()
-    note_taken_out(case.folder, {3: "taken out"})
+    note_excluded(case.folder, {3: "taken out"})
     case.solution = solve_again(case.solution, {3: "taken out"})
     case.accept()
 
@@ -506,7 +506,7 @@ def test_other_images_of_a_swing_are_another_result(case: Case) -> None:
 
 
 def test_a_swing_that_has_changed_since_it_was_solved_is_refused(case: Case) -> None:
-    note_taken_out(case.folder, {3: "taken out"})
+    note_excluded(case.folder, {3: "taken out"})
 
     with pytest.raises(FileError, match="changed after the tip was computed"):
         case.accept()
@@ -623,8 +623,8 @@ def test_a_journal_that_cannot_be_written_is_concluded_at_the_next_start(
 ) -> None:
     with RecordWriter.resume(open_record(case.folder)) as writer:
         for _ in range(50):  # until the journal is longer than the result
-            writer.take_out(range(1000, 2000), "taken out")
-            writer.set_taken_out({})
+            writer.exclude(range(1000, 2000), "taken out")
+            writer.set_excluded({})
     journal = open_record(case.folder).length
 
     assert elsewhere("limit", journal, case.data) == 0

@@ -15,7 +15,7 @@ from lightpen.record.swings.solving import Solution, solve_again, solve_record
 N_IMAGES = 20
 DAMAGED = 7
 SLIPPED = 12
-TAKEN_OUT = (5, 9, 14)
+EXCLUDED = (5, 9, 14)
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +25,9 @@ def solution(
     folder = tmp_path_factory.mktemp("review") / "swing"
     shutil.copytree(swung(N_IMAGES), folder)
     (folder / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
-    taken_out = dict.fromkeys(TAKEN_OUT, str(Reason.TAKEN_OUT))
-    taken_out[SLIPPED] = str(Reason.SLIPPED)
-    return solve_again(solve_record(open_record(folder)), taken_out)
+    excluded = dict.fromkeys(EXCLUDED, str(Reason.TAKEN_OUT))
+    excluded[SLIPPED] = str(Reason.SLIPPED)
+    return solve_again(solve_record(open_record(folder)), excluded)
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +57,10 @@ def test_every_image_says_whether_and_why_it_does_not_take_part(
     assert reasons == {
         DAMAGED: Reason.UNREADABLE,
         SLIPPED: Reason.SLIPPED,
-        **dict.fromkeys(TAKEN_OUT, Reason.TAKEN_OUT),
+        **dict.fromkeys(EXCLUDED, Reason.TAKEN_OUT),
     }
-    put_back = {row.number for row in rows.values() if row.is_taken_out}
-    assert put_back == {SLIPPED, *TAKEN_OUT}
+    can_be_included = {row.number for row in rows.values() if row.can_be_included}
+    assert can_be_included == {SLIPPED, *EXCLUDED}
 
 
 def test_an_image_tells_how_many_leds_were_seen(
@@ -75,7 +75,7 @@ def test_an_image_tells_how_many_leds_were_seen(
 def test_reasons_are_counted_the_most_frequent_first(solution: Solution) -> None:
     counts = list(count_left_out(solution).items())
 
-    assert counts[0] == (Reason.TAKEN_OUT, len(TAKEN_OUT))
+    assert counts[0] == (Reason.TAKEN_OUT, len(EXCLUDED))
     assert sorted(counts[1:]) == [(Reason.SLIPPED, 1), (Reason.UNREADABLE, 1)]
 
 

@@ -99,8 +99,8 @@ def test_images_taken_out_after_the_verdict_do_not(
 ) -> None:
     with recorded(preparation, tmp_path / "a", 3) as writer:
         writer.conclude("check")
-        writer.take_out([1], "taken out")
-        writer.set_taken_out({})
+        writer.exclude([1], "taken out")
+        writer.set_excluded({})
 
     assert names_found(tmp_path) == []
 
@@ -111,7 +111,7 @@ def test_a_verdict_far_from_the_end_counts_as_well(
     with recorded(preparation, tmp_path / "a", 1) as writer:
         writer.conclude("check")
         for _ in range(40):
-            writer.take_out(range(200), "taken out")
+            writer.exclude(range(200), "taken out")
 
     assert names_found(tmp_path) == []
 
@@ -192,7 +192,7 @@ def test_an_interrupted_swing_goes_on_with_all_its_images(
                 *(BLACK, pixels[index], swing.rotations[index]),
                 *(swing.translations[index], 0.05 * index),
             )
-        writer.take_out([7], "tip slipped")
+        writer.exclude([7], "tip slipped")
 
     resumable = read_resumable(tmp_path / "a")
 

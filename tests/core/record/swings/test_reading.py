@@ -26,7 +26,7 @@ from lightpen.record.swings.header import FileCopy, Header, header_copies
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import open_record, record_files
 from lightpen.record.swings.recorded_source import source
-from lightpen.record.swings.writing import RecordWriter, note_taken_out
+from lightpen.record.swings.writing import RecordWriter, note_excluded
 from lightpen.simulator.swings import paper_camera, paper_pen
 
 N_KILLS = 20
@@ -258,7 +258,7 @@ def test_one_program_at_a_time_writes_to_a_record(
     with pytest.raises(FileError, match="Another program is writing to the swing in"):
         RecordWriter.resume(open_record(folder))
     with pytest.raises(FileError, match="Another program is writing to the swing in"):
-        note_taken_out(folder, {1: "taken out"})
+        note_excluded(folder, {1: "taken out"})
     assert len(open_record(folder).images) == 2
     for load in source(open_record(folder)).images.open():
         load()
@@ -349,12 +349,12 @@ def test_images_are_taken_out_and_put_back(tmp_path: Path, header: Header) -> No
     with RecordWriter.create(tmp_path / "swing", header) as writer:
         for seed in range(4):
             append(writer, seed)
-        writer.take_out([2, 3], "tip slipped")
-        writer.set_taken_out({2: "tip slipped"})
+        writer.exclude([2, 3], "tip slipped")
+        writer.set_excluded({2: "tip slipped"})
 
     record = open_record(tmp_path / "swing")
     assert record.numbers.tolist() == [1, 3, 4]
-    assert record.taken_out == {2: "tip slipped"}
+    assert record.excluded == {2: "tip slipped"}
     assert len(source(record).images.names) == 4
     assert record.next_number == 5
 
@@ -456,9 +456,9 @@ def test_what_could_not_be_written_is_not_in_the_record(
         append(writer)
         monkeypatch.setattr("lightpen.record.swings.writing.os.fsync", fail)
         with pytest.raises(FileError, match="the disk is full"):
-            writer.take_out([1], "tip slipped")
+            writer.exclude([1], "tip slipped")
 
-    assert open_record(tmp_path / "swing").taken_out == {}
+    assert open_record(tmp_path / "swing").excluded == {}
 
 
 def test_a_part_of_a_line_that_a_failing_disk_left_is_written_over(

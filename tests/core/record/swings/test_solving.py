@@ -118,11 +118,11 @@ def test_images_are_listed_worst_first_and_those_without_the_pen_before_them(
 def test_only_what_was_taken_out_can_be_put_back(without_five: Solution) -> None:
     rows = {row.number: row for row in worst_first(without_five)}
 
-    assert rows[5].is_taken_out
+    assert rows[5].can_be_included
     assert not rows[5].is_used
-    assert not rows[7].is_taken_out
+    assert not rows[7].can_be_included
     assert not rows[7].is_used
-    assert not rows[1].is_taken_out
+    assert not rows[1].can_be_included
 
 
 def test_what_is_left_out_is_counted_by_reason(without_five: Solution) -> None:
