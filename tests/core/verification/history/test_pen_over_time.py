@@ -42,8 +42,10 @@ def test_accepted_swings_with_the_led_file_tell_of_the_pen(
     for seed in (1, 2):
         accept_tip(tmp_path, off_file, seed, LED_ERROR)
     accept_tip(tmp_path, prepared, 3)  # with another file
-    found = read_pen_over_time(FolderArchive(tmp_path), off_file)
+    reported: list[float] = []
+    found = read_pen_over_time(FolderArchive(tmp_path), off_file, reported.append)
 
+    assert reported == [1 / 3, 2 / 3, 1.0]
     assert (len(found.swings), found.n_left_out, found.n_missing) == (2, 1, 2)
     assert found.health is not None
     assert found.health.assessment.grade is Grade.PASS
