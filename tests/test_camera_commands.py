@@ -176,7 +176,7 @@ def test_a_file_of_another_focus_is_contradicted_by_a_swing(
 
     assert status == 1
     printed = capsys.readouterr()
-    assert "camera file: focal length" in printed.err  # the worst of them
-    assert "camera file: principal point cy" in printed.out
+    assert "intrinsics file: focal length" in printed.err  # the worst of them
+    assert "intrinsics file: principal point cy" in printed.out
     fx_of_file, u_of_file = printed.out.split("fx")[1].split()[:2]
     assert (float(fx_of_file), float(u_of_file)) == (4598.2, 1.0)

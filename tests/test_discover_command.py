@@ -112,12 +112,12 @@ def test_a_camera_file_that_is_off_is_reported(
 
     write_camera(camera, file)
     assert main(arguments(centers, *given)) == 0
-    assert "camera file is off" not in capsys.readouterr().out
+    assert "intrinsics file is off" not in capsys.readouterr().out
 
     off = replace(camera, fx=1.05 * camera.fx, fy=1.05 * camera.fy)
     write_camera(off, file)
     assert main(arguments(centers, *given)) == 0
-    assert "camera file is off" in capsys.readouterr().out
+    assert "intrinsics file is off" in capsys.readouterr().out
 
     for name in OUTPUTS:
         (centers.parent / name).unlink(missing_ok=True)
@@ -126,7 +126,7 @@ def test_a_camera_file_that_is_off_is_reported(
         off = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
         write_camera(replace(off, covariance=certain), file)
         assert main(arguments(centers, *given)) == 1
-        assert "does not fit the camera file" in capsys.readouterr().err
+        assert "does not fit the intrinsics file" in capsys.readouterr().err
     assert not any((centers.parent / name).exists() for name in OUTPUTS)
 
 

@@ -76,7 +76,7 @@ def test_recorded_touches_are_measured_by_a_plan(
         ("of: [run_02]", "of: [run_03]", "unknown feature 'run_03'"),
         ("name: run_02", "name: run_01", "'run_01' is defined twice"),
         ("features:", "featured:", "unknown field"),
-        ("touches: 8", "touches: 800", "has 20 touches; the plan needs 800"),
+        ("touches: 8", "touches: 800", "has 20 probed points; the plan needs 800"),
         ("quantity: radius", "quantity: width", "is not defined for features"),
     ],
 )

@@ -52,7 +52,7 @@ COMMANDS = (
         "calibrate the extrinsics of two cameras with a board",
     ),
     ("board", "board", "write a calibration board for printing"),
-    ("check-camera", "check_camera", "check the camera file with a swing"),
+    ("check-camera", "check_camera", "check the intrinsics file with a swing"),
     ("export", "export", "export a tip for other programs"),
     ("stream", "stream", "stream pose and tip to other programs"),
 )

@@ -248,7 +248,7 @@ def _share_name(name: ContributionName) -> str:
         ContributionName.TEMPERATURE: translate("paper", "Pen temperature"),
         ContributionName.DISTANCE: translate("paper", "Distance of the cones"),
         ContributionName.DIAMETER: translate("paper", "Diameter of the LED discs"),
-        ContributionName.CAMERA: translate("paper", "Intrinsics of the camera file"),
+        ContributionName.CAMERA: translate("paper", "Intrinsics of the camera"),
         ContributionName.EXTRINSICS: translate("paper", "Extrinsics of the cameras"),
         ContributionName.LENS: translate("paper", "Lens beyond its distortion model"),
         ContributionName.COMPLIANCE: translate(

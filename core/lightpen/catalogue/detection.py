@@ -1,18 +1,18 @@
 """Messages of detection: code, then template with named values."""
 
 MESSAGES = {
-    "diagnosis.spots-do-not-fit": "Most images show {n_needed} or more spots, but these do not match the {n_leds} LEDs of the LED file. Check that the LED file belongs to this pen and the camera file to these images.",
+    "diagnosis.spots-do-not-fit": "Most images show {n_needed} or more spots, but these do not match the {n_leds} LEDs of the LED file. Check that the LED file belongs to this pen and the intrinsics file to these images.",
     "diagnosis.few-spots": "Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.",
     "diagnosis.mirror": "The images match the mirror image of the pen. Change the sign of {axis} in the LED file.",
     "diagnosis.unit": "The images match LED coordinates {factor:g} times those of the LED file. Check its unit; millimetres are needed.",
     "diagnosis.disc": "The LEDs appear {factor:g} times as large as stated in the LED file ({diameter:g} mm). Check the disc diameter and the unit of the coordinates.",
-    "diagnosis.focal-length": "The images match about {factor:g} times the focal length of the camera file. Choose the file of this camera and lens, or calibrate the camera again.",
+    "diagnosis.focal-length": "The images match about {factor:g} times the focal length of the intrinsics file. Choose the file of this camera and lens, or calibrate the camera again.",
     "image.size": "{width} x {height} px",
     "images.ambiguous": "The LED layout of this pen is symmetric, so the LEDs cannot be identified. Move an LED, or give the LED centres.",
     "images.too-small": "The LEDs are {width:.1f} px wide in most images; at least {needed:.0f} px are needed. Bring the camera nearer, or use a longer focal length or a camera of higher resolution.",
     "images.none-readable": "None of the {n_images} images can be read. {why}",
-    "images.other-size": "{n_wrong} of {n_readable} images are {size}, the camera file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.",
-    "centers.outside": "The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.",
+    "images.other-size": "{n_wrong} of {n_readable} images are {size}, the intrinsics file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.",
+    "centers.outside": "The LED centres reach to ({x:.0f}, {y:.0f}) px, the intrinsics file was made for {width} x {height} px. Choose the file for this camera.",
     "reason.unreadable": "unreadable",
     "reason.unhandled": "program error",
     "reason.wrong-size": "wrong size",

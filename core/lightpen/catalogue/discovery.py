@@ -35,6 +35,6 @@ MESSAGES = {
     "discover.length-limits": "The length limits U: a standard uncertainty of {sigma:.3f} mm would reduce U from {now:.0f} to {then:.0f} µm.",
     "discover.centers-outside": "Most centres are outside the image: they extend to ({x:.0f}, {y:.0f}) px; the images have {width} x {height} px. Check the size of the images.",
     "discover.centers-small": "The centres of all images lie within {extent:.1f} px; the images have {width} x {height} px. Give the centres in pixels, and check the size of the images.",
-    "discover.camera-off": "The camera file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.",
-    "discover.other-camera": "The swing does not fit the camera file. Check that the file is of this camera, zoom and focus, or find the camera without a file.",
+    "discover.camera-off": "The intrinsics file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.",
+    "discover.other-camera": "The swing does not fit the intrinsics file. Check that the file is of this camera, zoom and focus, or find the camera without a file.",
 }

@@ -66,6 +66,6 @@ MESSAGES = {
     "pair.late": "The cameras are not synchronised: {camera} lags by {lag:.2f} ± {u:.2f} view intervals (k = 2). Each millisecond is an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.",
     "pair.few": "Both cameras see the board in {n_pairs} views; at least {least} are needed. Add views in which both cameras see the whole board.",
     "pair.contradicting": "The views disagree on the pose of the second camera: {n_agree} of {n_pairs} agree. A camera was moved, or image pairs are not simultaneous. Check the names and order of the images.",
-    "pair.other-lens": "The camera file of {camera} contradicts the images of the board: residuals of {rms:.1f} px (RMS). The file is of another camera or zoom, or has a lens model that does not fit this lens, such as a plain one for a fisheye. Check it, or calibrate the cameras from these images.",
+    "pair.other-lens": "The intrinsics file of {camera} contradicts the images of the board: residuals of {rms:.1f} px (RMS). The file is of another camera or zoom, or has a lens model that does not fit this lens, such as a plain one for a fisheye. Check it, or calibrate the cameras from these images.",
     "pair.moved": "In {n_views} of {n_pairs} views the board positions seen by the two cameras differ by up to {rms:.2f} px. The board or a camera moved between the exposures. Hold the board still, or trigger both cameras by one signal.",
 }

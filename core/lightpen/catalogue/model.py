@@ -1,8 +1,8 @@
 """Messages of model: code, then template with named values."""
 
 MESSAGES = {
-    "camera.distortion-folds": "The distortion of the camera file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.",
-    "camera-validity.serial": "The camera file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.",
+    "camera.distortion-folds": "The distortion of the intrinsics file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.",
+    "camera-validity.serial": "The intrinsics file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.",
     "camera-validity.age": "The camera was calibrated {age} days ago, on {day}. Check the camera by a swing, or calibrate it again.",
     "camera-validity.temperature": "The camera was calibrated at {stated:.1f} °C; the station is at {used:.1f} °C. Check the camera by a swing, or calibrate it at this temperature.",
     "pen.direction": "the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen",
@@ -58,7 +58,7 @@ MESSAGES = {
     "limit.length-per-m": "Length: additional error per metre",
     "limit.location": "Location error",
     "limit.repeatability": "Repeatability: std. deviation of the tip",
-    "limit.drift": "Drift of reference point",
+    "limit.drift": "Motion of drift reference",
     "limit.max-days": "Tip: calibration interval (days)",
     "limit.max-swings": "Tip: max. swings of the pen",
 }

@@ -18,7 +18,7 @@ MESSAGES = {
     "press-test.unsolved": "Press test without result: {why}",
     "press-test.other-choices": "The selected files or names are not those of the swing. Select them, then repeat the press test.",
     "press-test.another-station": "A press test compares two swings with the same cameras and LEDs. Give two calibrations of one station and pen.",
-    "press-test.another-camera": "{other} was calibrated with another camera file than {first}. Give two swings with one camera file.",
+    "press-test.another-camera": "{other} was calibrated with another intrinsics file than {first}. Give two swings with one intrinsics file.",
     "pen-health.measure-again": "Next: inspect the pen, fix the LED, and measure the LEDs again.",
     "pen-health.measure-length": "Next: let the pen reach room temperature, and measure a certified length.",
     "pen-health.keep-file": "Next: continue with this pen and its LED file.",

@@ -104,7 +104,7 @@ def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="FILE",
-        help="camera file: intrinsics of the camera",
+        help="intrinsics file of the camera",
     )
     parser.add_argument(
         "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
@@ -114,7 +114,7 @@ def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
 
 def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
     """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen."""
-    add_file(parser, "--camera", "FILE", "camera file: intrinsics of the camera")
+    add_file(parser, "--camera", "FILE", "intrinsics file of the camera")
     parser.add_argument(
         "--rig",
         type=Path,

@@ -55,7 +55,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         type=_share,
         metavar="SHARE",
         help="standard uncertainty of the focal length, for example 0.5%%, if the "
-        "camera file states none; other intrinsics are scaled with it",
+        "intrinsics file states none; other intrinsics are scaled with it",
     )
     parser.add_argument(
         "--scale-sigma",

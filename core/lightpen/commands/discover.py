@@ -95,7 +95,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="RUN",
-        help="touches of two cones at a certified distance, as for verify length: "
+        help="points of two cones at a certified distance, as for verify length: "
         "image folders, videos, records or FILE.csv (frame,led,x_px,y_px). With "
         "--distance they give the scale",
     )
@@ -117,7 +117,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
     )
-    add_file(parser, "--camera", "FILE", "camera file, if there is one")
+    add_file(parser, "--camera", "FILE", "intrinsics file, if there is one")
     rough = parser.add_mutually_exclusive_group()
     rough.add_argument(
         "--pen-sketch",
@@ -128,7 +128,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
     rough.add_argument(
         "--pen", type=Path, metavar="FILE", help="the same as --pen-sketch"
     )
-    for name, what in (("pen", "LED file"), ("camera", "camera file")):
+    for name, what in (("pen", "LED file"), ("camera", "intrinsics file")):
         suffix = "json" if name == "pen" else "yaml"
         add_file(parser, f"--out-{name}", f"FILE.{suffix}", f"write the {what}")
     add_file(

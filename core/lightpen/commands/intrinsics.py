@@ -58,7 +58,7 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("camera.yaml"),
         metavar="FILE.yaml",
-        help="camera file to write (camera.yaml)",
+        help="intrinsics file to write (camera.yaml)",
     )
     parser.add_argument(
         "--serial", default="", metavar="TEXT", help="serial number of the camera"
@@ -67,8 +67,8 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
         "--form",
         choices=[form.value for form in CameraForm],
         default=CameraForm.OPENCV.value,
-        help="layout of the camera file (opencv); kalibr holds no k3, so that the lens "
-        "model is then one without",
+        help="layout of the intrinsics file (opencv); kalibr holds no k3, so that the "
+        "lens model is then one without",
     )
     _add_temperature(parser)
     parser.add_argument(
@@ -97,7 +97,7 @@ def add_extrinsics(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs=2,
         metavar=("LEFT.yaml", "RIGHT.yaml"),
-        help="camera files (default: calibrated from the same images)",
+        help="intrinsics files (default: calibrated from the same images)",
     )
     parser.add_argument(
         "--names",
@@ -117,7 +117,7 @@ def add_extrinsics(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("rig.json"),
         metavar="FILE.json",
-        help="rig file to write (rig.json); without --cameras the camera files are "
+        help="rig file to write (rig.json); without --cameras the intrinsics files are "
         "written next to it",
     )
     _add_temperature(parser)
@@ -221,7 +221,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
     )
     write_camera(camera, options.out, form)
     print(shown(intrinsics_text(calibration, observed)))
-    print(shown(f"\nThe camera file is {options.out}."))
+    print(shown(f"\nThe intrinsics file is {options.out}."))
     if options.json is not None:
         record = intrinsics_record(calibration, observed.unseen, tolerances)
         write_record(options.json, plain(record))

@@ -76,7 +76,7 @@ def add_improve_pen(parser: argparse.ArgumentParser) -> None:
         parser,
         "--out-camera",
         "NEW.yaml",
-        "new camera file to write, by the same swings",
+        "new intrinsics file to write, by the same swings",
     )
 
 

@@ -57,7 +57,7 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT",
         help="calibrations of one tip: RESULT.json, or LED centres as FILE.csv",
     )
-    add_file(parser, "--camera", "FILE", "camera file for LED centres")
+    add_file(parser, "--camera", "FILE", "intrinsics file for LED centres")
     add_file(parser, "--pen", "FILE", "LED file for LED centres")
     add_pen_options(parser)
     parser.add_argument(

@@ -154,7 +154,7 @@ def _simulate(options: argparse.Namespace) -> None:
             folders = ", ".join(rig.names)
             written = (
                 f"{scene.n_images} images of each camera (folders {folders}), their "
-                "camera files, rig.json"
+                "intrinsics files, rig.json"
             )
     print(
         shown(

@@ -68,7 +68,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--producer", default="", metavar="FILE", help="GenTL producer of a camera"
     )
-    add_file(parser, "--camera", "FILE", "camera file: intrinsics of the camera")
+    add_file(parser, "--camera", "FILE", "intrinsics file of the camera")
     parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(

@@ -75,8 +75,8 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
         type=int,
         choices=range(1, 101),
         metavar="N",
-        help="images per touch while the pen is held still, such as "
-        f"{FAST}, or {PRECISE} for a precise point; 1: each image is a touch "
+        help="images per probed point while the pen is held still, such as "
+        f"{FAST}, or {PRECISE} for a precise point; 1: each image is a point "
         f"(default: {FAST}, or 1 if the pen was never held still)",
     )
 

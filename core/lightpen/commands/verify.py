@@ -91,7 +91,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
                     dest=option.name,
                     choices=tuple(option.words),
                     default=next(iter(option.words)),
-                    help="what was touched; only with --ball-diameter "
+                    help="what was probed; only with --ball-diameter "
                     f"({next(iter(option.words))})",
                 )
     if task.compares_nominal_tip:
@@ -116,7 +116,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
 
 def _add_touches(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_touches, decision_rule="simple", max_risk=5.0)
-    _add_runs(parser, "points that were touched")
+    _add_runs(parser, "points that were probed")
     parser.add_argument(
         "--ball-diameter",
         type=above_zero,

@@ -343,7 +343,7 @@
         <translation>{0}：均方根 {1:.4f} px，交叉验证 {2:.4f} px</translation>
     </message>
     <message>
-        <source>Save camera file</source>
+        <source>Save intrinsics file</source>
         <translation>保存内参文件</translation>
     </message>
     <message>
@@ -681,7 +681,7 @@
     </message>
     <message>
         <source>No drift reference</source>
-        <translation>无漂移参考</translation>
+        <translation>无漂移参考点</translation>
     </message>
     <message>
         <source>The camera moved. Verify the tip.</source>
@@ -689,7 +689,7 @@
     </message>
     <message>
         <source>Drift reference stable</source>
-        <translation>漂移参考稳定</translation>
+        <translation>漂移参考点稳定</translation>
     </message>
 </context>
 <context>
@@ -704,7 +704,7 @@
     </message>
     <message>
         <source>Drift reference</source>
-        <translation>漂移参考</translation>
+        <translation>漂移参考点</translation>
     </message>
     <message>
         <source>Temperature</source>
@@ -1470,7 +1470,7 @@
     </message>
     <message>
         <source>Open the files of camera and LEDs first.</source>
-        <translation>请先打开相机文件和 LED 文件。</translation>
+        <translation>请先打开内参文件和 LED 文件。</translation>
     </message>
     <message>
         <source>Computing: {0:.0%}</source>
@@ -3427,8 +3427,8 @@
         <translation>尚未读取摆动。</translation>
     </message>
     <message>
-        <source>Four accepted swings with this LED file and camera file are needed; missing: {0}.</source>
-        <translation>需要用此 LED 文件和相机文件的四次已接受摆动；还缺：{0}。</translation>
+        <source>Four accepted swings with this LED file and intrinsics file are needed; missing: {0}.</source>
+        <translation>需要用此 LED 文件和内参文件的四次已接受摆动；还缺：{0}。</translation>
     </message>
     <message>
         <source>An LED has moved: no LED file fits all swings.</source>
@@ -4329,8 +4329,8 @@ needed</source>
         <translation>联合平差</translation>
     </message>
     <message>
-        <source>LED file and camera file by all selected swings of a pen</source>
-        <translation>用同一光笔的所选全部摆动求 LED 文件和相机文件</translation>
+        <source>LED file and intrinsics file by all selected swings of a pen</source>
+        <translation>用同一光笔的所选全部摆动求 LED 文件和内参文件</translation>
     </message>
     <message>
         <source>Repeatability report...</source>
@@ -5913,8 +5913,8 @@ mm</translation>
         <translation>漂移</translation>
     </message>
     <message>
-        <source>Drift of reference point</source>
-        <translation>参考点漂移</translation>
+        <source>Motion of drift reference</source>
+        <translation>漂移参考点的移动</translation>
     </message>
     <message>
         <source>Enter the name of the supervisor.</source>
@@ -5973,8 +5973,8 @@ mm</translation>
         <translation>平面度 {flatness:.4f} mm（U {uncertainty:.4f} mm），证书值 {certified:.4f} mm（超出量限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
-        <source>Flatness {flatness:.4f} mm (U {uncertainty:.4f} mm), certified {certified:.4f} mm: the excess is beyond the limit of {limit:.4f} mm. The tip, the LED file or the camera file may be wrong, or the plate is dirty.</source>
-        <translation>平面度 {flatness:.4f} mm（U {uncertainty:.4f} mm），证书值 {certified:.4f} mm：超出量大于限值 {limit:.4f} mm。测头、LED 文件或相机文件可能有误，或平板不清洁。</translation>
+        <source>Flatness {flatness:.4f} mm (U {uncertainty:.4f} mm), certified {certified:.4f} mm: the excess is beyond the limit of {limit:.4f} mm. The tip, the LED file or the intrinsics file may be wrong, or the plate is dirty.</source>
+        <translation>平面度 {flatness:.4f} mm（U {uncertainty:.4f} mm），证书值 {certified:.4f} mm：超出量大于限值 {limit:.4f} mm。测头、LED 文件或内参文件可能有误，或平板不清洁。</translation>
     </message>
     <message>
         <source>Form error</source>
@@ -6029,8 +6029,8 @@ mm</translation>
         <translation>LED 中心</translation>
     </message>
     <message>
-        <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. First check that the LED file belongs to this pen with its LEDs in order, and the camera file to this camera, lens and focus; then that the tip was pressed into the cone.</source>
-        <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头也似乎在移动。请先检查 LED 文件是否属于此光笔且 LED 顺序正确，相机文件是否属于此相机、镜头和对焦；再检查测头是否压紧在锥孔中。</translation>
+        <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. First check that the LED file belongs to this pen with its LEDs in order, and the intrinsics file to this camera, lens and focus; then that the tip was pressed into the cone.</source>
+        <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头也似乎在移动。请先检查 LED 文件是否属于此光笔且 LED 顺序正确，内参文件是否属于此相机、镜头和对焦；再检查测头是否压紧在锥孔中。</translation>
     </message>
     <message>
         <source>LED {led} is listed already on line {line}.</source>
@@ -6154,7 +6154,7 @@ mm</translation>
     </message>
     <message>
         <source>Moves of the drift reference / mm</source>
-        <translation>漂移参考点的位移 / mm</translation>
+        <translation>漂移参考点的移动 / mm</translation>
     </message>
     <message>
         <source>NOT PROVEN</source>
@@ -6461,8 +6461,8 @@ mm</translation>
         <translation>半径误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
-        <source>Radius error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file or the camera file may be wrong, or the ball is not compensated.</source>
-        <translation>半径误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件或相机文件可能有误，或测球未补偿。</translation>
+        <source>Radius error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file or the intrinsics file may be wrong, or the ball is not compensated.</source>
+        <translation>半径误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件或内参文件可能有误，或测球未补偿。</translation>
     </message>
     <message>
         <source>Range</source>
@@ -6521,8 +6521,8 @@ mm</translation>
         <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm），形状误差 {form:.4f} mm。</translation>
     </message>
     <message>
-        <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file, the camera file or the ball diameter may be wrong.</source>
-        <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件、相机文件或球径可能有误。</translation>
+        <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file, the intrinsics file or the ball diameter may be wrong.</source>
+        <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件、内参文件或球径可能有误。</translation>
     </message>
     <message>
         <source>Sphere</source>
@@ -6565,7 +6565,7 @@ mm</translation>
         <translation>可用的摆动：{n_swings} 次。合并需要 {needed} 次，另需一次用于确认；须全部使用一台相机以及相同的内参文件和 LED 文件。</translation>
     </message>
     <message>
-        <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.</source>
+        <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the intrinsics file was made for {width} x {height} px. Choose the file for this camera.</source>
         <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
     </message>
     <message>
@@ -6641,7 +6641,7 @@ mm</translation>
         <translation>视频路径 {path} 不是有效的 UTF-8，视频解码器无法使用。请重命名视频或其文件夹，或将其复制到别处。</translation>
     </message>
     <message>
-        <source>The plan has no feature {name}. Its features are: {names}. Name the touches after a feature.</source>
+        <source>The plan has no feature {name}. Its features are: {names}. Name the probed points after a feature.</source>
         <translation>计划中没有要素 {name}。其要素为：{names}。请按要素命名测点。</translation>
     </message>
     <message>
@@ -6681,8 +6681,8 @@ mm</translation>
         <translation>档案库的封印文件 {file} 被改动过或已损坏。</translation>
     </message>
     <message>
-        <source>The swing does not fit the camera file. Check that the file is of this camera, zoom and focus, or find the camera without a file.</source>
-        <translation>摆动与相机文件不符。请检查文件是否属于这台相机及其变焦和对焦，或在没有文件的情况下求出相机。</translation>
+        <source>The swing does not fit the intrinsics file. Check that the file is of this camera, zoom and focus, or find the camera without a file.</source>
+        <translation>摆动与内参文件不符。请检查文件是否属于这台相机及其变焦和对焦，或在没有文件的情况下求出相机。</translation>
     </message>
     <message>
         <source>The swing of the result {file} is not in {folder}. Copy it back there, then open the result again.</source>
@@ -7045,7 +7045,7 @@ mm</translation>
         <translation>{name} 不以 .csv 或 .svg 结尾；控制图以这两种格式写出。请另选名称。</translation>
     </message>
     <message>
-        <source>{name} does not end in .yaml; camera files are written as YAML. Choose a name that ends in .yaml.</source>
+        <source>{name} does not end in .yaml; intrinsics files are written as YAML. Choose a name that ends in .yaml.</source>
         <translation>{name} 不以 .yaml 结尾；内参文件以 YAML 保存。请选择以 .yaml 结尾的名称。</translation>
     </message>
     <message>
@@ -7081,7 +7081,7 @@ mm</translation>
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
     </message>
     <message>
-        <source>{name} has the same camera file {file} for {one} and {other}. Give each camera its own calibration file.</source>
+        <source>{name} has the same intrinsics file {file} for {one} and {other}. Give each camera its own calibration file.</source>
         <translation>{name} 为 {one} 和 {other} 指定了同一个内参文件 {file}。每台相机都需要自己的标定文件。</translation>
     </message>
     <message>
@@ -7245,16 +7245,16 @@ mm</translation>
         <translation>测头在各次标定间的分散为 {of_tip:.4f} mm，而用其触测的固定点仅为 {of_point:.4f} mm。标定误差会使两者同样偏移，因此在各次标定之间光笔上有部件移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 测量是否过粗。</translation>
     </message>
     <message>
-        <source>The touches of {name} do not show its kind. Probe more points of it, or state its kind: {kinds}.</source>
-        <translation>{name} 的触测点无法确定其类型。请触测更多点，或指定类型：{kinds}。</translation>
+        <source>The probed points of {name} do not show its kind. Probe more points of it, or state its kind: {kinds}.</source>
+        <translation>{name} 的测点无法确定其类型。请触测更多点，或指定类型：{kinds}。</translation>
     </message>
     <message>
         <source>The verification belongs to {result}, which is no longer current for tip {tip} of pen {pen}. Close the verification and start another one.</source>
         <translation>此验证属于 {result}，它已不是光笔 {pen} 测头 {tip} 的当前结果。请关闭此验证并重新开始。</translation>
     </message>
     <message>
-        <source>The verification was started with another camera file or LED file than the selected one. Select that file, then continue.</source>
-        <translation>此验证开始时使用的相机文件或 LED 文件与当前所选不同。请选择该文件，然后继续。</translation>
+        <source>The verification was started with another intrinsics file or LED file than the selected one. Select that file, then continue.</source>
+        <translation>此验证开始时使用的内参文件或 LED 文件与当前所选不同。请选择该文件，然后继续。</translation>
     </message>
     <message>
         <source>The video {path} cannot be decoded within {most:.0f} MB. Save its frames as images.</source>
@@ -7337,7 +7337,7 @@ mm</translation>
         <translation>c11 至 c66 不是协方差：必须对称，相关系数在 -1 到 1 之间。请改正或删除这些列。</translation>
     </message>
     <message>
-        <source>camera file</source>
+        <source>intrinsics file</source>
         <translation>内参文件</translation>
     </message>
     <message>
@@ -7461,7 +7461,7 @@ mm</translation>
         <translation>图像来源</translation>
     </message>
     <message>
-        <source>the camera file. Calibrate the camera, and state the covariance in its file</source>
+        <source>the intrinsics file. Calibrate the camera, and state the covariance in its file</source>
         <translation>内参文件。请标定相机，并在文件中给出协方差</translation>
     </message>
     <message>
@@ -7677,7 +7677,7 @@ mm</translation>
         <translation>{n_images} 幅图像中有 {n_usable} 幅可用</translation>
     </message>
     <message>
-        <source>{n_wrong} of {n_readable} images are {size}, the camera file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.</source>
+        <source>{n_wrong} of {n_readable} images are {size}, the intrinsics file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.</source>
         <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}，而内参文件适用于 {width} × {height} px。请选择这台相机的文件，或关闭像素合并和裁剪。</translation>
     </message>
     <message>
@@ -7894,7 +7894,7 @@ mm</translation>
     </message>
     <message>
         <source>Cone and camera moved by {distance:.3f} mm relative to each other during the swing. The result is corrected as far as possible, but probed points would be affected too. Clamp both and let the camera warm up.</source>
-        <translation>摆动过程中锥孔与相机相对移动 {distance:.3f} mm。结果已尽可能修正，但触测点同样会受影响。请固定两者，并让相机充分预热。</translation>
+        <translation>摆动过程中锥孔与相机相对移动 {distance:.3f} mm。结果已尽可能修正，但测点同样会受影响。请固定两者，并让相机充分预热。</translation>
     </message>
     <message>
         <source>Dask is not installed; computing on a cluster needs it. Install the extra &quot;cluster&quot;, or compute on this machine.</source>
@@ -8014,7 +8014,7 @@ mm</translation>
     </message>
     <message>
         <source>Has the camera moved? Probe the cone {needed} times with the pen upright, and lift the tip in between: {n_touches} of {needed}. Visit {visit} of {n_visits}.</source>
-        <translation>相机是否移动？请使光笔竖直，触测锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {visit} / {n_visits} 次触测参考点。</translation>
+        <translation>相机是否移动？请使光笔竖直，触测锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {visit} / {n_visits} 次触测漂移参考点。</translation>
     </message>
     <message>
         <source>Hold the pen of this tip in view of the camera.</source>
@@ -8065,7 +8065,7 @@ mm</translation>
         <translation>LED 文件</translation>
     </message>
     <message>
-        <source>LED positions and images disagree: {sigma:.1f} px; usual is {usual} px or less. Check that the LED file belongs to this pen with its LEDs in order, and the camera file to this camera.</source>
+        <source>LED positions and images disagree: {sigma:.1f} px; usual is {usual} px or less. Check that the LED file belongs to this pen with its LEDs in order, and the intrinsics file to this camera.</source>
         <translation>LED 位置与图像不符：{sigma:.1f} px，通常不超过 {usual} px。请检查 LED 文件是否属于这支光笔且编号顺序正确，内参文件是否属于这台相机。</translation>
     </message>
     <message>
@@ -8121,8 +8121,8 @@ mm</translation>
         <translation>长度 / mm</translation>
     </message>
     <message>
-        <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified length of this bar. Otherwise the scale of the LED file or the camera file is wrong, or the pen is warmer than at its measurement.</source>
-        <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的校准长度。否则 LED 文件或相机文件的比例有误，或光笔温度高于其测量时的温度。</translation>
+        <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified length of this bar. Otherwise the scale of the LED file or the intrinsics file is wrong, or the pen is warmer than at its measurement.</source>
+        <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的校准长度。否则 LED 文件或内参文件的比例有误，或光笔温度高于其测量时的温度。</translation>
     </message>
     <message>
         <source>Length: additional error per metre</source>
@@ -8133,7 +8133,7 @@ mm</translation>
         <translation>{file} 第 {line} 行已损坏。请用备份恢复文件，或删除该行，不用那幅图像继续。</translation>
     </message>
     <message>
-        <source>Line {line} of {name} begins a document type definition, which is not accepted for security. Remove it; camera files of OpenCV have none.</source>
+        <source>Line {line} of {name} begins a document type definition, which is not accepted for security. Remove it; intrinsics files of OpenCV have none.</source>
         <translation>{name} 第 {line} 行开始一个文档类型定义，出于安全原因不予接受。请删除；OpenCV 的内参文件中没有这种定义。</translation>
     </message>
     <message>
@@ -8201,7 +8201,7 @@ mm</translation>
         <translation>多数图像中的光点少于 {n_needed} 个（中位数 {median:.0f}）；光笔的 {n_leds} 个 LED 中须看到 {n_needed} 个。请检查 LED 是否点亮并在图像内，以及曝光是否合适。</translation>
     </message>
     <message>
-        <source>Most images show {n_needed} or more spots, but these do not match the {n_leds} LEDs of the LED file. Check that the LED file belongs to this pen and the camera file to these images.</source>
+        <source>Most images show {n_needed} or more spots, but these do not match the {n_leds} LEDs of the LED file. Check that the LED file belongs to this pen and the intrinsics file to these images.</source>
         <translation>多数图像中有 {n_needed} 个或更多光点，但与含 {n_leds} 个 LED 的 LED 文件不符。请检查该文件是否属于这支光笔，内参文件是否属于这些图像。</translation>
     </message>
     <message>
@@ -8217,7 +8217,7 @@ mm</translation>
         <translation>下一步：继续采集图像。本次摆动的图像会保留。</translation>
     </message>
     <message>
-        <source>Next: check that the camera file belongs to this camera and the LED file to this pen.</source>
+        <source>Next: check that the intrinsics file belongs to this camera and the LED file to this pen.</source>
         <translation>下一步：检查内参文件和 LED 文件是否属于这台相机和这支光笔。</translation>
     </message>
     <message>
@@ -8290,7 +8290,7 @@ mm</translation>
     </message>
     <message>
         <source>Next: use the points probed between the visits.</source>
-        <translation>下一步：使用各次触测参考点之间的测点。</translation>
+        <translation>下一步：使用各次触测漂移参考点之间的测点。</translation>
     </message>
     <message>
         <source>Next: use the tip for measurement.</source>
@@ -8349,7 +8349,7 @@ mm</translation>
         <translation>尚未设置主管密码。请在“开始”步骤的“所有限值”中设置。</translation>
     </message>
     <message>
-        <source>No touches of {name} are given. Give them as {name}=IMAGES, or as a folder of that name.</source>
+        <source>No probed points of {name} are given. Give them as {name}=IMAGES, or as a folder of that name.</source>
         <translation>未给出 {name} 的测点。请以 {name}=IMAGES 或同名文件夹给出。</translation>
     </message>
     <message>
@@ -8441,7 +8441,7 @@ mm</translation>
         <translation>把测头放入锥孔并保持不动，每次改变倾斜。</translation>
     </message>
     <message>
-        <source>Residuals are large: {sigma:.2f} px; usual is {usual} px or less. Check that the camera file belongs to this camera, lens and focus, and the LED file to this pen.</source>
+        <source>Residuals are large: {sigma:.2f} px; usual is {usual} px or less. Check that the intrinsics file belongs to this camera, lens and focus, and the LED file to this pen.</source>
         <translation>残差过大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于此相机、镜头和对焦，LED 文件是否属于此光笔。</translation>
     </message>
     <message>
@@ -8641,16 +8641,16 @@ mm</translation>
         <translation>相机在拍摄期间漂移：从第一个视图到最后一个视图，图像上变化 {px:.2f} px（fx {fx:+.2f}，cx {cx:+.2f}，cy {cy:+.2f} px）。请让相机预热，固定镜头和支架，然后重新拍摄视图。</translation>
     </message>
     <message>
-        <source>The camera file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.</source>
+        <source>The intrinsics file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.</source>
         <translation>内参文件属于相机 {stated}，而当前使用的相机是 {used}。请提供该相机的文件。</translation>
     </message>
     <message>
-        <source>The camera file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.</source>
+        <source>The intrinsics file is off: it states a focal length of {stated:.0f} px ({off:+.1f} %); by the swing it is {found:.0f} px. Check that the file is of this camera, zoom and focus; use the file written now.</source>
         <translation>内参文件有偏差：文件给出的焦距为 {stated:.0f} px（{off:+.1f} %），由摆动得到的焦距为 {found:.0f} px。请检查文件是否属于这台相机及其变焦和对焦；请使用现在写出的文件。</translation>
     </message>
     <message>
-        <source>The camera file of {camera} contradicts the images of the board: residuals of {rms:.1f} px (RMS). The file is of another camera or zoom, or has a lens model that does not fit this lens, such as a plain one for a fisheye. Check it, or calibrate the cameras from these images.</source>
-        <translation>{camera} 的相机文件与标定板图像矛盾：残差为 {rms:.1f} px（均方根）。该文件属于另一台相机或另一变焦，或其镜头模型不适合此镜头，例如将普通模型用于鱼眼镜头。请检查该文件，或用这些图像标定相机。</translation>
+        <source>The intrinsics file of {camera} contradicts the images of the board: residuals of {rms:.1f} px (RMS). The file is of another camera or zoom, or has a lens model that does not fit this lens, such as a plain one for a fisheye. Check it, or calibrate the cameras from these images.</source>
+        <translation>{camera} 的内参文件与标定板图像矛盾：残差为 {rms:.1f} px（均方根）。该文件属于另一台相机或另一变焦，或其镜头模型不适合此镜头，例如将普通模型用于鱼眼镜头。请检查该文件，或用这些图像标定相机。</translation>
     </message>
     <message>
         <source>The camera link loses images: {n_incomplete} of {n_sent} incomplete, {n_missed} lost. Lower the frame rate, use a smaller region or larger packets, or check cable and switch.</source>
@@ -8733,7 +8733,7 @@ mm</translation>
         <translation>与前一测头之差，各轴均不超过该差值 U (k = 2) 的 {gate:g} 倍时予以接受（测头未变时，接受的概率为 95 %）；超出此值，或无法读取前一测头时，判为“需检查”。“需检查”须说明理由才能接受，“重新摆动”不得接受。</translation>
     </message>
     <message>
-        <source>The distortion of the camera file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
+        <source>The distortion of the intrinsics file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
         <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
     </message>
     <message>
@@ -8746,7 +8746,7 @@ mm</translation>
     </message>
     <message>
         <source>The drift reference stays within {distance:.4f} mm, but its U is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a drift of that size would not be detected.</source>
-        <translation>漂移参考点的位移不超过 {distance:.4f} mm，但其 U 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：这样大小的漂移无法察觉。</translation>
+        <translation>漂移参考点的移动不超过 {distance:.4f} mm，但其 U 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：这样大小的漂移无法察觉。</translation>
     </message>
     <message>
         <source>The drift reference was visited once; drift needs two visits or more. Probe it before, during and after the session.</source>
@@ -8757,7 +8757,7 @@ mm</translation>
         <translation>由这些视图得出的畸变使图像在角部翻折，而那里没有视图显示标定板。请补充标定板位于图像各角的视图。</translation>
     </message>
     <message>
-        <source>The feature {name} has {n_touches} touches; the plan needs {needed}. Probe the missing points.</source>
+        <source>The feature {name} has {n_touches} probed points; the plan needs {needed}. Probe the missing points.</source>
         <translation>要素 {name} 有 {n_touches} 个测点；计划需要 {needed} 个。请触测缺少的点。</translation>
     </message>
     <message>
@@ -8865,7 +8865,7 @@ mm</translation>
         <translation>图像与 LED 文件坐标的 {factor:g} 倍相符。请检查文件的单位：需要毫米。</translation>
     </message>
     <message>
-        <source>The images match about {factor:g} times the focal length of the camera file. Choose the file of this camera and lens, or calibrate the camera again.</source>
+        <source>The images match about {factor:g} times the focal length of the intrinsics file. Choose the file of this camera and lens, or calibrate the camera again.</source>
         <translation>图像与内参文件焦距的约 {factor:g} 倍相符。请选择这台相机和镜头的文件，或重新标定相机。</translation>
     </message>
     <message>
@@ -9305,15 +9305,15 @@ mm</translation>
         <translation>触测的长度 {length:g} mm 对应的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。请检查触测的是哪个长度、其校准值以及圆盘直径。</translation>
     </message>
     <message>
-        <source>The touches of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.</source>
+        <source>The probed points of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.</source>
         <translation>{names} 的测点与已知形状的偏差超过其 U（卡方 {chi_square:.1f}，自由度 {n_free}），未作修正。</translation>
     </message>
     <message>
-        <source>The touches of {name} come from both sides of the surface. Probe the feature again from one side.</source>
+        <source>The probed points of {name} come from both sides of the surface. Probe the feature again from one side.</source>
         <translation>{name} 的测点来自表面的两侧。请从一侧重新触测该要素。</translation>
     </message>
     <message>
-        <source>The touches of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
+        <source>The probed points of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
         <translation>{name} 的测点不能表明测球位于表面的哪一侧。请在计划中写明 &apos;side: inside&apos; 或 &apos;side: outside&apos;。</translation>
     </message>
     <message>
@@ -10005,7 +10005,7 @@ mm</translation>
         <translation>{one} 与 {other} 的测头完全相同。每次校准只需给出一次。</translation>
     </message>
     <message>
-        <source>{other} was calibrated with another camera file than {first}. Give two swings with one camera file.</source>
+        <source>{other} was calibrated with another intrinsics file than {first}. Give two swings with one intrinsics file.</source>
         <translation>{other} 与 {first} 所用的内参文件不同。请给出使用同一内参文件的两次摆动。</translation>
     </message>
     <message>
@@ -10057,7 +10057,7 @@ mm</translation>
         <translation>{where}请检查该文件是否对应这些相机当前的位置，或重新标定相机组。</translation>
     </message>
     <message>
-        <source>{name} names the camera file of {camera}: {fault}</source>
+        <source>{name} names the intrinsics file of {camera}: {fault}</source>
         <translation>{name} 所指定的相机 {camera} 的文件：{fault}</translation>
     </message>
     <message>
@@ -10154,7 +10154,7 @@ mm</translation>
     </message>
     <message>
         <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.</source>
-        <translation>漂移参考在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未夹紧，或相机未预热。其间测量的点有同样大小的误差。</translation>
+        <translation>漂移参考点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未夹紧，或相机未预热。其间测量的点有同样大小的误差。</translation>
     </message>
     <message>
         <source>The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
@@ -10165,8 +10165,8 @@ mm</translation>
         <translation>图像与 LED 文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于这支光笔，或重新测量光笔。</translation>
     </message>
     <message>
-        <source>The images contradict the camera file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
-        <translation>图像与相机文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
+        <source>The images contradict the intrinsics file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
+        <translation>图像与内参文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
     </message>
     <message>
         <source>The images contradict the file of camera {camera}: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
@@ -10253,7 +10253,7 @@ mm</translation>
         <translation>{name} 是表格，无处存放光笔的名称、标称测头和协方差。请选择以 .json 结尾的文件名。</translation>
     </message>
     <message>
-        <source>{name} is for {n_cameras} cameras, but {n_files} camera files are with it. Restore it from a copy.</source>
+        <source>{name} is for {n_cameras} cameras, but {n_files} intrinsics files are with it. Restore it from a copy.</source>
         <translation>{name} 对应 {n_cameras} 台相机，而与之相配的内参文件有 {n_files} 个。请从备份恢复该文件。</translation>
     </message>
     <message>
@@ -10325,8 +10325,8 @@ mm</translation>
         <translation>{place} 中没有图像。请选择有图像的录制。</translation>
     </message>
     <message>
-        <source>{place} contains the images of {n_given} cameras; the verification uses {n_cameras}. Give the camera file or the rig file of these images.</source>
-        <translation>{place} 中有 {n_given} 台相机的图像，而验证测头用的是 {n_cameras} 台。请指定这些图像的相机文件或相机组文件。</translation>
+        <source>{place} contains the images of {n_given} cameras; the verification uses {n_cameras}. Give the intrinsics file or the rig file of these images.</source>
+        <translation>{place} 中有 {n_given} 台相机的图像，而验证测头用的是 {n_cameras} 台。请指定这些图像的内参文件或相机组文件。</translation>
     </message>
     <message>
         <source>{place} has no {key}, or its value is not text. Add it.</source>
@@ -11133,8 +11133,8 @@ mm</translation>
         <translation>LED 发光面直径</translation>
     </message>
     <message>
-        <source>Intrinsics of the camera file</source>
-        <translation>内参文件的内参</translation>
+        <source>Intrinsics of the camera</source>
+        <translation>相机内参</translation>
     </message>
     <message>
         <source>Lens beyond its distortion model</source>

@@ -58,7 +58,7 @@ def test_a_file_is_read_whole(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"The camera file .*none\.yaml does not exist"):
+    with pytest.raises(FileError, match=r"The intrinsics file .*none\.yaml does not"):
         read_bytes(tmp_path / "none.yaml", CAMERA_FILE, LIMIT)
 
 

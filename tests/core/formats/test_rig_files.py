@@ -124,7 +124,7 @@ def test_a_rotation_in_few_digits_becomes_one_in_all(rig_file: Path) -> None:
         (setting("intrinsics", "gone.yaml"), "right: .*gone.yaml does not exist"),
         (
             setting("intrinsics", "left.yaml"),
-            "the same camera file .* for left and right",
+            "the same intrinsics file .* for left and right",
         ),
         (setting("intrinsics", [3]), "has no intrinsics"),
         (setting("name", "left"), "two cameras named .left"),

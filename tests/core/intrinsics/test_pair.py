@@ -147,7 +147,7 @@ def test_a_file_of_another_lens_is_refused_with_its_camera(
     distortion = np.array([k1, *camera.distortion[1:]])
     other = replace(known, fx=zoom * camera.fx, distortion=distortion)
 
-    with pytest.raises(CalibrationError, match="The camera file of right"):
+    with pytest.raises(CalibrationError, match="The intrinsics file of right"):
         calibrate_pair(both_see(camera), BoardTolerances(), NAMES, (known, other))
 
 

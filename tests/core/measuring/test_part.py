@@ -219,7 +219,7 @@ def test_touches_from_both_sides_are_refused(plan: Plan) -> None:
 
 
 def test_missing_touches_are_named(plan: Plan) -> None:
-    with pytest.raises(CalibrationError, match="front has 0 touches"):
+    with pytest.raises(CalibrationError, match="front has 0 probed points"):
         measure_part(plan, only(touched(), "top"))
 
 

@@ -215,7 +215,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def _on_save_clicked(self) -> None:
         path = self._place.folder() / "camera.yaml"
-        ask_file(self, self.tr("Save camera file"), path, self.save)
+        ask_file(self, self.tr("Save intrinsics file"), path, self.save)
 
     def _on_found_changed(self) -> None:
         found = self._calibration.found

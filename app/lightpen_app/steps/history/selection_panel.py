@@ -133,7 +133,7 @@ class SelectionPanel(Translated, QWidget):
     def _retranslate(self) -> None:
         self._adjust.setText(self.tr("Adjust together"))
         self._adjust.setToolTip(
-            self.tr("LED file and camera file by all selected swings of a pen")
+            self.tr("LED file and intrinsics file by all selected swings of a pen")
         )
         too_few = self.tr(
             "To adjust together, select {0} or more calibrations."

@@ -268,8 +268,8 @@ class PenPanel(Translated, QWidget):
             return self.tr("The swings are not read yet.")
         if found.n_missing:
             text = self.tr(
-                "Four accepted swings with this LED file and camera file are needed; "
-                "missing: {0}."
+                "Four accepted swings with this LED file and intrinsics file are "
+                "needed; missing: {0}."
             )
             return text.format(found.n_missing)
         if found.health is not None and found.health.moved:

@@ -114,7 +114,7 @@ def _add_result(result: Element, file: CalibrationFile, laboratory: Laboratory) 
     _add_software(_sub(result, "usedSoftware"), program.name, program.version)
     equipment = _sub(result, "measuringEquipments")
     inputs = calibration.inputs
-    for name, given in (("Camera file", inputs.camera), ("LED file", inputs.pen)):
+    for name, given in (("Intrinsics file", inputs.camera), ("LED file", inputs.pen)):
         _add_file(equipment, name, given.file, given.sha256)
     for each in file.traced:
         _add_traced(equipment, each)

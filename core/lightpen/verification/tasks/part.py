@@ -409,7 +409,7 @@ def _rule(options: PartOptions, limits: VerificationLimits) -> Message:
 PART = VerificationTask(
     kind="part",
     summary="a part by a plan",
-    run_help="touches of a feature",
+    run_help="probed points of a feature",
     title=message("part.title"),
     purpose=message("part.title"),
     first=message("part.first"),

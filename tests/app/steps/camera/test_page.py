@@ -418,7 +418,7 @@ def test_intrinsics_of_another_camera_and_of_long_ago_are_doubted(
 
     live.enter("Intrinsics file", str(path))
 
-    live.wait("The camera file belongs to camera DEV-99")
+    live.wait("The intrinsics file belongs to camera DEV-99")
     assert "on 2020-01-02" in live.words
 
 

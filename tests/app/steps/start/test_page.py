@@ -1091,7 +1091,7 @@ def cut_header(folder: Path) -> str:
 def remove_camera(folder: Path) -> str:
     (camera,) = folder.glob("camera.*")
     camera.unlink()
-    return f"The camera file {camera} does not exist."
+    return f"The intrinsics file {camera} does not exist."
 
 
 def damage_line(folder: Path) -> str:

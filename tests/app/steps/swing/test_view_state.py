@@ -150,7 +150,7 @@ def test_spots_that_do_not_match_the_pen_point_to_its_file_before_the_swing(
     reported = words.warning(replace(waiting, has_unfit_spots=True))
 
     assert reported.text.endswith(
-        "Check that the LED file belongs to this pen and the camera file to these "
+        "Check that the LED file belongs to this pen and the intrinsics file to these "
         "images."
     )
     assert words.warning(replace(at_verdict(), has_unfit_spots=True)) == StatusMessage()

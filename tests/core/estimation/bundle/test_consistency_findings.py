@@ -182,7 +182,7 @@ def test_what_lies_far_beyond_the_files_own_uncertainty_is_named_with_both_value
     assert found.stated == pytest.approx(stated)
     assert abs(found.estimated - true) <= 1.5 * found.estimated_uncertainty
     assert str(found.message) in map(str, warnings_of(result))
-    assert f"camera file: {name} " in str(found.message)
+    assert f"intrinsics file: {name} " in str(found.message)
     assert "calibrate the camera again" in str(found.message)
     verdict = judge(result, SwingLimits(max_uncertainty=0.1))
     assert verdict.grade is Grade.CHECK

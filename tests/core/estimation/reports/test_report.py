@@ -232,7 +232,7 @@ def test_a_contradicted_file_is_in_record_warnings_and_text() -> None:
     assert entry["wanted"] == pytest.approx(CAMERA.fx, rel=1e-3)
     codes = [warning["code"] for warning in found["warnings"]]
     assert "warning.camera-file-contradicted" in codes
-    assert "The images contradict the camera file: focal length" in text
+    assert "The images contradict the intrinsics file: focal length" in text
 
 
 def test_words_among_the_values_of_a_verdict_have_codes_and_text() -> None:
@@ -333,7 +333,7 @@ def test_large_residuals_are_warned_of() -> None:
     (warning,) = warnings_of(noisy)
 
     assert "Residuals are large" in str(warning)
-    assert "camera file" in str(warning)
+    assert "intrinsics file" in str(warning)
 
 
 def test_a_pivot_calibration_is_recorded_and_shown() -> None:

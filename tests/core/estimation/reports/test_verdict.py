@@ -176,7 +176,7 @@ def test_an_uncertainty_by_leds_that_are_off_is_reported_as_such(
     [
         (
             ContributionName.CAMERA,
-            "the camera file. Calibrate the camera",
+            "the intrinsics file. Calibrate the camera",
             "intrinsics file",
         ),
         (ContributionName.LEDS, "the LED file. Measure the LEDs more", "LED file"),
