@@ -2031,7 +2031,7 @@
     </message>
     <message>
         <source>Certified value</source>
-        <translation>检定值</translation>
+        <translation>证书值</translation>
     </message>
     <message>
         <source>Max. change since last calibration</source>
@@ -2126,7 +2126,7 @@
     </message>
     <message>
         <source>Place of calibration</source>
-        <translation>校准地点</translation>
+        <translation>标定地点</translation>
     </message>
     <message>
         <source>Laboratory</source>
@@ -5806,7 +5806,7 @@ mm</translation>
     </message>
     <message>
         <source>Certified diameter</source>
-        <translation>校准直径</translation>
+        <translation>证书直径</translation>
     </message>
     <message>
         <source>Certified flatness</source>
@@ -5898,7 +5898,7 @@ mm</translation>
     </message>
     <message>
         <source>Diameter / mm; certified {certified:.4f} mm</source>
-        <translation>直径 / mm；校准值 {certified:.4f} mm</translation>
+        <translation>直径 / mm；证书值 {certified:.4f} mm</translation>
     </message>
     <message>
         <source>Diameter of the discs: {flaw}</source>
@@ -7190,7 +7190,7 @@ mm</translation>
     </message>
     <message>
         <source>A press test compares two swings with the same cameras and LEDs. Give two calibrations of one station and pen.</source>
-        <translation>压力试验比较使用相同相机和 LED 的两次摆动。请给出同一工位、同一光笔的两次校准。</translation>
+        <translation>压力试验比较使用相同相机和 LED 的两次摆动。请给出同一工位、同一光笔的两次标定。</translation>
     </message>
     <message>
         <source>A swing with firm pressure is compared only and cannot be accepted.</source>
@@ -7502,7 +7502,7 @@ mm</translation>
     </message>
     <message>
         <source>the whole record of the calibration</source>
-        <translation>完整的校准记录</translation>
+        <translation>完整的标定记录</translation>
     </message>
     <message>
         <source>the {what} is {value:g} where the first LED has {first:g}. It must be the same for all LEDs of a pen.</source>
@@ -7810,7 +7810,7 @@ mm</translation>
     </message>
     <message>
         <source>An LED file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.</source>
-        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，触测已检定长度的两端，或在已知距离的第二个锥孔中摆动。</translation>
+        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，触测一段有证书的长度的两端，或在已知距离的第二个锥孔中摆动。</translation>
     </message>
     <message>
         <source>An internal error occurred, and the verification is paused. Results so far are kept; continue, or start over.</source>
@@ -7934,7 +7934,7 @@ mm</translation>
     </message>
     <message>
         <source>Entry {number} is later than its timestamp: the clock of the station is ahead. Nothing was stored. Set the clock, and repeat the request after the next entry.</source>
-        <translation>记录 {number} 晚于其时间戳：工位时钟超前。未保存任何内容。请校准时钟，并在下一条记录之后重新请求。</translation>
+        <translation>记录 {number} 晚于其时间戳：工位时钟超前。未保存任何内容。请校正时钟，并在下一条记录之后重新请求。</translation>
     </message>
     <message>
         <source>Entry {number} is not an accepted tip. Choose the entry of an accepted tip.</source>
@@ -8122,7 +8122,7 @@ mm</translation>
     </message>
     <message>
         <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified length of this bar. Otherwise the scale of the LED file or the intrinsics file is wrong, or the pen is warmer than at its measurement.</source>
-        <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的校准长度。否则 LED 文件或内参文件的比例有误，或光笔温度高于其测量时的温度。</translation>
+        <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的证书长度。否则 LED 文件或内参文件的比例有误，或光笔温度高于其测量时的温度。</translation>
     </message>
     <message>
         <source>Length: additional error per metre</source>
@@ -8194,7 +8194,7 @@ mm</translation>
     </message>
     <message>
         <source>Monte Carlo gives more: U is {percent:.0f} % smaller along {axis} (standard error {own:.0f} %). The calibration is not linear within the uncertainties of its files. State U by Monte Carlo, or reduce these uncertainties and tilt the pen farther.</source>
-        <translation>蒙特卡洛法的结果较大：U 沿 {axis} 小 {percent:.0f} %（标准误差 {own:.0f} %）。在文件的不确定度范围内校准不是线性的。请按蒙特卡洛法给出 U，或减小这些不确定度并加大倾斜。</translation>
+        <translation>蒙特卡洛法的结果较大：U 沿 {axis} 小 {percent:.0f} %（标准误差 {own:.0f} %）。在文件的不确定度范围内标定不是线性的。请按蒙特卡洛法给出 U，或减小这些不确定度并加大倾斜。</translation>
     </message>
     <message>
         <source>Most images show fewer than {n_needed} spots (median {median:.0f}); at least {n_needed} of the {n_leds} LEDs are needed. Check that the LEDs are lit and in the image, and check the exposure.</source>
@@ -8266,7 +8266,7 @@ mm</translation>
     </message>
     <message>
         <source>Next: let the pen reach room temperature, and measure a certified length.</source>
-        <translation>下一步：让光笔达到室温，并测量一段已认证的长度。</translation>
+        <translation>下一步：让光笔达到室温，并测量一段有证书的长度。</translation>
     </message>
     <message>
         <source>Next: probe more points with more images each, tilt the pen farther to all sides, and turn it.</source>
@@ -8282,7 +8282,7 @@ mm</translation>
     </message>
     <message>
         <source>Next: tighten the stylus or use a shorter, stiffer one, clamp the cone, and calibrate again with gentle pressure.</source>
-        <translation>下一步：拧紧测杆或换用更短、更硬的测杆，夹紧锥座，以轻压重新校准。</translation>
+        <translation>下一步：拧紧测杆或换用更短、更硬的测杆，夹紧锥座，以轻压重新标定。</translation>
     </message>
     <message>
         <source>Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.</source>
@@ -9302,7 +9302,7 @@ mm</translation>
     </message>
     <message>
         <source>The touched length of {length:g} mm gives a disc diameter of {found:.2f} mm, stated is {stated:g} mm. Check which length was touched, its certified value, and the disc diameter.</source>
-        <translation>触测的长度 {length:g} mm 对应的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。请检查触测的是哪个长度、其校准值以及圆盘直径。</translation>
+        <translation>触测的长度 {length:g} mm 对应的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。请检查触测的是哪个长度、其证书值以及圆盘直径。</translation>
     </message>
     <message>
         <source>The probed points of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.</source>
@@ -9322,7 +9322,7 @@ mm</translation>
     </message>
     <message>
         <source>The two points are {distance:.2f} mm apart; the certified length is {certified} mm. Probe its other end.</source>
-        <translation>两点相距 {distance:.2f} mm，校准长度为 {certified} mm。请触测其另一端。</translation>
+        <translation>两点相距 {distance:.2f} mm，证书长度为 {certified} mm。请触测其另一端。</translation>
     </message>
     <message>
         <source>The two recordings have different numbers of images. Choose two simultaneous recordings.</source>
@@ -9330,7 +9330,7 @@ mm</translation>
     </message>
     <message>
         <source>The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.</source>
-        <translation>未指定校准值的不确定度。请输入其证书中的 U (k = 2)。</translation>
+        <translation>未指定证书值的不确定度。请输入其证书中的 U (k = 2)。</translation>
     </message>
     <message>
         <source>The uncertainty of the stylus axis is {uncertainty:.1f}°; the limit is {needed:.1f}°. The pen was tilted during the rotation. Hold the stylus upright between two fingers and only turn it.</source>
@@ -9862,7 +9862,7 @@ mm</translation>
     </message>
     <message>
         <source>the scale of the LED file. Calibrate the LED coordinates against a better length standard and state the uncertainty, or swing in two cones at a known distance</source>
-        <translation>LED 文件的尺度。请用更准确的长度标准测量 LED 并给出其不确定度，或在间距已知的两个锥孔中摆动</translation>
+        <translation>LED 文件的尺度。请用更准确的长度标准标定 LED 坐标并给出其不确定度，或在间距已知的两个锥孔中摆动</translation>
     </message>
     <message>
         <source>the scatter of the poses and its correlation from pose to pose</source>
@@ -10002,11 +10002,11 @@ mm</translation>
     </message>
     <message>
         <source>{one} and {other} hold the same tip to the last digit. Give each calibration once.</source>
-        <translation>{one} 与 {other} 的测头完全相同。每次校准只需给出一次。</translation>
+        <translation>{one} 与 {other} 的测头完全相同。每次标定只需给出一次。</translation>
     </message>
     <message>
         <source>{other} was calibrated with another intrinsics file than {first}. Give two swings with one intrinsics file.</source>
-        <translation>{other} 与 {first} 所用的内参文件不同。请给出使用同一内参文件的两次摆动。</translation>
+        <translation>{other} 与 {first} 标定时所用的内参文件不同。请给出使用同一内参文件的两次摆动。</translation>
     </message>
     <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
@@ -10150,7 +10150,7 @@ mm</translation>
     </message>
     <message>
         <source>The diameter of the sphere is not specified. Enter the certified one.</source>
-        <translation>未指定球的直径。请输入校准值。</translation>
+        <translation>未指定球的直径。请输入证书值。</translation>
     </message>
     <message>
         <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.</source>
@@ -10230,7 +10230,7 @@ mm</translation>
     </message>
     <message>
         <source>The points lie on a circle of radius {measured:.3f} mm; certified are {certified} mm. Check that it is this ring, and that the radius is entered, not the diameter.</source>
-        <translation>各点位于半径 {measured:.3f} mm 的圆上；校准值为 {certified} mm。请检查是否为此环规，且填写的是半径而不是直径。</translation>
+        <translation>各点位于半径 {measured:.3f} mm 的圆上；证书值为 {certified} mm。请检查是否为此环规，且填写的是半径而不是直径。</translation>
     </message>
     <message>
         <source>The points lie on no sphere: {n_off} of {n} are outliers, and the others deviate by up to {off:.2f} mm. Probe one sphere.</source>

@@ -36,6 +36,16 @@ WORDS = re.compile(
     r"[A-Za-z]{2}[,.:]? [A-Za-z]{2}|^[A-Z][a-z]{2,}:? ?$|^ [a-z]{3}|[a-z]{3} $"
     r"|\{\} [A-Za-z]{3}|[A-Za-z]{3}:? \{\}"
 )
+# Words for what the glossary gives another term: intrinsics file, drift reference,
+# probed points; in Chinese intrinsics file, certified value, calibration.
+OTHER_TERMS = re.compile(
+    r"camera files?\b|reference point|\btouches\b"
+    "|\u76f8\u673a\u6587\u4ef6|\u68c0\u5b9a|\u6821\u51c6"
+)
+# Laboratory and certificate keep the names that standards give them.
+NAMED_BY_STANDARDS = re.compile(
+    "\u6821\u51c6\u5b9e\u9a8c\u5ba4|\u6570\u5b57\u6821\u51c6\u8bc1\u4e66"
+)
 TRANSLATING = {"tr", "translate", "QT_TRANSLATE_NOOP"}
 UNSEEN = {"setObjectName", "TypeVar", "ValueError"}  # whose words no user reads
 ENGLISH = ("self_test", "crash.py", "desktop_entry.py")  # files, and both languages
@@ -313,6 +323,22 @@ def test_labels_are_translated_as_in_the_glossary() -> None:
     }
 
     assert others == set()
+
+
+def other_terms(text: str) -> list[str]:
+    return OTHER_TERMS.findall(NAMED_BY_STANDARDS.sub("", text))
+
+
+def test_texts_use_the_terms_of_the_glossary() -> None:
+    for _, source, translation in messages(CHINESE):
+        for text in (source, *texts_of(translation)):
+            assert other_terms(text) == [], text
+
+
+def test_another_word_than_that_of_the_glossary_is_noticed() -> None:
+    assert other_terms("Open the camera file. Name the touches.") != []
+    assert other_terms("\u6821\u51c6\u5b9e\u9a8c\u5ba4") == []  # a laboratory
+    assert other_terms("\u91cd\u65b0\u6821\u51c6") == ["\u6821\u51c6"]
 
 
 @pytest.mark.parametrize("page", sorted((RESOURCES / "help").glob("*/*.md")), ids=str)
