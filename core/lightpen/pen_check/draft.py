@@ -199,8 +199,8 @@ def exchanged(
     return result
 
 
-def mended(draft: PenDraft, finding: Finding) -> PenDraft:
-    """Return a draft with a finding of live images that `can_be_mended` corrected.
+def corrected(draft: PenDraft, finding: Finding) -> PenDraft:
+    """Return a draft corrected by a finding of live images that `can_be_corrected`.
 
     Coordinates that two LEDs have of each other are exchanged, and an LED off its place
     is put where the images show it. Where either of two coordinates can be exchanged,

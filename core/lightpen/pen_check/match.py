@@ -70,7 +70,7 @@ class Finding:
     advice: Message | None = None  # problem of the files as a whole, and the remedy
 
     @property
-    def can_be_mended(self) -> bool:
+    def can_be_corrected(self) -> bool:
         """Whether it gives the correct coordinates."""
         is_measured = self.what is MatchFinding.SHIFTED and self.is_sure
         return self.what is MatchFinding.EXCHANGED or is_measured

@@ -137,7 +137,7 @@ class LedFileControl(QObject):
     def _on_opened(self, opened: OpenedPen) -> None:
         if opened.file is not None and self._pens.doubt_about(opened.file):
             use = partial(self._use, opened.file)
-            self._panel.ask(partial(self._doubting, opened.file), use)
+            self._panel.ask(partial(self._doubt_question, opened.file), use)
         elif opened.file is not None:
             self._use(opened.file)
         elif opened.draft is not None:  # those in use stay in use
@@ -156,7 +156,7 @@ class LedFileControl(QObject):
         self._pens.keep(file)
         self._set_problem(str)
 
-    def _doubting(self, file: PenFile) -> tuple[str, str]:
+    def _doubt_question(self, file: PenFile) -> tuple[str, str]:
         words = self.tr("{0} Use it for this pen from now on?")
         text = words.format(self._pens.doubt_about(file))
         return text, self.tr("Use this file")

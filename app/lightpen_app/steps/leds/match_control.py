@@ -156,7 +156,7 @@ class MatchControl(QObject):
     def _on_draft_changed(self) -> None:
         check = self._leds.state.check
         self._panel.set_has_frame(check.frame is None or not check.frame.error)
-        self._panel.set_can_mend(check.sought is check.pen)
+        self._panel.set_can_correct(check.sought is check.pen)
         self._region()
 
     def _region(self) -> None:

@@ -33,7 +33,7 @@ from lightpen_app.work.live_images import DisplayedImage
 class FixableMessage(Translated, QWidget):
     """Shows a remark; hidden while there is none."""
 
-    mend_requested = Signal(object)  # Finding to correct: the button was pressed
+    correction_requested = Signal(object)  # Finding to correct: the button was pressed
 
     def __init__(self) -> None:
         super().__init__()
@@ -41,13 +41,13 @@ class FixableMessage(Translated, QWidget):
 
         # Widgets
         self._remark = SignLabel()
-        self._mend = PushButton()
+        self._correct = PushButton()
 
         # Layout
-        vertical_layout(self, self._remark, self._mend)
+        vertical_layout(self, self._remark, self._correct)
 
         # Connections
-        self._mend.clicked.connect(self._on_mend_clicked)
+        self._correct.clicked.connect(self._on_correct_clicked)
 
         self.hide()
         self._retranslate()
@@ -61,23 +61,23 @@ class FixableMessage(Translated, QWidget):
         self._remark.set_value(remark)
         self.setVisible(bool(remark.text))
 
-    def set_mendable(self, finding: Finding | None) -> None:
+    def set_correctable(self, finding: Finding | None) -> None:
         """Offer a correction, or none."""
         self._finding = finding
-        self._mend.setVisible(finding is not None)
+        self._correct.setVisible(finding is not None)
         if finding is not None:
-            self._mend.setText(self._verb(finding))
+            self._correct.setText(self._verb(finding))
 
     def _verb(self, finding: Finding) -> str:
         if finding.what is MatchFinding.EXCHANGED:
             return self.tr("Swap {0} and {1}").format(*finding.leds)
         return self.tr("Use measured position")
 
-    def _on_mend_clicked(self) -> None:
-        self.mend_requested.emit(self._finding)
+    def _on_correct_clicked(self) -> None:
+        self.correction_requested.emit(self._finding)
 
     def _retranslate(self) -> None:
-        self.set_mendable(self._finding)
+        self.set_correctable(self._finding)
 
 
 N_SMOOTHED = 20  # images that are reported together: one second
@@ -88,7 +88,7 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 class MatchPanel(Translated, QGroupBox):
     """Shows images with numbered LEDs and the match of each."""
 
-    mend_requested = Signal(object)  # Finding to correct in the table
+    correction_requested = Signal(object)  # Finding to correct in the table
 
     def __init__(self, foot: QWidget) -> None:
         super().__init__()
@@ -98,7 +98,7 @@ class MatchPanel(Translated, QGroupBox):
         self._counts: deque[int] = deque(maxlen=N_SMOOTHED)
         self._why_none = ""
         self._has_frame = True
-        self._can_mend = True
+        self._can_correct = True
         self._is_aside = False
 
         # Widgets
@@ -111,7 +111,7 @@ class MatchPanel(Translated, QGroupBox):
 
         # Connections
         for remark in self._messages:
-            remark.mend_requested.connect(self.mend_requested)
+            remark.correction_requested.connect(self.correction_requested)
 
         self._retranslate()
 
@@ -147,10 +147,10 @@ class MatchPanel(Translated, QGroupBox):
             self._has_frame = has_frame
             self._refresh()
 
-    def set_can_mend(self, can_mend: bool) -> None:
+    def set_can_correct(self, can_correct: bool) -> None:
         """Set whether the table is in the frame of the findings."""
-        if can_mend != self._can_mend:
-            self._can_mend = can_mend
+        if can_correct != self._can_correct:
+            self._can_correct = can_correct
             self._refresh()
 
     def set_aside(self, is_aside: bool) -> None:
@@ -201,10 +201,10 @@ class MatchPanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         found = self._found()
-        mendable = self._mendable()
+        correctable = self._correctable()
         for i, remark in enumerate(self._messages):
             remark.set_value(found[i] if i < len(found) else StatusMessage())
-            remark.set_mendable(mendable[i] if i < len(mendable) else None)
+            remark.set_correctable(correctable[i] if i < len(correctable) else None)
         self._refresh_state()
 
     def _refresh_state(self) -> None:
@@ -271,12 +271,12 @@ class MatchPanel(Translated, QGroupBox):
             remarks = [StatusMessage.good(text)]
         return remarks
 
-    def _mendable(self) -> list[Finding | None]:
+    def _correctable(self) -> list[Finding | None]:
         """Return the findings that a click can correct, in their places."""
-        if self._match is None or self._why_none or not self._can_mend:
+        if self._match is None or self._why_none or not self._can_correct:
             return []
         return [
-            each if each.can_be_mended else None
+            each if each.can_be_corrected else None
             for each in self._match.findings[:N_FINDINGS]
         ]
 

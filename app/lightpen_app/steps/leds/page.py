@@ -3,7 +3,7 @@
 from PySide6.QtCore import QSize
 from typing_extensions import override
 
-from lightpen.pen_check.draft import PenDraft, exchanged, mended
+from lightpen.pen_check.draft import PenDraft, corrected, exchanged
 from lightpen.pen_check.match import Finding, PenMatch
 from lightpen.swing.image_sources import SourceKind
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
@@ -50,8 +50,8 @@ class LedsPage(ResponsiveLayout, Page):
         self._file = LedFilePanel()
         self._table = LedTablePanel(UndoButtons(self._leds.edits, self))
         self._space = FramePanel()
-        self._hand = LedSimulatorControls(workbench.live)
-        self._match = MatchPanel(self._hand)
+        self._simulator = LedSimulatorControls(workbench.live)
+        self._match = MatchPanel(self._simulator)
 
         self._pens = workbench.pens
         self._files = LedFileControl(
@@ -83,7 +83,7 @@ class LedsPage(ResponsiveLayout, Page):
         self._table.led_chosen.connect(self._space.view.set_chosen)
         self._space.led_chosen.connect(self._table.set_chosen)
         self._space.move_requested.connect(self._on_move_requested)
-        self._match.mend_requested.connect(self._on_mend_requested)
+        self._match.correction_requested.connect(self._on_correction_requested)
         self._matching.watch.value_changed.connect(self._on_match_changed)
         self._leds.changed.connect(self._on_draft_changed)
         self._pens.changed.connect(self.changed)
@@ -125,7 +125,7 @@ class LedsPage(ResponsiveLayout, Page):
     @override
     def run_main_action(self) -> None:
         if self.is_doubtful():
-            self._file.ask(self._doubting, self.advance_requested.emit)
+            self._file.ask(self._doubt_question, self.advance_requested.emit)
         else:
             super().run_main_action()
 
@@ -136,7 +136,7 @@ class LedsPage(ResponsiveLayout, Page):
     @override
     def left(self) -> None:
         self._matching.stop()
-        self._hand.rest()
+        self._simulator.rest()
 
     @override
     def unsaved(self) -> str:
@@ -207,11 +207,11 @@ class LedsPage(ResponsiveLayout, Page):
         self._table.focus_cells()
         self._leds.edit(exchanged(self._leds.state.draft, pair))
 
-    def _on_mend_requested(self, finding: Finding) -> None:
+    def _on_correction_requested(self, finding: Finding) -> None:
         self._table.focus_cells()
-        self._leds.edit(mended(self._leds.state.draft, finding))
+        self._leds.edit(corrected(self._leds.state.draft, finding))
 
-    def _doubting(self) -> tuple[str, str]:
+    def _doubt_question(self) -> tuple[str, str]:
         """Return the question whether to swing with LEDs that do not fit.
 
         The match says what does not fit.

@@ -372,7 +372,7 @@ def test_a_pen_of_another_layout_keeps_its_frame(seen: "Seen", tmp_path: Path) -
 # The pen frame
 
 
-def test_exchanged_leds_of_a_file_are_named_and_can_be_mended(
+def test_exchanged_leds_of_a_file_are_named_and_can_be_corrected(
     seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
@@ -392,8 +392,8 @@ def test_exchanged_leds_of_a_file_are_named_and_can_be_mended(
     assert "exchanged" not in seen.words
     assert not seen.shows("Swap 5 and 8")
     assert why_not(seen) == "Save the LED table first; the record needs its file."
-    save_as(seen, tmp_path / "mended.csv")
-    assert in_use(workbench).path == tmp_path / "mended.csv"
+    save_as(seen, tmp_path / "corrected.csv")
+    assert in_use(workbench).path == tmp_path / "corrected.csv"
     assert why_not(seen) == ""
 
 

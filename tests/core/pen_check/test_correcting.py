@@ -1,4 +1,4 @@
-"""Drafts of a pen, mended by a finding."""
+"""Drafts of a pen, corrected by a finding."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ import pytest
 from lightpen.pen_check.draft import (
     PenDraft,
     check_draft,
+    corrected,
     exchanged,
     leds_to_exchange,
-    mended,
 )
 from lightpen.pen_check.match import Finding, MatchFinding
 from lightpen.simulator.swings import paper_pen
@@ -36,18 +36,22 @@ def test_of_two_coordinates_that_is_exchanged_which_the_frame_needs(
 ) -> None:
     wrong = exchanged(DRAFT, (5, 9), wrong_axis)
 
-    assert mended(wrong, Finding(MatchFinding.EXCHANGED, (5, 9), axes="x/y")) == DRAFT
+    assert (
+        corrected(wrong, Finding(MatchFinding.EXCHANGED, (5, 9), axes="x/y")) == DRAFT
+    )
 
 
 def test_several_coordinates_are_exchanged_together() -> None:
     wrong = exchanged(DRAFT, (2, 8), "yz")
 
-    assert mended(wrong, Finding(MatchFinding.EXCHANGED, (2, 8), axes="y, z")) == DRAFT
+    assert (
+        corrected(wrong, Finding(MatchFinding.EXCHANGED, (2, 8), axes="y, z")) == DRAFT
+    )
 
 
 def test_an_led_off_its_place_is_put_where_it_was_measured() -> None:
     by = (0.8, 0.0, -0.1234567)
-    result = mended(DRAFT, Finding(MatchFinding.SHIFTED, (6,), by))
+    result = corrected(DRAFT, Finding(MatchFinding.SHIFTED, (6,), by))
 
     moved = result.pen().leds - paper_pen().leds
     np.testing.assert_allclose(moved[5], by, atol=5e-4)  # written to the micrometre
@@ -60,4 +64,4 @@ def test_what_the_images_do_not_tell_is_left_to_the_user() -> None:
     either = Finding(MatchFinding.SHIFTED_EITHER, (6, 7), (0.8, 0.0, 0.0))
 
     for finding in (unsure, either, Finding(MatchFinding.UNSEEN, (6,))):
-        assert not finding.can_be_mended
+        assert not finding.can_be_corrected
