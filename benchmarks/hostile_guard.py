@@ -34,7 +34,7 @@ from benchmarks.rows import Row
 
 from lightpen.archive.chains.chains import entries_of, heads
 from lightpen.archive.checks.check import check_archive
-from lightpen.archive.events.station_events import account_of_station
+from lightpen.archive.events.station_events import event_of_station
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
 from lightpen.archive.replication.exchange import export_entries, import_entries
 from lightpen.archive.store.database import look_into, open_file
@@ -160,7 +160,7 @@ def damage(guarded: Guarded, n_mutations: int, seed: int = SEED) -> Counter[str]
                     found = read_supervision(guarded.data)
                     is_right = found.signers().station.public == key
                 elif file == guarded.verification:
-                    event = account_of_station(results, file).event
+                    event = event_of_station(results, file).event
                     is_right = event.reason == ACCEPTED["reason"]
                 else:
                     found = read_supervision(guarded.data)

@@ -54,7 +54,7 @@ class ExtractedEvent:
     takes_back: str = ""  # file that is revoked, as `FileHash.place`
 
 
-def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
+def event_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a result file or of a revocation."""
     content = read_bytes(file, WHAT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
@@ -76,7 +76,7 @@ def account_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
     return ExtractedEvent(event, file_text(content), results.place_of(revoked))
 
 
-def account_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
+def event_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a change of the tip library."""
     content, change = read_bytes(file, WHAT, LARGEST_RECORD), read_change(file)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
@@ -108,14 +108,14 @@ def file_text(content: bytes) -> str:
     return content.decode("utf-8", "surrogateescape")
 
 
-def account_of_abandoned(
+def event_of_abandoned(
     results: FolderArchive, record: Record, at: datetime
 ) -> ExtractedEvent:
     """Return the event of a swing that was abandoned."""
     return ExtractedEvent(_event_of_swing(results, record, Kind.ABANDONED, at))
 
 
-def account_of_unreadable(
+def event_of_unreadable(
     results: FolderArchive, folder: Path, at: datetime, why: Message
 ) -> ExtractedEvent:
     """Return the event of a discarded swing that cannot be read."""
@@ -130,7 +130,7 @@ def account_of_unreadable(
     return ExtractedEvent(event)
 
 
-def account_of_refused(
+def event_of_refused(
     results: FolderArchive,
     solution: Solution,
     assessment: SwingAssessment,

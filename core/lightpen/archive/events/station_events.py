@@ -48,7 +48,7 @@ def is_station_file(file: Path) -> bool:
     return file.parent.name in FOLDERS
 
 
-def account_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
+def event_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a limits, verification or camera file."""
     content = read_bytes(file, WHAT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())

@@ -31,14 +31,14 @@ from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.events.event_extraction import (
     ExtractedEvent,
-    account_of_abandoned,
-    account_of_change,
-    account_of_refused,
-    account_of_result,
-    account_of_unreadable,
+    event_of_abandoned,
+    event_of_change,
+    event_of_refused,
+    event_of_result,
+    event_of_unreadable,
 )
 from lightpen.archive.events.station_events import (
-    account_of_station,
+    event_of_station,
     is_station_file,
     station_files,
 )
@@ -131,7 +131,7 @@ class Logbook:
             for n_done, path in enumerate(owed):
                 report(n_done / len(owed))
                 try:
-                    self._enter(self._account_of(path))
+                    self._enter(self._event_of(path))
                 except FileError as error:
                     faults.append(error.message)
         return tuple(faults)
@@ -141,7 +141,7 @@ class Logbook:
     ) -> None:
         """Enter that the tip of an abandoned swing was not accepted."""
         with self._lock:
-            self._enter(account_of_refused(self._results, solution, assessment, at))
+            self._enter(event_of_refused(self._results, solution, assessment, at))
 
     def enter_note(self, about: StoredEntry, text: str, operator: str) -> None:
         """Enter a comment on an entry."""
@@ -264,26 +264,26 @@ class Logbook:
     def _is_entered(self, path: Path) -> bool:
         return self._results.place_of(path) in self._entered
 
-    def _account_of(self, path: Path) -> ExtractedEvent:
+    def _event_of(self, path: Path) -> ExtractedEvent:
         if path.parent.name == LIBRARY:
-            return account_of_change(self._results, path)
+            return event_of_change(self._results, path)
         if is_station_file(path):
-            return account_of_station(self._results, path)
+            return event_of_station(self._results, path)
         if path.parent.name != RECORDS:
-            return account_of_result(self._results, path)
+            return event_of_result(self._results, path)
         at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)
         try:
             record = open_record(path)
         except FileError as error:
-            return account_of_unreadable(self._results, path, at, error.message)
-        return account_of_abandoned(self._results, record, at)
+            return event_of_unreadable(self._results, path, at, error.message)
+        return event_of_abandoned(self._results, record, at)
 
-    def _enter(self, account: ExtractedEvent) -> None:
-        event = account.event
-        if account.takes_back:
-            back = entry_of_result(self.database, self.chain, account.takes_back)
+    def _enter(self, extracted: ExtractedEvent) -> None:
+        event = extracted.event
+        if extracted.takes_back:
+            back = entry_of_result(self.database, self.chain, extracted.takes_back)
             event = event if back is None else _taking_back(event, back)
-        append(self.database, self.chain, event, account.record)
+        append(self.database, self.chain, event, extracted.record)
         _logger.info("entered: %s", event.kind)
         if self._replicator is not None:
             self._replicator.wake()

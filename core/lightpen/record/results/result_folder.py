@@ -136,7 +136,7 @@ class FolderArchive:
         self, pen: str, tip: str, *, is_simulated: bool = False
     ) -> Path | None:
         """Return the file of what `in_force` returns."""
-        for file, heading in self._standing(self._root(is_simulated)):
+        for file, heading in self._unrevoked(self._root(is_simulated)):
             if heading.pen in (pen, None) and heading.tip in (tip, None):
                 return file
         return None
@@ -149,7 +149,7 @@ class FolderArchive:
         root = self._root(is_simulated)
         found = [
             heading.tip
-            for _, heading in self._standing(root, passes_over_damage=True)
+            for _, heading in self._unrevoked(root, passes_over_damage=True)
             if heading.pen == pen
         ]
         return tuple(filter(None, dict.fromkeys(found)))
@@ -159,7 +159,7 @@ class FolderArchive:
         root = self._root(is_simulated)
         return tuple(
             file
-            for file, heading in self._standing(root, passes_over_damage=True)
+            for file, heading in self._unrevoked(root, passes_over_damage=True)
             if heading.pen == pen
         )
 
@@ -182,7 +182,7 @@ class FolderArchive:
         Results that cannot be read or that were revoked are passed over.
         """
         for root in self._roots():
-            for file, heading in self._standing(root, passes_over_damage=True):
+            for file, heading in self._unrevoked(root, passes_over_damage=True):
                 place = heading.record
                 with suppress(FileError):
                     if place is not None and self._data / place == folder.absolute():
@@ -209,7 +209,7 @@ class FolderArchive:
     def file_of(self, result: Result) -> Path:
         """Return the file of a result that is not revoked."""
         place, root = self.place_of(result.record), self._root(result.is_simulated)
-        for file, heading in self._standing(root, passes_over_damage=True):
+        for file, heading in self._unrevoked(root, passes_over_damage=True):
             if heading.record == place and _is_same(self.read(file), result):
                 return file
         names = result.names
@@ -222,7 +222,7 @@ class FolderArchive:
         """Return the folder of the results."""
         return self._root(True), self.folder
 
-    def _standing(
+    def _unrevoked(
         self, root: Path, *, passes_over_damage: bool = False
     ) -> Iterator[tuple[Path, ResultHeading]]:
         """Yield the results that are not revoked, the newest first."""
