@@ -65,12 +65,14 @@ def running_log(level: int, *, is_verbose: bool = False) -> Iterator[None]:
 
     If verbose, the lines also go to standard error.
     """
-    if _intake() is not None:
+    if _queue_handler() is not None:
         yield
         return
     _recent.clear()
-    intake = _Intake([logging.StreamHandler(sys.stderr)] if is_verbose else [])
-    logging.getLogger().addHandler(intake)
+    handler = _LogQueueHandler(
+        [logging.StreamHandler(sys.stderr)] if is_verbose else []
+    )
+    logging.getLogger().addHandler(handler)
     for name in OUR_LOGGERS:
         logging.getLogger(name).setLevel(level)
     try:
@@ -84,11 +86,11 @@ def running_log(level: int, *, is_verbose: bool = False) -> Iterator[None]:
 
 def end_log() -> None:
     """Write the lines that wait, in a limited time, and log no more."""
-    intake = _intake()
-    if intake is None:
+    handler = _queue_handler()
+    if handler is None:
         return
-    intake.writer.stop()
-    logging.getLogger().removeHandler(intake)
+    handler.writer.stop()
+    logging.getLogger().removeHandler(handler)
     for name in OUR_LOGGERS:
         logging.getLogger(name).setLevel(logging.NOTSET)
 
@@ -99,9 +101,9 @@ def write_log_to(data: Path) -> None:
     A missing folder is created. A folder that cannot be written is only reported in the
     last line in memory.
     """
-    intake = _intake()
-    if intake is not None:
-        intake.writer.handlers += (_LogFile(log_file(data)),)
+    handler = _queue_handler()
+    if handler is not None:
+        handler.writer.handlers += (_LogFile(log_file(data)),)
 
 
 def recent_lines() -> tuple[str, ...]:
@@ -109,12 +111,12 @@ def recent_lines() -> tuple[str, ...]:
     return tuple(_recent)
 
 
-def _intake() -> "_Intake | None":
+def _queue_handler() -> "_LogQueueHandler | None":
     handlers = logging.getLogger().handlers
-    return next((each for each in handlers if isinstance(each, _Intake)), None)
+    return next((each for each in handlers if isinstance(each, _LogQueueHandler)), None)
 
 
-class _Intake(QueueHandler):
+class _LogQueueHandler(QueueHandler):
     """Formats each record, keeps the last ones and queues them for the writer."""
 
     def __init__(self, handlers: list[logging.Handler]) -> None:
@@ -180,13 +182,13 @@ class _LogFile(RotatingFileHandler):
     @override
     def shouldRollover(self, record: logging.LogRecord) -> bool:
         if self.stream is not None and self._was_renamed(self.stream):
-            self._let_go()
+            self._release()
         return bool(super().shouldRollover(record))
 
     @override
     def doRollover(self) -> None:
         """Begin a new file, or keep this one if another process has it open."""
-        self._let_go()
+        self._release()
         path = Path(self.baseFilename)
         with suppress(OSError):
             # First, as it may fail: the old files then stay where they are.
@@ -212,7 +214,7 @@ class _LogFile(RotatingFileHandler):
             return True
         return not os.path.samestat(newest, os.fstat(stream.fileno()))
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         if self.stream is not None:
             self.stream.close()
             self.stream = None

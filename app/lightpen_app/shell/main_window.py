@@ -128,7 +128,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._options.about_chosen.connect(self._on_about_chosen)
         self._stream_dialog.value_changed.connect(self._options.set_stream)
         self.operator_view.closed.connect(self._on_operator_view_closed)
-        self.operator_view.advance_requested.connect(self._on_advance_wanted_afar)
+        self.operator_view.advance_requested.connect(self._on_remote_advance)
         self.operator_view.pause_requested.connect(self._on_pause_pressed)
         self._notice.value_changed.connect(self.operator_view.set_notice)
         notifications.raised.connect(self._notice.show_text)
@@ -500,7 +500,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         else:
             self._action_bar.press_main()
 
-    def _on_advance_wanted_afar(self) -> None:
+    def _on_remote_advance(self) -> None:
         """Advance for an operator away from the screen, without questions."""
         page = self.page()
         if page.is_hands_free() and page.is_complete():

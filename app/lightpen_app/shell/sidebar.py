@@ -69,7 +69,7 @@ class Sidebar(Translated, QFrame):
         self._name = text_label(TextSize.LEAD)
         self._subject = text_label(TextSize.SMALL, Tone.QUIET)
         self._origin = SignLabel()
-        self._standing = SignLabel()
+        self._status = SignLabel()
         self._stream = SignLabel()
         self._streamed = StreamStatus()
         self._steps = StepList()
@@ -82,7 +82,7 @@ class Sidebar(Translated, QFrame):
         self._layout = layout = vertical_layout(self)
         self._head = vertical_layout(layout, self._name, self._subject)
         self._head.setSpacing(GRID // 2)
-        fill(self._head, self._standing, self._origin, self._stream)
+        fill(self._head, self._status, self._origin, self._stream)
         content = QWidget()
         vertical_layout(content, self._steps, 1)
         self._scroll = PageScroll()
@@ -115,9 +115,9 @@ class Sidebar(Translated, QFrame):
         """Return the item as text, one line for each name."""
         return self._subject.text()
 
-    def standing(self) -> StatusMessage:
+    def subject_status(self) -> StatusMessage:
         """Return the item that must not be used for measuring."""
-        return self._standing.value()
+        return self._status.value()
 
     def set_subject(self, subject: Subject) -> None:
         """Show the item and the origin of its images."""
@@ -155,12 +155,12 @@ class Sidebar(Translated, QFrame):
         parts = [words.format(shortened(name)) for words, name in named if name]
         self._subject.setText("\n".join(parts))
         self._subject.setVisible(bool(parts))
-        standing = subject_message(names, self._value.origin, self._value.statuses)
-        self._standing.set_value(standing)
+        status = subject_message(names, self._value.origin, self._value.statuses)
+        self._status.set_value(status)
         origin = origin_message(self._value.origin)
         self._origin.set_value(origin)
-        line = filter(None, (*parts, standing.text, origin.text))
-        self.subject_changed.emit(PARTED.join(line), bool(standing.text))
+        line = filter(None, (*parts, status.text, origin.text))
+        self.subject_changed.emit(PARTED.join(line), bool(status.text))
 
     def set_room(self, room: SizeClass) -> None:
         """Become narrower in a small window."""

@@ -37,16 +37,16 @@ _OF_KIND: dict[ItemKind, str] = {
 WORST_FIRST = (TipStatus.RETIRED, TipStatus.OVERDUE, TipStatus.UNCALIBRATED)
 
 
-def status_text(standing: TipStatus) -> str:
+def status_text(status: TipStatus) -> str:
     """Return the name of a status."""
-    return QCoreApplication.translate(CONTEXT, _WORDS[standing])
+    return QCoreApplication.translate(CONTEXT, _WORDS[status])
 
 
-def status_message(standing: TipStatus | None) -> StatusMessage:
+def status_message(status: TipStatus | None) -> StatusMessage:
     """Return a remark on a status; None if unknown."""
-    if standing is None:
+    if status is None:
         return StatusMessage()
-    return StatusMessage(status_text(standing), *_MARKS[standing])
+    return StatusMessage(status_text(status), *_MARKS[status])
 
 
 def message_icon(remark: StatusMessage, widget: QWidget) -> QIcon:

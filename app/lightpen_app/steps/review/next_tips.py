@@ -89,10 +89,8 @@ class NextTipsRow(Translated, QWidget):
         """Return why a tip needs attention: overdue, or not calibrated."""
         if each.last is not None and each.last.is_simulated:
             return StatusMessage()
-        standing = self._statuses.of_tip(each.pen, each.tip)
-        return (
-            StatusMessage() if standing is TipStatus.VALID else status_message(standing)
-        )
+        status = self._statuses.of_tip(each.pen, each.tip)
+        return StatusMessage() if status is TipStatus.VALID else status_message(status)
 
 
 class NextTipsControl(QObject):

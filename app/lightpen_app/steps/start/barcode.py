@@ -32,12 +32,12 @@ class BarcodeListener(QObject):
         self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
 
         # Connections
-        self._patience.timeout.connect(self._let_go)
+        self._patience.timeout.connect(self._release)
 
     def listen(self, window: QWindow | None) -> None:
         """Listen to the keys of another window, or of none."""
         if self._window is not None:
-            self._let_go()
+            self._release()
             self._window.removeEventFilter(self)
         self._window = window
         if window is not None:
@@ -45,12 +45,12 @@ class BarcodeListener(QObject):
 
     def takes(self, event: QEvent) -> bool:
         """Accept a key of a barcode before it is taken for a shortcut."""
-        if not (isinstance(event, QKeyEvent) and self.is_amid(event)):
+        if not (isinstance(event, QKeyEvent) and self.is_continuation(event)):
             return False
         event.accept()
         return True
 
-    def is_amid(self, event: QKeyEvent) -> bool:
+    def is_continuation(self, event: QKeyEvent) -> bool:
         """Return whether a key continues the held-back ones."""
         pressed = event.timestamp()
         return bool(self._held) and pressed - self._last_ms <= PACE_MS
@@ -61,12 +61,12 @@ class BarcodeListener(QObject):
             return False
         if event.type() != QEvent.Type.KeyPress or event.key() in SHIFTS:
             return False
-        if self._held and not self.is_amid(event):
-            self._let_go()
+        if self._held and not self.is_continuation(event):
+            self._release()
         if event.key() in ENTER_KEYS:
             return self._ends_with(event)
         if not _is_of_barcode(event) or (event.text() == " " and not self._held):
-            self._let_go()
+            self._release()
             return False
         self._held.append(event.clone())
         self._last_ms = event.timestamp()
@@ -77,14 +77,14 @@ class BarcodeListener(QObject):
         """Report the barcode ended by Enter, or pass the keys on."""
         code = "".join(each.text() for each in self._held)
         if len(code) < SHORTEST:
-            self._let_go()
+            self._release()
             return False
         self._patience.stop()
         self._held.clear()
         self.scanned.emit(code.strip())
         return True
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         """Pass the held-back keys on."""
         self._patience.stop()
         held, self._held = self._held, []

@@ -131,11 +131,11 @@ class LibraryControl(QObject):
         found, statuses = [], self._watch.statuses
         is_simulated = self._selection.preparation.origin is Origin.SIMULATED
         for item in self._watch.library.items(kind).values():
-            standing = statuses.of_item(kind, item.id)
+            status = statuses.of_item(kind, item.id)
             if kind is ItemKind.TIP and not is_simulated:
-                standing = statuses.of_tip(pen, item.id) or standing
+                status = statuses.of_tip(pen, item.id) or status
             if not item.is_retired:
-                found.append(ItemChoice(item.id, status_message(standing)))
+                found.append(ItemChoice(item.id, status_message(status)))
         return tuple(found)
 
     def take_code(self, code: str) -> None:

@@ -221,16 +221,16 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._refresh()
 
     def _row(self, item: AnyItem) -> list[QStandardItem]:
-        standing, due = self._statuses.of_item(item.kind, item.id), item.due
+        status, due = self._statuses.of_item(item.kind, item.id), item.due
         ball, change, pens = "", "", ""
         if isinstance(item, ListedTip):
             ball = "" if item.ball_diameter_mm is None else f"{item.ball_diameter_mm:g}"
             change = "" if item.max_change_mm is None else f"{item.max_change_mm:g}"
             pens = PARTED.join(self._statuses.pens_of(item.id))
-            if self._pen and standing is not TipStatus.RETIRED:
-                standing = self._statuses.of_tip(self._pen, item.id)
+            if self._pen and status is not TipStatus.RETIRED:
+                status = self._statuses.of_tip(self._pen, item.id)
                 due = self._statuses.due(self._pen, item.id) or due
-        remark = status_message(standing)
+        remark = status_message(status)
         texts = (
             item.id,
             remark.text,

@@ -68,7 +68,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._age = text_label(TextSize.TITLE)
         self._age.setWordWrap(False)
         self._grade = SignLabel(wraps=False)
-        self._standing = SignLabel(wraps=False)
+        self._status = SignLabel(wraps=False)
         self._when = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = QWidget()
         self._heads = [_cell(TextSize.SMALL, Tone.QUIET) for _ in range(3)]
@@ -88,7 +88,7 @@ class LastResultPanel(Translated, QGroupBox):
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
         middle = Qt.AlignmentFlag.AlignVCenter
-        marks = ((each, 0, middle) for each in (self._grade, self._standing))
+        marks = ((each, 0, middle) for each in (self._grade, self._status))
         horizontal_layout(layout, self._age, *marks, 1, spacing=2 * GRID)
         fill(layout, self._when, self._table, self._origin, self._reason)
         fill(layout, self._warning)
@@ -139,7 +139,7 @@ class LastResultPanel(Translated, QGroupBox):
     def set_status(self, status: TipStatus | None) -> None:
         """Mark a tip that must not be used for measuring; None if unknown."""
         self._marked = None if status is TipStatus.VALID else status
-        self._standing.set_value(status_message(self._marked))
+        self._status.set_value(status_message(self._marked))
 
     def set_why_unverified(self, why_not: str) -> None:
         """Say why the tip cannot be verified now, or let it."""
@@ -148,7 +148,7 @@ class LastResultPanel(Translated, QGroupBox):
 
     def words(self) -> tuple[str, ...]:
         """Return the texts, line by line."""
-        marks = [each.value().text for each in (self._grade, self._standing)]
+        marks = [each.value().text for each in (self._grade, self._status)]
         lines = [self._age.text(), *marks, self._when.text()]
         if self._value.result is not None:
             lines += [
@@ -168,7 +168,7 @@ class LastResultPanel(Translated, QGroupBox):
             if value.is_simulated
             else self.tr("Last calibration of this pen and tip")
         )
-        self._standing.set_value(status_message(self._marked))
+        self._status.set_value(status_message(self._marked))
         self._verify.setText(self.tr("Verify tip"))
         self._take_back.setText(self.tr("Revoke acceptance..."))
         self._take_back.setToolTip(

@@ -244,10 +244,10 @@ def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
     subject = desk.subject()
     sidebar.set_subject(replace(subject, names=replace(subject.names, cone="C-1")))
     assert cone
-    assert sidebar.standing().text == (
+    assert sidebar.subject_status().text == (
         "Tip NOT CALIBRATED  \N{MIDDLE DOT}  Cone OVERDUE"
     )
-    assert sidebar.standing().text in reported[-1][0]
+    assert sidebar.subject_status().text in reported[-1][0]
     assert reported[-1][1]
 
 
@@ -258,7 +258,7 @@ def test_a_simulated_tip_is_not_marked(desk: Desk) -> None:
     sidebar = Sidebar()
     desk.qtbot.addWidget(sidebar)
     sidebar.set_subject(desk.subject())
-    assert sidebar.standing().text == ""
+    assert sidebar.subject_status().text == ""
 
 
 def test_a_retired_tip_is_no_choice_and_typed_it_leads_no_further(desk: Desk) -> None:
