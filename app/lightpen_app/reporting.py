@@ -31,7 +31,7 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     if is_verification(read_bytes(result, A_FILE, LARGEST_RECORD)):
         return _write_verification(result, out, language)
     found = read_calibration_file(result)
-    with _speaking(language):
+    with _application_in(language):
         content = found.calibration_file, found.reestimated, found.entered
         pdf = pdf_of(paper_of(*content, _laboratory()))
     return _written(pdf, paper_stem(found.calibration_file), out)
@@ -45,7 +45,7 @@ def _write_verification(file: Path, out: Path | None, language: str) -> Path:
     )
 
     found = read_kept_verification(file)
-    with _speaking(language):
+    with _application_in(language):
         pdf = pdf_of(verification_paper(*found, _laboratory()))
     return _written(pdf, verification_stem(file, found.done), out)
 
@@ -56,7 +56,7 @@ def _laboratory() -> Laboratory | None:
 
 
 @contextmanager
-def _speaking(language: str) -> Iterator[None]:
+def _application_in(language: str) -> Iterator[None]:
     """Have an application, without a display if need be, in a language."""
     if not has_display():
         os.environ["QT_QPA_PLATFORM"] = "offscreen"

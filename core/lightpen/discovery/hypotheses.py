@@ -94,7 +94,7 @@ def solve_seed(
     a file. Raises `CalibrationError` if no part is long enough, or shape and mirror
     image fit alike.
     """
-    seed = _somewhere_solved(pieces, size, known)
+    seed = _solved_in_part(pieces, size, known)
     fits = seed.start.sigma <= FITTING
     if fits and seed.margin >= DECIDED:
         return seed
@@ -106,7 +106,7 @@ def solve_seed(
     raise CalibrationError("discover.no-fit", misfit=seed.start.sigma)
 
 
-def _somewhere_solved(
+def _solved_in_part(
     pieces: Pieces, size: tuple[int, int], known: Camera | None
 ) -> Seed:
     """Return the best of all hypotheses for a swing, or else for either half.

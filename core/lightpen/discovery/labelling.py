@@ -141,11 +141,11 @@ class _Search:
         """
         R, lengths = self._fitted(self.rotations[images], pixels)
         others, lengths_then = self._fitted(self._near_and_far_exchanged(R), pixels)
-        gate = AT_LED * self.width
-        is_better = _loss(lengths_then, gate) < _loss(lengths, gate)
+        threshold = AT_LED * self.width
+        is_better = _loss(lengths_then, threshold) < _loss(lengths, threshold)
         self.rotations[images] = np.where(is_better[:, None, None], others, R)
         lengths = np.where(is_better[:, None], lengths_then, lengths)
-        inside = np.nan_to_num(lengths, nan=np.inf) < gate
+        inside = np.nan_to_num(lengths, nan=np.inf) < threshold
         n_seen = np.isfinite(lengths).sum(axis=1)
         n_inside = inside.sum(axis=1)
         least = min(MIN_TURN_LEDS, self.state.pen.n_leds)
@@ -286,9 +286,9 @@ class _Search:
     def _settles(self, i: int, spots: FloatArray) -> bool:
         """Fit the rotation of an image to all its spots, closer and closer."""
         image = np.array([i])
-        for gate in (0.06, 0.03, 0.01, AT_LED, SURE):
+        for threshold in (0.06, 0.03, 0.01, AT_LED, SURE):
             there = self.predicted(self.rotations[image])[0]
-            match = assign(there, spots, gate * self.width)
+            match = assign(there, spots, threshold * self.width)
             found = match >= 0
             if found.sum() < MIN_FOUND:
                 return False
@@ -308,9 +308,9 @@ class _Search:
         return labels
 
 
-def _loss(lengths: FloatArray, gate: float) -> FloatArray:
-    """Return the sum of squared residuals (M, L), px, (M,); each at most the gate."""
-    return np.asarray(np.sum(np.fmin(lengths, gate) ** 2, axis=1))
+def _loss(lengths: FloatArray, threshold: float) -> FloatArray:
+    """Return the sum of squared residuals (M, L), px, (M,); each is bounded."""
+    return np.asarray(np.sum(np.fmin(lengths, threshold) ** 2, axis=1))
 
 
 def pixels_of(labels: IntArray, spots: Sequence[FloatArray]) -> FloatArray:

@@ -222,16 +222,16 @@ def _matched(
     return there, match, is_certain
 
 
-def assign(predicted: FloatArray, spots: FloatArray, gate: float) -> IntArray:
+def assign(predicted: FloatArray, spots: FloatArray, threshold: float) -> IntArray:
     """Return the spot of each prediction (T, 2) among spots (S, 2); -1 without one.
 
-    The sum of distances is least; none exceeds the gate, px.
+    The sum of distances is least; none exceeds the threshold, px.
     """
     if not len(predicted) or not len(spots):
         return np.full(len(predicted), -1)
     cost = np.linalg.norm(predicted[:, None] - spots, axis=2)
-    match = assigned_columns(np.minimum(cost, gate))
-    match[cost[np.arange(len(cost)), match] >= gate] = -1
+    match = assigned_columns(np.minimum(cost, threshold))
+    match[cost[np.arange(len(cost)), match] >= threshold] = -1
     return match
 
 

@@ -166,7 +166,7 @@ def _serve(
 ) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it and ends this
     with suppress(OSError):  # a program with a window may have no console
-        _hush_decoders()
+        _silence_decoders()
     keep_freed_memory()
     with suppress(OSError):  # a video that is sound needs none
         limit_memory(MAX_DECODER_MEMORY)
@@ -180,7 +180,7 @@ def _serve(
         return
 
 
-def _hush_decoders() -> None:
+def _silence_decoders() -> None:
     """Silence the messages of FFmpeg on the console."""
     sys.stderr = os.fdopen(os.dup(STDERR), "w")
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -138,7 +138,7 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
         own = _own(design, _reduced(design, best.components), best)
         fitted = _moved(views, fitted, best.x, own)
         nearest = sorted(found, key=lambda share: abs(np.log(share / likeliest)))[:3]
-        found = {share: _anew(views, fitted, found[share]) for share in nearest}
+        found = {share: _relinearised(views, fitted, found[share]) for share in nearest}
         design = found[likeliest][0][0]
     noise = best.components.noise
     nothing = replace(best.components, lenses=(LEAST * noise,) * n_cameras)
@@ -164,7 +164,7 @@ def _moved(
     )
 
 
-def _anew(
+def _relinearised(
     views: Views, moved: BoardFit, found: list[tuple[Design, _Solution]]
 ) -> list[tuple[Design, _Solution]]:
     """Return solutions by the same components, linearised at another fit."""

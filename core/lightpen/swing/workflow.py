@@ -173,9 +173,9 @@ class SwingWorkflow:
     def leave(self) -> None:
         """Begin no swing, and pause the capture."""
         self._presence = self._presence.left()
-        self._hold_back()
+        self._pause_unattended()
 
-    def _hold_back(self) -> None:
+    def _pause_unattended(self) -> None:
         """Pause a swing without an operator."""
         status = self._status
         goes_on = status.is_capturing and not status.is_paused_by_user
@@ -226,7 +226,7 @@ class SwingWorkflow:
                 origin=recorded_origin(record),
             )
         )
-        self._hold_back()
+        self._pause_unattended()
         if not swing.setup.is_recording and has_enough(swing.setup, swing.state):
             self.finish()  # it was interrupted after its last image
 

@@ -23,8 +23,8 @@ from lightpen_app.steps.history.texts import (
     item_text,
     kind_text,
     setting_text,
+    type_and_state_text,
     verdict_text,
-    what_text,
 )
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.reason_bar import ReasonBar
@@ -193,7 +193,7 @@ class EntryPanel(Translated, QWidget):
         kept = self.tr("Entry {0}, {1}, SHA-256 {2}").format(
             entry.number, event.program, line.entry.sha256[:SHORT]
         )
-        what = PARTED.join(filter(None, (what_text(line), when)))
+        what = PARTED.join(filter(None, (type_and_state_text(line), when)))
         return what, self._who_of(event), _why_of(event), self._notes_text(), kept
 
     def _who_of(self, event: Event) -> str:

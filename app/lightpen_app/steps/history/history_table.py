@@ -20,9 +20,9 @@ from lightpen_app.steps.history.reader import BLOCK
 from lightpen_app.steps.history.texts import (
     line_tone,
     rare_words,
+    type_and_state_text,
     usual_words,
     verdict_text,
-    what_text,
 )
 from lightpen_app.widgets.row_table import (
     RIGHT,
@@ -292,7 +292,7 @@ class HistoryTable(Translated, RowTable):
 
 def _text(line: Line, column: int) -> str:
     if column == WHAT:
-        return what_text(line)
+        return type_and_state_text(line)
     if line.entry is None:
         return ""
     event = line.entry.entry.event

@@ -86,7 +86,7 @@ def kind_text(kind: Kind, grade: str = "") -> str:
     return _translated(_KINDS[kind])
 
 
-def what_text(line: Line) -> str:
+def type_and_state_text(line: Line) -> str:
     """Return the kind of an entry and its later state."""
     if line.entry is None:
         return _translated(_CHANGED)

@@ -44,7 +44,7 @@ class LeaningDial(PostureDial):
         super().__init__()
         self._is_interactive = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._wish: Posture | None = None  # what the user wanted last
+        self._target: Posture | None = None  # what the user wanted last
         self._turns_at: float | None = None  # where a drag that turns began, px
 
     def set_interactive(self, interactive: bool) -> None:
@@ -54,9 +54,9 @@ class LeaningDial(PostureDial):
         self._is_interactive = interactive
         self._retranslate()
 
-    def forget_wish(self) -> None:
+    def forget_target(self) -> None:
         """Begin at the detected posture."""
-        self._wish = None
+        self._target = None
 
     @override
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -133,10 +133,10 @@ class LeaningDial(PostureDial):
         )
 
     def _held(self) -> Posture:
-        return self._wish or self.value().posture or UPRIGHT
+        return self._target or self.value().posture or UPRIGHT
 
     def _want(self, posture: Posture) -> None:
-        self._wish = posture
+        self._target = posture
         self.leaned.emit(posture)
 
     def _lean_to(self, place: QPointF) -> None:

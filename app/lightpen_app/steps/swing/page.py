@@ -55,17 +55,17 @@ class SwingPage(Page):
         self._verification, self._runner = workbench.verification, self._run.runner
         self._presenter = SwingPresenter(self._run, self._live, self)
         self._shown = self._presenter.page_state(is_away=True)
-        self._is_entered = False
+        self._is_shown = False
 
         # Widgets
-        self._face = SwingView(self)
-        self._hand = SwingSimulatorControls(self._live, self)
+        self._view = SwingView(self)
+        self._simulator = SwingSimulatorControls(self._live, self)
         self._question = QuestionBar()
         self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
         self._plotting = QTimer(self, interval=PLOTTING_MS)
 
         # Layout
-        vertical_layout(self, self._question, (self._face, 1), self._hand)
+        vertical_layout(self, self._question, (self._view, 1), self._simulator)
 
         # Connections
         self._run.changed.connect(self._on_run_changed)
@@ -75,11 +75,11 @@ class SwingPage(Page):
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
         self._live.other_changed.connect(self._on_connection_changed)
-        self._face.side.clicked.connect(self._on_act_clicked)
-        self._face.start_over.clicked.connect(self._on_start_over_clicked)
-        self._face.swapped.clicked.connect(self._on_swapped_clicked)
-        self._face.dial.leaned.connect(self._hand.lean)
-        self._hand.led_by_itself.connect(self._face.dial.forget_wish)
+        self._view.side.clicked.connect(self._on_act_clicked)
+        self._view.start_over.clicked.connect(self._on_start_over_clicked)
+        self._view.swapped.clicked.connect(self._on_swapped_clicked)
+        self._view.dial.leaned.connect(self._simulator.lean)
+        self._simulator.led_by_itself.connect(self._view.dial.forget_target)
         self._showing.timeout.connect(self._show)
         self._plotting.timeout.connect(self._plot)
 
@@ -119,11 +119,11 @@ class SwingPage(Page):
 
     @override
     def first_control(self) -> QWidget:
-        return self._face.dial  # no button: Space pauses, Enter continues
+        return self._view.dial  # no button: Space pauses, Enter continues
 
     @override
     def entered(self) -> None:
-        self._is_entered = True
+        self._is_shown = True
         is_recording = self._selection.preparation.source.kind == SourceKind.RECORDED
         if is_recording and self._run.status.state is None:
             self._camera.open()  # it begins with its first image
@@ -136,7 +136,7 @@ class SwingPage(Page):
     def left(self) -> None:
         self._plotting.stop()
         self._question.hide()
-        self._is_entered = False
+        self._is_shown = False
         self._runner.ask(lambda workflow: workflow.leave())
         self._show()
 
@@ -158,7 +158,7 @@ class SwingPage(Page):
 
     def _ask_about_choices(self) -> None:
         """Ask whether to continue a swing although the selection has changed."""
-        if self._is_entered and self._run.status.has_other_choices:
+        if self._is_shown and self._run.status.has_other_choices:
             self._runner.ask(lambda workflow: workflow.keep_choices())
             self._question.ask_about(other_choices_question, self._start_anew)
 
@@ -168,14 +168,14 @@ class SwingPage(Page):
 
     def _show(self) -> None:
         before = self._shown
-        self._shown = now = self._presenter.page_state(is_away=not self._is_entered)
-        self._face.set_state(now)
+        self._shown = now = self._presenter.page_state(is_away=not self._is_shown)
+        self._view.set_state(now)
         is_other = now.side is not before.side and {now.side, before.side} != PAUSES
-        if is_other and self._face.side.hasFocus():
-            self._face.dial.setFocus()  # Enter would do what the button did not say
+        if is_other and self._view.side.hasFocus():
+            self._view.dial.setFocus()  # Enter would do what the button did not say
         if not self._verification.status.is_here:
             self.operator_value_changed.emit(now.operator_value)
-        self._face.dial.set_interactive(self._live.operator is not None)
+        self._view.dial.set_interactive(self._live.operator is not None)
         if now.has_fault and not before.has_fault:
             self._sounds.play(Sound.LOST)
         if now.is_capturing is not before.is_capturing:
@@ -187,12 +187,12 @@ class SwingPage(Page):
     def _plot(self) -> None:
         state, setup = self._run.status.state, self._run.status.setup
         if state is not None and setup is not None:
-            self._face.plots().show_next(state, setup.limits.max_uncertainty)
+            self._view.plots().show_next(state, setup.limits.max_uncertainty)
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:
         self._presenter.sight.take(shown)
         if self.isVisible():
-            self._face.set_image(shown)
+            self._view.set_image(shown)
         self._show_soon()
 
     def _on_happened(self, event: SwingEvent) -> None:
@@ -235,11 +235,11 @@ class SwingPage(Page):
 
     def _on_swapped_clicked(self) -> None:
         self._runner.ask(lambda workflow: workflow.forget_side())
-        self._face.dial.setFocus()  # the button is no longer there
+        self._view.dial.setFocus()  # the button is no longer there
 
     def _start_anew(self) -> None:
         if why_not := self._missing_input():
             self._notices.notify(self.key, why_not)
             return
         self._runner.ask(lambda workflow: workflow.start_over())
-        self._face.dial.setFocus()  # Enter would restart
+        self._view.dial.setFocus()  # Enter would restart

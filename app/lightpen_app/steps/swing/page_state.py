@@ -62,7 +62,7 @@ class SwingPageState:
     operator_value: OperatorValue
     note: str  # images that are not counted
     warning: StatusMessage
-    stand: DisplayedPosture | None  # posture of the drawn pen
+    pen_posture: DisplayedPosture | None  # posture of the drawn pen
     is_verdict: bool
     is_capturing: bool
     has_fault: bool
@@ -169,7 +169,7 @@ class SwingPresenter(QObject):
             operator_value=shown,
             note="" if view is None else words.note(view),
             warning=StatusMessage() if view is None else words.warning(view),
-            stand=None if view is None else words.stand(view),
+            pen_posture=None if view is None else words.pen_posture(view),
             is_verdict=is_verdict,
             is_capturing=status.is_capturing,
             has_fault=status.has_fault,

@@ -127,7 +127,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         """Show a snapshot of a swing."""
         self.set_value(state.value, state.note, is_verdict=state.is_verdict)
         self._warning.set_value(state.warning)
-        self._pen.set_value(state.stand)
+        self._pen.set_value(state.pen_posture)
         self.side.setText(side_text(state.side))
         self.side.set_why_not(state.why_not_side)
         self.swapped.setVisible(state.knows_side)

@@ -142,7 +142,7 @@ class SwingWords(QObject):
             return StatusMessage()
         return StatusMessage.warning(worded(why))
 
-    def stand(self, moment: SwingViewState) -> DisplayedPosture | None:
+    def pen_posture(self, moment: SwingViewState) -> DisplayedPosture | None:
         """Return the view of the pen in space; None if its tip is unknown."""
         pen, seat = moment.setup.pen, moment.state.kept.seat or moment.state.seat
         tip = pen.nominal_tip if seat is None else seat.tip_pen

@@ -74,7 +74,7 @@ class ProbingPage(ResponsiveLayout, Page):
         for panel in self._panels.values():
             self._pages.add(panel)
         self._image = ImageView()
-        self._hand = ProbingSimulatorControls(self._live, presenter.tasks)
+        self._simulator = ProbingSimulatorControls(self._live, presenter.tasks)
         self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
 
         # Layout
@@ -84,7 +84,7 @@ class ProbingPage(ResponsiveLayout, Page):
         self._scrolled = vertical_layout(scrolled, (self._pages, 1))
         scroll.setWidget(scrolled)
         self._body = horizontal_layout(layout, (scroll, 3), spacing=2 * GRID, stretch=1)
-        fill(layout, self._hand)
+        fill(layout, self._simulator)
         self._use_room()
 
         # Connections
@@ -151,7 +151,7 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def left(self) -> None:
         self._progress.hide_question()
-        self._hand.stop()
+        self._simulator.stop()
         self._runner.ask(lambda workflow: workflow.leave())
 
     @override

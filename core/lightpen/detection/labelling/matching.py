@@ -127,8 +127,8 @@ def settle(sight: SpotArrays, pen: Constellation, candidates: Candidates) -> Can
         there = _step(sight, pen, candidates, weights)
         candidates = match(sight, pen, there.image, there.R, there.t, tolerance)
     settled = _drop_misshapen(sight, pen, candidates)
-    settled = fit(sight, pen, _drop(settled, _out_of_gate(settled)))
-    stray = _out_of_gate(settled)
+    settled = fit(sight, pen, _drop(settled, _beyond_threshold(settled)))
+    stray = _beyond_threshold(settled)
     if stray.any():
         settled = fit(sight, pen, _drop(settled, stray))
     return _drop_worst(sight, pen, settled)
@@ -274,7 +274,7 @@ def _drop_misshapen(
     return replace(dropped, area_ratio=1 + broadening)
 
 
-def _out_of_gate(candidates: Candidates) -> BoolArray:
+def _beyond_threshold(candidates: Candidates) -> BoolArray:
     """Return which pairs lie farther apart than the noise of the image allows, (C, L).
 
     The noise is the median residual of the image. The threshold is low because a stray

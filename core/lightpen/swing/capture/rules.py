@@ -284,7 +284,7 @@ def _capturing(
     if not detection.has_pose:
         return Transition(state)
     if not in_place(state, state.recent[-1:]).all():
-        return _astray(setup, state, detection)
+        return _out_of_cone(setup, state, detection)
     state = replace(state, strayed_since=None, stray_rotations=np.zeros((0, 3, 3)))
     state = guided(setup, oriented(setup, state, detection), detection)
     taken = take_image(setup, replace(state, message=_asking(state)), detection)
@@ -294,7 +294,7 @@ def _capturing(
     return taken
 
 
-def _astray(
+def _out_of_cone(
     setup: SwingSetup, state: SwingState, detection: PenDetection
 ) -> Transition:
     """Note that the tip is out of the cone; never keep such an image."""

@@ -132,7 +132,7 @@ class CheckpointFile:
         write_whole(self._path, with_checksum(text.encode()))
         self._written = value
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Release the lock."""
         descriptor, self._descriptor = self._descriptor, None
         self._written = None
@@ -144,7 +144,7 @@ class CheckpointFile:
         with suppress(OSError):
             self._path.unlink(missing_ok=True)
             sync_folder(self._path.parent)
-        self.let_go()
+        self.release()
         with suppress(OSError):
             self._path.with_suffix(LOCK).unlink(missing_ok=True)
 

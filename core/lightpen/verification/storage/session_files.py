@@ -231,7 +231,7 @@ class SessionKeeping:
         try:
             self.images.take_over(under_way.runs, self.root(before.tip) / TOUCHES)
         except BaseException:
-            file.let_go()
+            file.release()
             raise
         self._file, self._read = file, under_way.read
         self._files = list(before.files)

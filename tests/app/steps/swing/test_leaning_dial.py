@@ -161,7 +161,7 @@ def test_the_keys_begin_where_the_pen_is_after_somebody_else_led_it(
     QTest.keyClick(dial, Key.Key_Right)
     assert leaned[-1].tilt < math.radians(10)
 
-    dial.forget_wish()
+    dial.forget_target()
     QTest.keyClick(dial, Key.Key_Right)
 
     assert leaned[-1].tilt > math.radians(20)

@@ -157,13 +157,13 @@ def test_spots_that_do_not_match_the_pen_point_to_its_file_before_the_swing(
 
 
 def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
-    value = words.stand(at_verdict())
+    value = words.pen_posture(at_verdict())
 
     assert value is not None
     assert value.target is not None
     np.testing.assert_array_equal(value.tip_pen, paper_pen().nominal_tip)
     nobody = replace(SETUP, pen=replace(SETUP.pen, nominal_tip=None))
-    assert words.stand(replace(at_verdict(), setup=nobody)) is None
+    assert words.pen_posture(replace(at_verdict(), setup=nobody)) is None
 
 
 def displayed(*estimates: tuple[int, int]) -> list[RemainingImages]:
