@@ -14,6 +14,9 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.observations import Observations
+from lightpen.detection.pose import MIN_POSE_LEDS
+from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.discovery.found import Discovery, discovery_of
 from lightpen.discovery.hypotheses import (
     Hypothesis,
@@ -23,10 +26,10 @@ from lightpen.discovery.hypotheses import (
 from lightpen.discovery.labelling import Labelled, label, pixels_of
 from lightpen.discovery.lens_choice import pulled
 from lightpen.discovery.numbering import number_by_sketch
-from lightpen.discovery.observing import labelled_observations
 from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import (
     SECOND_PEN,
+    contradicting_distance,
     require_certain,
     require_distance,
     require_enough,
@@ -35,7 +38,13 @@ from lightpen.discovery.requirements import (
     require_one_camera,
     require_sketched,
 )
-from lightpen.discovery.scale import with_lengths_known
+from lightpen.discovery.scale import (
+    CONTRADICTING,
+    SHAPE,
+    MeasuredLength,
+    known_lengths,
+    with_lengths_known,
+)
 from lightpen.discovery.scaled_start import (
     RELATIVE,
     adjust_halves,
@@ -44,7 +53,6 @@ from lightpen.discovery.scaled_start import (
 )
 from lightpen.discovery.sightings import Report, Sightings
 from lightpen.discovery.starts import any_covariance, scaled_to
-from lightpen.discovery.touched_length import with_touched_length
 from lightpen.discovery.tracks import Pieces, find_lamps, follow, without_lamps
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
@@ -53,7 +61,11 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.distortion import Choice
+from lightpen.model.ellipse import centers_from_centroids
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import fit_rigid
+from lightpen.verification.tasks.length import LengthOptions, measure_length
+from lightpen.verification.tasks.task import Conditions
 
 NOT_SETTLED = (
     "bundle.not-settled",
@@ -134,7 +146,7 @@ def _adjusted(
     if request.second is not None:
         start, second = _with_second(start, request, report)
         lengths = lengths if request.lengths else ()
-    observations = labelled_observations(
+    observations = _labelled_observations(
         sightings, start, swing.found.images, swing.numbers
     )
     start = replace(start, pen=with_lengths_known(start.pen, lengths))
@@ -210,6 +222,33 @@ def _of_images(found: Labelled, some: BoolArray) -> Labelled:
     return replace(found, state=state, images=found.images[some])
 
 
+def with_touched_length(request: Request, relative: Discovery) -> Request:
+    """Return a request with the distance of two LEDs by the touched length.
+
+    The touches measure that length in the unit of the relative result. The ratio to the
+    certified length is the scale, and so the distance of the LEDs farthest apart.
+    Raises `CalibrationError` if the touches are not of two ends, or a known length
+    contradicts theirs.
+    """
+    touched = request.touched
+    assert touched is not None
+    instrument = relative.calibration.instrument
+    runs = [("--touched", touched.touches(instrument))]
+    (run,) = measure_length(runs, Conditions(instrument), LengthOptions()).runs
+    known, certified = relative.lengths[0], touched.separation
+    length = known.length * certified.distance / run.measured
+    own = run.uncertainty / COVERAGE_FACTOR / run.measured
+    sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
+    for each in known_lengths(request.lengths, relative.pen.leds):
+        implied = run.measured * each.length / each.between(relative.pen.leds)
+        relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
+        by_chance = np.hypot(implied * relative_sigma, certified.sigma)
+        if abs(implied - certified.distance) > CONTRADICTING * by_chance:
+            raise contradicting_distance(certified.distance, implied, each)
+    measured = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
+    return replace(request, lengths=(*request.lengths, measured))
+
+
 def _with_second(
     start: BundleState, request: Request, report: Report
 ) -> tuple[BundleState, SecondSwing]:
@@ -236,10 +275,51 @@ def _with_second(
     swing = replace(
         swing, found=replace(swing.found, spots=swing.found.spots[:, order])
     )
-    observations = labelled_observations(
+    observations = _labelled_observations(
         sightings, there, swing.found.images, swing.numbers
     )
     return start, SecondSwing(observations, separation)
+
+
+def _labelled_observations(
+    sightings: Sightings, start: BundleState, images: IntArray, spots: IntArray
+) -> Observations:
+    """Return the labelled observations; ``spots`` (N, L) are numbers in sightings."""
+    n_images, n_leds = spots.shape
+    pixels = pixels_of(spots, sightings.centers)
+    areas = np.full((n_images, n_leds), np.nan)
+    if sightings.shapes is not None and sightings.areas is not None:
+        shapes = np.full((n_images, n_leds, 2, 2), np.nan)
+        for i, j in zip(*np.nonzero(spots >= 0), strict=True):
+            shapes[i, j] = sightings.shapes[i][spots[i, j]]
+            areas[i, j] = sightings.areas[i][spots[i, j]]
+        pixels = centers_from_centroids(start.rig.cameras[0], pixels, shapes)
+    rotations = np.full((n_images, 3, 3), np.nan)
+    rotations[images] = start.rotations
+    translations = start.cone_rig - rotations @ start.tip_pen
+    widths = sightings.edge_widths
+    return Observations(
+        names=sightings.names,
+        pixels=pixels,
+        seen_pixels=pixels,
+        areas=areas,
+        sigmas=np.where(np.isfinite(pixels[..., 0]), EXACT_SIGMA, np.nan),
+        rotations=rotations,
+        translations=translations,
+        edge_widths=np.full(n_images, np.nan) if widths is None else widths,
+        lamps=np.zeros((n_images, 0, 2)),
+        reasons=tuple(
+            _reason(int((row >= 0).sum()), bool(np.isfinite(R[0, 0])))
+            for row, R in zip(spots, rotations, strict=True)
+        ),
+        details=(None,) * n_images,
+    )
+
+
+def _reason(n_seen: int, has_rotation: bool) -> Reason:
+    if not has_rotation:
+        return Reason.NOT_THE_PEN
+    return Reason.NONE if n_seen >= MIN_POSE_LEDS else Reason.TOO_FEW_LEDS
 
 
 def _calibrated(

@@ -6,11 +6,10 @@ import pytest
 from tests.simulated_stations import errors_of, leaning, random_station, seen_station
 
 from lightpen.detection.observations import observe_centers
-from lightpen.discovery.discover import discover
+from lightpen.discovery.discover import discover, with_touched_length
 from lightpen.discovery.found import Discovery
 from lightpen.discovery.numbering import number_by_sketch
 from lightpen.discovery.request import TouchedLength
-from lightpen.discovery.touched_length import with_touched_length
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.uncertainty.instrument import Instrument
