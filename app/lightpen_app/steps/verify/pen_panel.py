@@ -5,11 +5,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QProgressBar, QWidget
 from typing_extensions import override
 
+from lightpen.arrays import FloatArray
 from lightpen.formats.opened_files import PenFile
 from lightpen.verification.history.pen_health import PenHealth
 from lightpen.verification.history.pen_over_time import (
@@ -25,12 +27,11 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import MICROMETRES, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import moment_text, shortened
-from lightpen_app.steps.verify.pen_plot import LedMovesPlot
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.plots import Axes
+from lightpen_app.widgets.plots import Axes, Plot
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -40,6 +41,7 @@ from lightpen_app.work.workbench import Workbench
 LATEST = 8  # swings, which the table has room for
 PROGRESS_STEPS = 1000
 PLOT_HEIGHT = 20 * GRID
+DOT = 6  # px
 PPM = 1e6
 
 
@@ -64,7 +66,7 @@ class PenPanel(Translated, QWidget):
         self._verdict = SignLabel()
         self._left_out = text_label(TextSize.SMALL, Tone.QUIET)
         self._left_out.setWordWrap(True)
-        self._plot = LedMovesPlot()
+        self._plot = _LedMovesPlot()
         self._plot.setMinimumHeight(PLOT_HEIGHT)
         self._head = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = NumberTable()
@@ -302,3 +304,46 @@ class PenPanel(Translated, QWidget):
             size = "" if growth is None else number_text(PPM * growth.relative, 0)
             cells.append((*moves, size))
         return Figures(heads, tuple(names), tuple(cells))
+
+
+class _LedMovesPlot(Plot):
+    """Displacement of each LED over the swings; a displaced one stands out."""
+
+    def __init__(self) -> None:
+        self._lines: list[pg.PlotDataItem] = []
+        self._moved: tuple[int, ...] = ()
+        super().__init__(Axes(""))
+
+    def set_data(self, moves: FloatArray, moved: tuple[int, ...]) -> None:
+        """Show the shifts of LEDs (N, L) at each swing, mm, NaN where not seen.
+
+        ``moved`` are the numbers of those that moved against the others, from 1.
+        """
+        n_swings, n_leds = moves.shape
+        while len(self._lines) < n_leds:
+            line = pg.PlotDataItem(symbol="o", symbolSize=DOT, connect="finite")
+            self._lines.append(line)
+            self._item.addItem(line)
+        x = np.arange(1.0, n_swings + 1)
+        for j, line in enumerate(self._lines):
+            line.setVisible(j < n_leds)
+            if j < n_leds:
+                line.setData(x, moves[:, j])
+        self._moved = moved
+        self._columns = {"swing": x}
+        for j in range(n_leds):
+            self._columns[f"led_{j + 1}_mm"] = moves[:, j]
+        self._fit_numbered(n_swings, np.append(moves.ravel(), (0.0, 0.01)))
+        self._restyle()
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        colors = colors_of(self.palette())
+        for number, line in enumerate(self._lines, start=1):
+            has_moved = number in self._moved
+            color = colors.tone(Tone.BAD) if has_moved else colors.muted
+            line.setPen(pg.mkPen(color, width=1))
+            line.setSymbolBrush(pg.mkBrush(color))
+            line.setSymbolPen(None)
+            line.setZValue(1 if has_moved else 0)
