@@ -13,8 +13,8 @@ TICK_MS = 100
 class EndSignals(QObject):
     """Hears these signals, as a context.
 
-    Python runs the handler of a signal between its own instructions, of which there are
-    none while Qt waits: a timer sees to some.
+    Python runs signal handlers between its own instructions; as there are none while Qt
+    waits, a timer provides some.
     """
 
     # The number of the first signal, emitted from the event loop, so that nothing is

@@ -75,7 +75,7 @@ _logger = logging.getLogger(__name__)
 def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None) -> int:
     """Run the command line and return the exit status.
 
-    The arguments are those of the process by default. Without a desktop a command must
+    By default the arguments of the process are parsed. Without a desktop a command must
     be given.
     """
     given = sys.argv[1:] if arguments is None else arguments

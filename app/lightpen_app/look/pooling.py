@@ -8,8 +8,8 @@ from lightpen.arrays import Image
 def pooled(image: Image, bits: int = 8) -> Image:
     """Return an 8-bit image of half the size, each pixel the brightest of four.
 
-    A small LED stays as bright as it was, which averaging would not leave it. Of an
-    image with more than 8 bits in use the upper 8 are taken.
+    Unlike averaging, this keeps the brightness of small LEDs. Images with more than 8
+    used bits are reduced to the upper 8.
     """
     height, width = (size // 2 * 2 for size in image.shape)
     rows = np.maximum(image[0:height:2], image[1:height:2])

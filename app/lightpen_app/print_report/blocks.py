@@ -1,7 +1,7 @@
 """Blocks of a page: headings, paragraphs, tables and figures.
 
-A piece stands whole on one page. Lengths are in dots, of which a point has ten, so that
-words are measured as they are printed.
+A block stands whole on one page. Lengths are in dots, ten to a point, so that text is
+measured as printed.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,7 @@
 """The report of a verification, a repeatability study or a drift.
 
-The figures are those of the JSON record, under the names that they have there, so that
-a task that is added needs nothing here.
+The figures are taken from the JSON record, with its names, so that a new task needs no
+code here.
 """
 
 import json

@@ -57,7 +57,7 @@ OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "keyring.backends.Win
 def test_program(file: Path) -> int:
     """Test the installation, write a report, and return the exit status.
 
-    The report is written whatever happens, beside it a picture of the wizard.
+    The report is written in any case, with a picture of the wizard beside it.
     """
     report = Report(file)
     try:

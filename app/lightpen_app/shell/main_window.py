@@ -473,7 +473,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:
         """Let the page set the focus after the focused widget was removed.
 
-        Qt gives it to whatever comes next, such as a button that Enter then presses.
+        Otherwise Qt focuses the next widget, such as a button that Enter then presses.
         """
         if not isinstance(now, QAbstractButton) or now.window() is not self:
             return

@@ -14,8 +14,8 @@ from lightpen_app.widgets.translated import Translated
 class NoticeBar(Translated, QFrame):
     """Bar for a message, hidden without one; Close hides it.
 
-    While nothing can be kept in the data folder, whatever is reported of it says where
-    another one is chosen, and is reported once.
+    While the data folder cannot be written, a message on it says where to choose
+    another one, and appears once.
     """
 
     value_changed = Signal(str)  # its text; empty if it shows none

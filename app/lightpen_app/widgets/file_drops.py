@@ -9,7 +9,8 @@ from typing_extensions import override
 class FileDrops(QObject):
     """Accepts one local file or folder dropped on a widget.
 
-    It becomes the parent, and its children accept drops, too.
+    The widget becomes its parent; a drop on one of the widget's children counts as
+    well.
     """
 
     dropped = Signal(str)  # the path

@@ -7,7 +7,8 @@ from PySide6.QtWidgets import QWidget
 def give_focus(widget: QWidget) -> None:
     """Focus a widget and make it visible.
 
-    Qt gives it to those on hidden pages, too, and takes it from who is typing.
+    Qt itself would also focus widgets on hidden pages, and take the focus from a field
+    in use.
     """
     if widget.isVisible():
         widget.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -11,7 +11,7 @@ from lightpen_app.look.theme import Tone, set_tone
 class AskingBar(QFrame):
     """A bar for a question, hidden without one; it returns the focus.
 
-    Else it would go to whatever comes next, such as a button that Enter then presses.
+    Otherwise Qt would focus the next widget, such as a button that Enter then presses.
     """
 
     asking_changed = Signal()  # it asks, or no longer

@@ -21,8 +21,8 @@ from lightpen_app.work.stations import FilePaths
 class ChosenFiles(QObject):
     """Reads the files of a station, those beside images, and samples.
 
-    One reading at a time; of the one before nothing is reported any more. ``samples``
-    is the folder for the files of the simulated camera.
+    One reading at a time; an earlier one reports nothing any more. ``samples`` is the
+    folder for the files of the simulated camera.
     """
 
     def __init__(

@@ -47,9 +47,9 @@ CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
 class LiveView(QObject):
     """Opens one or two cameras and signals their images.
 
-    Of two, one is `chosen`: queries, signals and settings are of it, except `failed`
-    and `configured`, which are of both. Images go to the active verification, else to
-    the swing; the live stream gets those of the first camera.
+    Of two, one is `chosen`: queries, signals and settings refer to it, except `failed`
+    and `configured`, which refer to both. Images go to the active verification, else to
+    the swing; the live stream gets the images of the first camera.
     """
 
     # Shown: the newest image; those that the GUI had no time for are skipped

@@ -23,7 +23,7 @@ from lightpen_app.work.selection import Selection
 class PenFiles(QObject):
     """Opens the file of the pen that is chosen, and stores which file a pen has.
 
-    A simulated pen has its own files, whatever its name.
+    A simulated pen has its own files, independent of its name.
     """
 
     # `doubt` may have changed.

@@ -17,7 +17,7 @@ from lightpen_app.work.job import Job, LatestJob, Report
 class Streaming(QObject):
     """Opens and closes the stream and updates its tip.
 
-    The clock is that of the cameras.
+    ``clock`` is the clock of the cameras.
     """
 
     changed = Signal()  # `status`, `has_tip` or `fault` is different

@@ -22,7 +22,7 @@ from lightpen_app.work.run_view import RunView
 class SwingRun(RunView[SwingStatus, SwingEvent]):
     """Status and events of a swing as Qt signals; commands go to its `runner`.
 
-    `progressed` reports solving; the verdict is an event, too.
+    `progressed` reports solving; the verdict is also an event.
     """
 
     # A result was accepted or revoked: another tip may be current.

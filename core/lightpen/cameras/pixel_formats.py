@@ -2,8 +2,8 @@
 
 The names are those of the GenICam Pixel Format Naming Convention (PFNC) and, for packed
 ones, also of GigE Vision 1: ``Mono12p`` and ``Mono12Packed`` order their bits in
-different ways. Bayer patterns and colours become grey, which costs sharpness: each
-pixel then stands for its neighbours, too.
+different ways. Bayer patterns and colours become grey, which costs sharpness, as each
+pixel is then interpolated from its neighbours.
 """
 
 import re

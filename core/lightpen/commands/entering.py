@@ -53,8 +53,8 @@ def keep_record(
 ) -> None:
     """Write a verification as JSON where requested, and enter it in the archive.
 
-    That is in the data folder of the tip; None of LED centres alone. The origin of the
-    images is by default that of the tip.
+    That is in the data folder of the tip; None of LED centres alone. By default the
+    origin of the images is taken from the tip.
     """
     names = NOBODY if tip is None else tip.names
     own = None if tip is None else tip.origin

@@ -225,7 +225,8 @@ def _cost(
 def _correlated(pulls: FloatArray) -> float:
     """Return the factor on variances by noise correlated between pixels (JPEG).
 
-    ``pulls`` (N, S, S) are those of the pixels at a coordinate of the centre.
+    ``pulls`` (N, S, S) are the weighted residuals of the pixels times their derivatives
+    by a coordinate of the centre.
     """
     pairs = np.vdot(pulls[:, 1:], pulls[:, :-1])
     pairs += np.vdot(pulls[:, :, 1:], pulls[:, :, :-1])

@@ -32,7 +32,7 @@ def masked_lights(
 ) -> FloatArray:
     """Return the centre of the brightest clean spot in each masked circle, (M, 2), px.
 
-    NaN in a circle without one. ``mask`` and ``full_scale`` are those of
+    NaN in a circle without one. ``mask`` and ``full_scale`` as in
     `lightpen.detection.spots.detect_spots`.
     """
     circles = np.zeros((0, 3)) if mask is None else np.asarray(mask)

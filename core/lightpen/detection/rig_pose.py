@@ -1,8 +1,8 @@
 """One pose of the pen by all cameras of a rig that see it at the same moment.
 
 All LEDs in all images make one pose ``rig_from_pen``, by maximum likelihood as in
-`lightpen.detection.pose`. What one camera hardly sees, the depth along its view, the
-others do, so that its covariance is that of all of them together.
+`lightpen.detection.pose`. One camera hardly determines the depth along its view, others
+do; the covariance of the pose combines all cameras.
 """
 
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ class RigReprojection:
 def derivatives_in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
     """Convert derivatives (..., 6) by the camera pose into those by the rig pose.
 
-    ``turn`` (3, 3) is that of cam_from_rig.
+    ``turn`` (3, 3) is the rotation of cam_from_rig.
     """
     return np.concatenate([J[..., :3] @ turn, J[..., 3:] @ turn], axis=-1)
 
@@ -59,7 +59,7 @@ def fit_rig_poses(
 ) -> Poses:
     """Fit poses rig_from_pen, each to the LEDs in all cameras.
 
-    Residuals and weights are those of the first camera, of the second, and so on.
+    Residuals and weights are ordered by camera.
 
     Parameters
     ----------

@@ -71,7 +71,8 @@ def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
 def cauchy_weights(residuals: FloatArray, sigma: float | FloatArray) -> FloatArray:
     """Return the Cauchy weights (N, L) of residuals (N, L, 2), px; 0 where not seen.
 
-    ``sigma`` is that of one image coordinate, of all images or of each (N,), px.
+    ``sigma`` is the standard deviation of one image coordinate, px, common to all
+    images or one for each, (N,).
     """
     squares = np.einsum("...i,...i->...", residuals, residuals)
     width = CAUCHY_WIDTH * np.reshape(sigma, (-1, 1))

@@ -103,9 +103,9 @@ def discover(
 ) -> Discovery:
     """Find tip, pen and camera.
 
-    The sightings are those of a swing in time order, with the tip in the cone.
-    ``report`` is called with the fraction done; what it raises stops the computation.
-    Raises `CalibrationError` if the images do not determine them.
+    ``sightings`` are of one swing with the tip in the cone, in time order. ``report``
+    is called with the fraction done; an exception from it stops the computation. Raises
+    `CalibrationError` if the images do not determine them.
     """
     swing = _labelled_swing(sightings, request, report)
     swing = replace(swing, found=numbered(swing.found, request))
@@ -331,8 +331,8 @@ def _calibrated(
 ) -> tuple[Calibration, Choice | None]:
     """Return the calibration, and the choice of the lens model.
 
-    The camera is that of the file, or has the covariance of any, with the weakest
-    regularisation that does not fold the image; none where each does.
+    The camera is read from a file, or starts with a wide covariance and the weakest
+    regularisation that does not fold the image; None if every one folds it.
     """
     pen, camera = start.pen, start.rig.cameras[0]
     if choice is None:  # the camera is known

@@ -85,8 +85,8 @@ def discovery_of(
 ) -> Discovery:
     """Return the result of a calibration with wide priors.
 
-    The choice is that of the lens model, None where the camera is known; the sketch
-    (L, 3), mm, are rough LEDs in the frame that the pen is given.
+    ``choice`` is the choice of the lens model, None for a known camera; ``sketch`` (L,
+    3), mm, are rough LEDs in the frame that the pen gets.
     """
     bundle, instrument = calibration.bundle, calibration.instrument
     state, tip = bundle.state, calibration.joint.tip_pen

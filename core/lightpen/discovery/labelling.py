@@ -55,7 +55,7 @@ def label(
 ) -> Labelled:
     """Label the spots (S, 2), px, of all images from a part that is solved.
 
-    The certain pieces are labelled as a whole; the width is that of the images, px.
+    Certain pieces are labelled as a whole; ``width`` is the width of the images, px.
     """
     search = _Search(seed.start.state, certain, spots, width)
     search.rotations[seed.images] = seed.start.state.rotations

@@ -72,10 +72,9 @@ def framed(
 ) -> tuple[Pen, FloatArray, FloatArray]:
     """Return a numbered pen in its frame, and R, t that brought it there.
 
-    The frame is that of the sketch where there is one, and that of the paper for a pen
-    of its layout. Else LED 1 is the origin, y runs to the last LED, and z, at right
-    angles to it, is next to the normal of the discs. Tip (3,) and sketch (L, 3) are in
-    mm.
+    The frame is the sketch's if there is one, and the paper's for a pen of its layout.
+    Otherwise LED 1 is the origin, y runs to the last LED, and z, at right angles to it,
+    is next to the normal of the discs. Tip (3,) and sketch (L, 3) are in mm.
     """
     leds = pen.leds
     if sketch is not None:

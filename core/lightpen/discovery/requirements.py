@@ -101,7 +101,8 @@ def require_distance(
 ) -> None:
     """Refuse a distance of two cones that known lengths contradict.
 
-    The calibration is that of both swings without it, by the lengths alone.
+    ``without`` is the calibration by both swings without the distance, scaled by the
+    lengths alone.
     """
     bundle, second = without.bundle, without.second
     assert second is not None

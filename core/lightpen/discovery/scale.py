@@ -89,8 +89,9 @@ def nearest_pair(leds: FloatArray, length: float) -> tuple[int, int, float]:
 def with_lengths_known(pen: Pen, lengths: Sequence[KnownLength]) -> Pen:
     """Return a pen with wide priors for all but known lengths, for the adjustment.
 
-    Its LEDs have a wide covariance; along the change of a length it is that of the
-    length. The lengths are those during the swing, so the pen does not expand.
+    Its LEDs have a wide covariance, narrowed along the derivative of each length to the
+    variance of that length. The lengths hold during the swing, so the pen does not
+    expand.
     """
     size = float(np.ptp(pen.leds, axis=0).max())
     information = np.eye(pen.leds.size) / (WIDE * size) ** 2

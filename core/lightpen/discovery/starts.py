@@ -1,9 +1,9 @@
 """Initial values of the bundle adjustment from a weak-perspective shape.
 
 A start is adjusted here with a robust loss and damped steps, as the factorisation is
-off by several percent; the final adjustment is that of `lightpen.estimation`. Both use
-the same linearised equations. The tip is the origin of the pen's frame and the normal
-of the discs starts as its z axis.
+off by several percent; `lightpen.estimation` does the final adjustment. Both use the
+same linearised equations. The tip is the origin of the pen's frame and the normal of
+the discs starts as its z axis.
 """
 
 from dataclasses import dataclass, replace
@@ -151,7 +151,8 @@ def state_of(
 ) -> BundleState:
     """Return the state of a shape before a camera.
 
-    The radius is that of the discs, mm; ``unit`` are mm a unit of the shape.
+    ``radius`` is the radius of the discs, mm; ``unit`` is the size of a unit of the
+    shape, mm.
     """
     distances = camera.fx * unit / shape.scales
     middle = np.array([camera.cx, camera.cy])

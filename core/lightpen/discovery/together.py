@@ -116,10 +116,10 @@ def _report_part(report: Report, k: int, n: int, fraction: float) -> None:
 def joined(swings: Sequence[Discovery]) -> Discovery:
     """Return the joint result of swings, in the frame of the first.
 
-    What is known of camera and discs without images counts once: each swing brings the
-    information of its images, which is its own less that of these priors. What goes
-    beyond the fits, lens and mechanics, is common to all as far as all have it, and of
-    each swing alone beyond that.
+    Prior information on camera and discs counts once: each swing adds the information
+    of its images, which is its total less the prior. Uncertainty beyond the fits (lens,
+    mechanics) counts as common to all swings up to the amount that all have, and as
+    independent beyond that.
     """
     first, at = swings[0], swings[0].parameters
     if len(swings) == 1:

@@ -106,8 +106,8 @@ class Calibration:
 
     Arrays over images hold all N images of the observations; the fits hold the M images
     that entered them, in the same order. An image of which the joint fit uses no LED is
-    among these M and not among the used ones. Of a rig, the images of one moment count
-    as one, and the camera frame is that of the first camera.
+    among these M and not among the used ones. For a rig, the images of one moment count
+    as one, and the first camera defines the camera frame.
     """
 
     cameras: tuple[CameraImages, ...]

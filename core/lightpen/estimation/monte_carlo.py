@@ -1,11 +1,10 @@
 """Monte Carlo evaluation of the tip's uncertainty [1]_, as a check of the budget.
 
 The estimate is taken for the truth. Each trial draws files of camera and pen about it,
-by what the files state of themselves or what is assumed in its place, a seat and a
-drift as U counts them, mechanics of usual size, centres that are off in each posture,
-the areas of the discs, and noise in the images; then it calibrates again, as a user
-would who has no more than these files. The scatter of the tips is their uncertainty,
-whatever is not linear in between.
+with the stated or assumed uncertainties, a seat and a drift as U counts them, mechanics
+of usual size, centres that are off in each posture, the areas of the discs, and noise
+in the images; then it calibrates with these files alone. The scatter of the tips is
+their uncertainty, including all nonlinear effects.
 
 References
 ----------
@@ -181,8 +180,8 @@ def run_monte_carlo(
 ) -> MonteCarlo:
     """Run trials of a calibration in worker processes.
 
-    ``report`` is called with the fraction done, 0 to 1; what it raises ends the trials.
-    Raises `CalibrationError` if most of the trials give no tip.
+    ``report`` is called with the fraction done, 0 to 1; an exception from it ends the
+    trials. Raises `CalibrationError` if most of the trials give no tip.
     """
     if n_trials < MIN_TRIALS:
         raise ValueError(f"`n_trials` must be {MIN_TRIALS} or more, got {n_trials}.")

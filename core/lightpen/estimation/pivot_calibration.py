@@ -2,7 +2,7 @@
 
 `lightpen.estimation.pivot.pivot.fit_pivot` trusts the poses. Here they are judged
 first: by their convention, and by whether they are of one tip in one place. The
-uncertainty is that of residuals which hang together from pose to pose.
+uncertainty accounts for residuals that are correlated from pose to pose.
 """
 
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ def calibrate_pivot(
 ) -> PivotCalibration:
     """Find the tip from poses in the order of capture.
 
-    Its parameters are those of `lightpen.estimation.pivot.pivot.fit_pivot`. Raises
+    Parameters as of `lightpen.estimation.pivot.pivot.fit_pivot`. Raises
     `CalibrationError` if the poses do not fix a tip, are in another convention or unit,
     have no tip in common, or have two without a clear majority.
     """

@@ -1,7 +1,7 @@
 """Axis of a stylus from a rotation of the pen about it with the tip in the cone.
 
-While the pen turns about its stylus, the stylus points one way in the camera, whatever
-the pen does about it. So every pose i gives
+While the pen turns about its stylus, the direction of the stylus in the camera is
+constant. So every pose i gives
 
     R_i axis_pen = axis_cam
 

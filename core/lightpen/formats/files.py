@@ -131,8 +131,7 @@ def require_folder_of(path: Path) -> None:
 def create_whole(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write a new file whole or not at all; raise `NameTakenError` if it exists.
 
-    When this returns, the file is on the disk with its name, whatever happens next. The
-    mode is that of `os.open`.
+    When this returns, the file is durable under its name. ``mode`` as in `os.open`.
     """
     _require_file(path)
     sweep_parts(path.parent)

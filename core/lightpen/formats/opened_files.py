@@ -69,7 +69,7 @@ def open_files(
 ) -> OpenedFiles:
     """Read the files last in use, each independently of the others; None if not in use.
 
-    ``units`` are those of a pen file that states none.
+    ``units`` apply to a pen file that states none.
     """
     faults: list[Message] = []
 

@@ -66,11 +66,11 @@ def read_pen(
 ) -> Pen:
     """Read a pen with LEDs in the pen frame; the module describes the layouts.
 
-    The unit of lengths is one of `UNITS`, needed if the file does not state it.
-    Disc diameter, mm, and nominal tip (3,), pen frame, mm, replace those of the
-    file. Raises `FileError` unless it is a complete pen, one of the paper's layout
-    in the paper's frame, and `UsageError` if the units are neither in the file nor
-    given, or both and different.
+    The unit of lengths is one of `UNITS`, needed if the file does not state it. Disc
+    diameter, mm, and nominal tip (3,), pen frame, mm, replace the values of the file.
+    Raises `FileError` unless it is a complete pen, one of the paper's layout in the
+    paper's frame, and `UsageError` if the units are neither in the file nor given, or
+    both and different.
     """
     pen = _pen(_read(path, units), diameter, nominal_tip)
     try:

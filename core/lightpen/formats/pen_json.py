@@ -41,7 +41,7 @@ ASYMMETRY = 1e-6  # of the largest variance
 def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
     """Return the pen of a JSON document, named as displayed; refuse an incomplete one.
 
-    ``units`` are those of its lengths where it does not say; see `agreed_unit`.
+    ``units`` apply to lengths of a file that states none; see `agreed_unit`.
     """
     if not isinstance(tree, dict):
         raise FileError("pen-file.list", name=name)

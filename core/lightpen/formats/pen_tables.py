@@ -34,7 +34,7 @@ _COLUMN = (
 def from_table(table: Table, units: str | None) -> PenContent:
     """Return the pen of a table; refuse an incomplete one.
 
-    ``units`` are those of its lengths where it does not say; see `agreed_unit`.
+    ``units`` apply to lengths of a file that states none; see `agreed_unit`.
     """
     named = [_name_and_unit(column) for column in table.header]
     stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}

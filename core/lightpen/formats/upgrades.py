@@ -1,8 +1,8 @@
 """Formats of the program's files, and their upgrades.
 
 The newest format of a kind of file is one more than it has upgrades. To change a
-format, append the function that turns the entries of the format before into those of
-the new one; all that read such files then read both.
+format, append the function that converts entries of the previous format to the new one;
+all readers of such files then read both.
 """
 
 from collections.abc import Callable, Mapping

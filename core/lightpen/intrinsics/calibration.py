@@ -1,9 +1,9 @@
 """The intrinsics of a camera from views of a board, with their covariance.
 
-Residuals alone certify nothing: what another lens model gains is asked of views that it
-was not fitted to, parts of the views are compared by what their difference may be, and
-the covariance contains what board, lens and single views do beside the model. A set of
-views that no single camera can have taken is refused, by what it is instead.
+Residuals alone certify nothing: lens models are compared by cross-validation, parts of
+the views by their difference and its covariance, and the covariance contains the random
+effects of board, lens and views beside the model. Views that no single camera can have
+taken are refused, with the likely cause.
 """
 
 from collections.abc import Callable

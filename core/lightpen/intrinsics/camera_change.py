@@ -53,9 +53,9 @@ def find_alternation(mixed: MixedFit) -> CameraChange | None:
 def find_apart(mixed: MixedFit, taken: BoolArray) -> BoolArray | None:
     """Return views that differ from the others by more than one lens explains, (W,).
 
-    View by view goes to the other group as long as that increases the difference of fx
-    fy cx cy; the chance that it must not have is that of all ways of parting the views.
-    Those that were not ``taken`` (W,) for the fit stay with the first.
+    Views move to the other group one by one as long as that increases the difference of
+    fx fy cx cy; its significance accounts for all ways of splitting the views. Views
+    that were not ``taken`` (W,) for the fit stay in the first group.
     """
     at = mixed.adjustment.of_intrinsics(0)
     few = slice(at.start, at.start + 4)

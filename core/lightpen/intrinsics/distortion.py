@@ -165,8 +165,8 @@ def choose_distortion(
 ) -> tuple[Choice, BoardFit, FloatArray]:
     """Return the lens model, its fit, and the cross-validation errors.
 
-    A model other than that of 5 coefficients must be better. Without ``has_k3``, lens
-    models are a fisheye and that of 4 coefficients, k3 being 0.
+    A model with another number than 5 coefficients must be better. Without ``has_k3``,
+    the lens models are a fisheye and the one with 4 coefficients, k3 being 0.
     """
     first = _Drawn(fitted, None)
     others: list[Callable[[], _Drawn | None]]
@@ -384,7 +384,7 @@ def _richer(views: Views, tolerances: BoardTolerances, few: Camera) -> _Drawn | 
 def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> FloatArray:
     """Return the error of each view by a fit of the others, (V,), px rms.
 
-    Uneven squares err alike with every lens model, and would hide what it gains.
+    Uneven squares add the same error to every lens model and would hide its gain.
     """
     errors = np.full(views.n_views, np.nan)
     fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)

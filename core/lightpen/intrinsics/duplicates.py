@@ -1,7 +1,7 @@
 """Detection of repeated board positions, which count once.
 
 What such views share (where the points lie on the pixels, how the board hangs, blur and
-shadows) is the same in all of them, so more of them tell nothing more of the camera.
+shadows) is the same in all of them, so more of them add no information on the camera.
 """
 
 import numpy as np

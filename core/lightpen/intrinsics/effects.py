@@ -1,10 +1,10 @@
 """Normal equations of a fitted board and its random effects, view by view.
 
-The unknowns are those of the board adjustment but the poses, then the points of the
+The unknowns are those of the board adjustment without the poses, then the points of the
 board (x y z each, mm), then the nodes of each lens' residual field (u v each, px). Each
 view has its pose, the coefficients of a smooth error of its own, and for each further
-camera those of a rigid motion of the board between the exposures, which also takes what
-else a pose may (blur, shadows). The points of each camera are weighted by its noise.
+camera a rigid motion of the board between the exposures, which also absorbs other
+pose-like errors (blur, shadows). The points of each camera are weighted by its noise.
 """
 
 from dataclasses import dataclass
@@ -296,7 +296,7 @@ def _lines(board: Board) -> FloatArray:
 def smooth_functions(board: Board) -> FloatArray:
     """Return functions of second and third order over the board, (N, 7).
 
-    Orthogonal to each other and to those of lower order, of mean square 1.
+    Orthogonal to each other and to functions of lower order, of mean square 1.
     """
     x, y = board.points[:, 0], board.points[:, 1]
     u, v = x / np.abs(x).max(), y / np.abs(y).max()

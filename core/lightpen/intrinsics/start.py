@@ -43,8 +43,8 @@ class BoardPoses(NamedTuple):
 def start_camera(views: Views, n_coefficients: int) -> Camera:
     """Return a camera that the views of one camera are near to.
 
-    It has no distortion, or that of an equidistant fisheye, in which straight rows of
-    points are straighter.
+    It has no distortion, or the one of an equidistant fisheye if rows of points are
+    straighter with it.
     """
     pinhole = _start_pinhole(views, n_coefficients)
     fisheye = _start_fisheye(views)

@@ -439,7 +439,7 @@ def _field(
 
     Its values are moved from the solution.
 
-    Its covariance is that of the image: an error of the field draws the intrinsics
+    Its covariance refers to the image: an error of the field shifts the intrinsics
     along, and most of it cancels.
     """
     at, own, field = design.of_field(c), fitted.of_intrinsics(c), design.fields[c]

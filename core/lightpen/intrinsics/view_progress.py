@@ -1,6 +1,6 @@
 """Variation of board views: position, size and skew in the image.
 
-The measures and the ranges that suffice are those of the calibrator of ROS [1]_.
+Measures and required ranges are taken from the calibrator of ROS [1]_.
 
 References
 ----------

@@ -1,10 +1,10 @@
 """The live pipeline: detects spots and pen in camera images and passes them on.
 
 One thread processes the images. While nothing is captured it takes the newest and skips
-those in between; during a swing or a verification it takes all of them in order, of two
-cameras those of one moment together. Where nothing moves it takes two a second, within
-a swing or a verification only after a while; without a viewer, none. A recording that
-has been replayed to its end counts as at rest.
+those in between; during a swing or a verification it takes all of them in order,
+simultaneous ones of two cameras together. If nothing moves it takes two a second,
+within a swing or a verification only after a while; without a viewer, none. A recording
+that has been replayed to its end counts as at rest.
 """
 
 import logging

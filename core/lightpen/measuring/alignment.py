@@ -129,7 +129,7 @@ def tie(
 
     The part or the camera was moved in between. The origins of the same features before
     and after count. Both touches of each point are uncertain, and the motion carries
-    the covariance of both, from that of all inputs, (P, P).
+    the covariance of both, given the covariance of all inputs, (P, P).
     """
     n = len(then)
 

@@ -1,9 +1,9 @@
 """Most informative place of the next touch on a feature.
 
-Of places spread over the feature the one is taken that most reduces the volume of the
+Of places spread over the feature, the chosen one most reduces the volume of the
 covariance of its unknowns (D-optimal design [1]_): with the derivatives ``J`` of the
-distances of all touches and ``j`` of those of the new one,
-``det(I + j (J^T J)^-1 j^T)`` is largest.
+distances of all touches and ``j`` of the new one, ``det(I + j (J^T J)^-1 j^T)`` is
+largest.
 
 References
 ----------

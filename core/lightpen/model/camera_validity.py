@@ -16,8 +16,8 @@ def unmodelled_effects_of(
 ) -> tuple[Message, ...]:
     """Return why the intrinsics of a camera may no longer be valid.
 
-    The temperature is that at the station, degrees Celsius, the serial number that of
-    the camera in use. Nothing is said of what the file or the station leaves out.
+    Temperature, degrees Celsius, and serial number are those at the station; what the
+    file or the station does not state is not checked.
     """
     doubts = []
     if camera.serial and serial and camera.serial.casefold() != serial.casefold():

@@ -70,7 +70,7 @@ def decide(
 ) -> Decision:
     """Return the decision on a value with its U (k = 2) and limits of the true value.
 
-    ``max_risk`` is that of accepting what does not conform, and of rejecting what does.
+    ``max_risk`` is the maximum risk of a false acceptance and of a false rejection.
     """
     if rule is DecisionRule.RISK:
         p = conformity_probability(value, uncertainty, lower=lower, upper=upper)

@@ -38,7 +38,7 @@ def ellipse_centers(
 ) -> FloatArray:
     """Return the centres (..., 2), px, of the ellipses that discs are imaged as.
 
-    The centre is that of the conic in the undistorted normalised plane, distorted.
+    The centre of the conic in the undistorted normalised plane is distorted to pixels.
     Centres, mm, and unit normals of the discs (..., 3) are in the camera frame; the
     radius is in mm.
     """
@@ -50,7 +50,7 @@ def ellipse_centers_with_jacobian(
 ) -> PointMap:
     """Return the centres of the ellipses that discs are imaged as, and d px / d mm.
 
-    The derivative is that of the projected centre: the ellipse's centre lies within
+    The derivative is taken of the projected centre: the ellipse's centre lies within
     some 0.1 px of it and moves with it to a part in a thousand. For the arguments see
     `ellipse_centers`; a radius of 0 takes the projected centres.
     """

@@ -37,8 +37,8 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray:
 def with_turns(moves: FloatArray, arms: FloatArray) -> FloatArray:
     """Return derivatives (..., k, 6) by a rotation vector and a move.
 
-    ``moves`` (..., k, 3) are those of k values by the move of a point alone, ``arms``
-    (..., 3) lead from the centre of rotation to the point.
+    ``moves`` (..., k, 3) are the derivatives of k values by the move of a point alone,
+    ``arms`` (..., 3) lead from the centre of rotation to the point.
     """
     J = np.empty((*moves.shape[:-1], 6))
     x, y, z = (arms[..., None, k] for k in range(3))

@@ -202,9 +202,9 @@ def exchanged(
 def corrected(draft: PenDraft, finding: Finding) -> PenDraft:
     """Return a draft corrected by a finding of live images that `can_be_corrected`.
 
-    Coordinates that two LEDs have of each other are exchanged, and an LED off its place
-    is put where the images show it. Where either of two coordinates can be exchanged,
-    that is chosen which leaves the LEDs in the pen frame.
+    Coordinates that are swapped between two LEDs are swapped back, and a displaced LED
+    gets its measured position. If either of two coordinates can be swapped, the one is
+    chosen that keeps the LEDs in the pen frame.
     """
     if finding.what is not MatchFinding.EXCHANGED:
         return _put_in_place(draft, finding)

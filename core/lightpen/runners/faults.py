@@ -24,7 +24,7 @@ class FaultListener(Protocol):
 class FaultReporter:
     """Reports one fault at a time, and its end.
 
-    A fault that can end automatically has a cause, of whatever kinds its owner knows.
+    A fault that can end automatically has a cause, a value of a type of its owner.
     """
 
     def __init__(self, listener: FaultListener) -> None:

@@ -20,9 +20,8 @@ Report: TypeAlias = Callable[[float], None]
 class SerialQueue:
     """Runs queued functions one after the other in its own thread.
 
-    The thread outlives a bug: the act in which it happened is not completed, the crash
-    goes to `threading.excepthook`, and ``on_bug`` is done next, except after a bug in
-    itself.
+    The thread survives a bug: the failed function is not completed, the crash goes to
+    `threading.excepthook`, and ``on_bug`` is done next, except after a bug in itself.
     """
 
     def __init__(self, name: str, on_bug: Act) -> None:

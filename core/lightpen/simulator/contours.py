@@ -88,8 +88,8 @@ def ellipse_contour(
 ) -> Contours:
     """Return the contour of one ellipse in the image.
 
-    Centre (2,), semi-axes and the Gaussian blur sigma are in px; the angle is that of
-    the first semi-axis from the image's x axis, rad.
+    Centre (2,), semi-axes and the Gaussian blur sigma are in px; the angle is measured
+    from the image's x axis to the first semi-axis, rad.
     """
     angles = _node_angles(2 * np.pi * max(semi_axes), sigma)
     cosine, sine = np.cos(angle), np.sin(angle)

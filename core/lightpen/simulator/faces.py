@@ -64,7 +64,7 @@ class Dome:
     ) -> LightArray:
         """Return the brightness where lines of sight through the disc meet the dome.
 
-        Parameters are those of `HotSpot.brightness`.
+        Parameters as of `HotSpot.brightness`.
         """
         radius = (1 + self.height**2) / (2 * self.height)
         x, y, z = towards.tolist()
@@ -107,9 +107,9 @@ def face_patches(
 ) -> list[Patch]:
     """Return the images of lit LEDs, blurred and integrated by the pixels.
 
-    Rotations (S, 3, 3) and translations (S, 3), mm, of cam_from_pen are those at S
-    times during the exposure, the faces those of all LEDs. Sigma of the Gaussian blur
-    is in px, ``margin`` the number of dark pixels to add all round.
+    Rotations (S, 3, 3) and translations (S, 3), mm, are cam_from_pen at S times during
+    the exposure; ``faces`` are the faces of all LEDs. Sigma of the Gaussian blur is in
+    px, ``margin`` the number of dark pixels to add all round.
     """
     across = orthogonal(pen.normals)
     axes = np.stack([across, np.cross(pen.normals, across), pen.normals], axis=-1)

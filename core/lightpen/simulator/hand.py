@@ -98,10 +98,10 @@ class _Wish(NamedTuple):
 class Operator:
     """A simulated operator who holds a pen of ``n_leds`` LEDs.
 
-    The commands may come from any thread. They are taken up at the time that the clock
-    shows, which makes the movement a function of the seed, the commands and their
-    times. Angles are those of `lightpen.simulator.postures`. Unless seated in the cone,
-    the pen is out of the image at first.
+    The commands may come from any thread. They take effect at the present time of the
+    clock, which makes the movement a function of the seed, the commands and their
+    times. Angles as in `lightpen.simulator.postures`. Unless seated in the cone, the
+    pen is out of the image at first.
     """
 
     def __init__(

@@ -62,7 +62,7 @@ def write_scene(
 ) -> FloatArray:
     """Write a simulated set: ``camera.yaml``, ``leds.csv``, ``images``, ``truth.json``.
 
-    ``report`` is called with the fraction done; what it raises stops the writing.
+    ``report`` is called with the fraction done; an exception from it stops the writing.
     Returns the true tip (3,), mm, in the frame in which the LEDs of ``leds.csv`` fit
     the true ones best. Raises `FileError` if the folder is not empty or cannot be
     written.

@@ -131,7 +131,7 @@ class _Seen:
 class PoseStream:
     """Streams poses while it is open, timed by the clock of the camera.
 
-    ``on_change`` is called with the new status by whatever thread changes it; it must
+    ``on_change`` is called with the new status, on the thread that changes it; it must
     return at once.
     """
 

@@ -172,8 +172,8 @@ class SwingRecorder:
     ) -> Transition | None:
         """Return the transition by an image, once it is stored if accepted.
 
-        `n_images` are those of the recording that the image is of. None for an image
-        that is not of this swing.
+        ``n_images`` is the number of images of the recording, if it is one. Return None
+        for an image of another swing.
         """
         if stats is not None:
             self._counters = self._counters.after(stats)

@@ -170,7 +170,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _named_board(self, *, measured: bool = True) -> Board | None:
         """Return the board of the fields, or report why there is none.
 
-        Scaled as it was measured, if it was, unless that is not wanted.
+        Scaled by the measured length, if there is one and it is requested.
         """
         try:
             board = self.board.board()

@@ -29,7 +29,7 @@ from lightpen_app.widgets.translated import Translated
 class SourcePanel(Translated, QGroupBox):
     """The choice of a source.
 
-    Of a second camera, the files are those of the rig.
+    The files of a second camera are the rig's.
     """
 
     value_changed = Signal(object)  # SourceChoice

@@ -36,7 +36,7 @@ PAIR = 2
 class SelectionPanel(Translated, QWidget):
     """Compares two entries, and shows the scatter of all selected ones.
 
-    With fewer than two selected, the scatter is that of the whole trend.
+    With fewer than two selected, the scatter of the whole trend is shown.
     """
 
     # Improved LED and camera files from the selected swings are requested.

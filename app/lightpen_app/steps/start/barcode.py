@@ -17,7 +17,7 @@ class BarcodeListener(QObject):
     """Intercepts a barcode and its Enter in a window, wherever the focus is.
 
     Keys are held back for an imperceptible moment and forwarded unless they are a
-    barcode. Their time is that of the windowing system, so keys that waited for a busy
+    barcode. The windowing system stamps their times, so keys that waited for a busy
     program are not mistaken for a scanner's.
     """
 

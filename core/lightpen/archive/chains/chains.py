@@ -108,8 +108,7 @@ def entries_of_limits(database: Database, chain: str) -> tuple[StoredEntry, ...]
 class ArchivedFiles:
     """The paths of the result files and swings in a chain.
 
-    What was read once is kept, so that of a long chain only its new entries are:
-    they are never changed.
+    Entries never change, so only new ones are read again.
     """
 
     def __init__(self, database: Database, chain: str) -> None:

@@ -2,8 +2,8 @@
 
 An archive holds chains, one for each data folder that was ever entered in it. A chain
 grows only where its data folder is; everywhere else it is a copy of what was entered
-there. Each entry carries the hash of the one before it, so that none can be changed,
-left out or put in between without all that follow telling of it.
+there. Each entry carries the hash of the previous one, so that a changed, missing or
+inserted entry invalidates all that follow.
 """
 
 import json

@@ -65,10 +65,10 @@ def append(
 ) -> StoredEntry | None:
     """Append an entry to the own chain of a database.
 
-    When this returns, the entry is kept whatever happens next; when it raises, or is
-    killed, it is kept whole or not at all. Of two programs that enter the same result
-    file, or that the same swing was abandoned, one does; the other gets None. The event
-    contains the hash of the record, which is JSON.
+    When this returns, the entry is durable; when it raises or is killed, it is stored
+    whole or not at all. Of two programs that enter the same result file, or that the
+    same swing was abandoned, one does; the other gets None. The event contains the hash
+    of the record, which is JSON.
     """
     with database.writing() as connection:
         if _is_entered(connection, chain, event):

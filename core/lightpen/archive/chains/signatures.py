@@ -56,7 +56,7 @@ def key_in(signature: str) -> str:
 class ChainKeys:
     """The key that may sign a chain, by its earlier entries of limits in their order.
 
-    Once another key is introduced, the one before signs nothing more.
+    Once another key is introduced, the previous one may sign nothing more.
     """
 
     def __init__(self, chain: str, entries: Iterable[StoredEntry] = ()) -> None:

@@ -49,8 +49,8 @@ def check_archive(
 ) -> ArchiveCheckResult:
     """Check every entry, record and file that an archive refers to.
 
-    A data folder given is examined, too. ``report`` is called with the fraction done, 0
-    to 1; what it raises ends the check.
+    A given data folder is examined as well. ``report`` is called with the fraction
+    done, 0 to 1; what it raises ends the check.
     """
     ends, home = heads(database), chain_at_home(database)
     n_all = max(1, sum(head.number for head in ends))
@@ -128,7 +128,7 @@ def _walked(
 ) -> Iterator[Message]:
     """Check a chain from its first entry to its last, and yield the findings.
 
-    Entries that are added meanwhile are walked over, too.
+    Entries added meanwhile are checked as well.
     """
     number, previous, keys = 0, NOTHING_BEFORE, ChainKeys(head.chain)
     while True:

@@ -1,7 +1,7 @@
 """Check of accepted tips by recomputation from the LED centres in their records.
 
-Hashes and signatures show that a result is as it was entered, not that it was right
-then: who has the key of the station may enter any tip. To be believed, a forged tip
+Hashes and signatures show that a result is unchanged since its entry, not that it was
+right: the holder of the station key may enter any tip. To be believed, a forged tip
 would need forged LED centres that give it.
 """
 

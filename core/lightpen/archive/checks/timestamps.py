@@ -2,8 +2,8 @@
 
 A timestamp is of the text of the last entry, by its SHA-256, and so of all entries
 before. It proves that they existed at its time, also against whoever has the key of the
-station. The answer of the authority is stored as it is, one file for an entry, and can
-be verified by other programs, too.
+station. The response of the authority is stored unchanged, one file for each entry, so
+that other programs can verify it.
 
 References
 ----------
@@ -105,8 +105,8 @@ def with_timestamps(
 ) -> ArchiveCheckResult:
     """Verify the timestamps of a data folder; return the check with its findings.
 
-    The certificate is that of the authority, as `Authority.certificate`; None for that
-    of the computer. Without one signatures are not verified, which is a note.
+    ``certificate`` is the authority's, see `Authority.certificate`; None takes the one
+    of the machine settings. Without any, signatures are not verified, which is noted.
     """
     findings, notes, n_sound = list[Message](), list[Message](), 0
     try:

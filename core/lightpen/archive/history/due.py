@@ -48,7 +48,7 @@ def due_tips(
 ) -> tuple[DueTip, ...]:
     """Return the current tips of real pens at a station, the due ones first.
 
-    The chain is that of the data folder in which the tips are current. The station's
+    ``chain`` belongs to the data folder in which the tips are current. The station's
     rule is for tips without their own in the library; retired tips are omitted.
     """
     found = (

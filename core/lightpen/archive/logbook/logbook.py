@@ -123,7 +123,7 @@ class Logbook:
         """Enter events from files that the archive does not have yet.
 
         ``report`` is called with the fraction done; what it raises ends the work. What
-        is not entered stays owed; the messages returned say why.
+        could not be entered is tried again next time; the returned messages say why.
         """
         with self._lock:
             self._entered.read()
@@ -217,8 +217,8 @@ class Logbook:
     def share_library(self, server: Database) -> None:
         """Take over newer changes of the libraries of other stations.
 
-        Where a supervisor must sign, only tell how much waits. A library that cannot
-        be read, or is not as it was entered, is reported by all who need it.
+        Where a supervisor must sign, only tell how much waits. A library that is
+        unreadable or was changed is reported where it is used.
         """
         with suppress(FileError, AcceptanceError, UsageError):
             guard = self._results.supervision()

@@ -109,8 +109,8 @@ def take_over(
 ) -> tuple[TakenOver, ...]:
     """Take over the changes of other stations that are newer than those of this one.
 
-    The arguments are those of `newer_elsewhere`; a library with a supervisor password
-    needs the signature of a supervisor (`AcceptanceError`).
+    Arguments as of `newer_elsewhere`; a library with a supervisor password needs the
+    signature of a supervisor (`AcceptanceError`).
     """
     newer = newer_elsewhere(data, database, now, server)
     for each in newer:

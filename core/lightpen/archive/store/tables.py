@@ -1,8 +1,8 @@
 """The tables of the archive: entries and records, on SQLite and PostgreSQL alike.
 
-What the columns of an entry say stands in its text, too: they are there to be searched
-by, and `lightpen.archive.checks.check` compares them with it. How far a chain has come,
-a file says beside its entries; on a server the entries alone do, see
+The columns of an entry repeat its text: they serve the search, and
+`lightpen.archive.checks.check` compares them with it. How far a chain has come, a file
+says beside its entries; on a server the entries alone do, see
 `lightpen.archive.replication.server_setup`.
 """
 

@@ -149,7 +149,7 @@ def _spot_triples(
 def _triples_of(n: int) -> IntArray:
     """Return the index triples of n items, low numbers first.
 
-    So a triple draws the same lot whatever other images an image is labelled with.
+    So the order of a triple is independent of the other images that are labelled.
     """
     triples = sorted(combinations(range(n), 3), key=lambda triple: triple[::-1])
     return np.array(triples, dtype=np.int64).reshape(-1, 3)

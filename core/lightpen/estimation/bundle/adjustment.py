@@ -2,8 +2,8 @@
 
 Where a camera file states no uncertainty, the prior assumed in its place must allow for
 a bad file. Where the images do not show the file to be off, its values are better than
-an estimate from one swing. So the estimate is taken with the assumed prior shrunk to
-the deviation that the images show (empirical Bayes); its uncertainty is that of the
+an estimate from one swing. So the estimate uses the assumed prior shrunk to the
+deviation that the images show (empirical Bayes); its uncertainty follows from the
 unshrunk prior, and the shift of the estimate by shrinkage is a separate contribution.
 
 Likewise mechanics of usual size have their prior in the uncertainty; the estimate
@@ -217,7 +217,7 @@ def _with_led_noise(
 ) -> tuple["partial[Bundle]", Bundle]:
     """Weigh each LED by its noise, where these differ, until it settles.
 
-    ``of_centers`` (N, C, L) is that of single centres, if these differ.
+    ``of_centers`` (N, C, L) is the noise of single centres, if these differ.
     """
     known = np.ones_like(bundle.unknowns.noise) if of_centers is None else of_centers
     weights = np.ones(known.shape[1:])
@@ -234,7 +234,7 @@ def _with_led_noise(
 def with_effects(bundle: Bundle, effects: tuple[Effect, ...]) -> Bundle:
     """Return a fit with other priors of its effects, by one linear step.
 
-    The residuals stay those of the fit.
+    The residuals of the fit are kept.
     """
     unknowns = replace(bundle.unknowns, effects=effects)
     information, right = bundle.information + bundle.measured_information, bundle.right

@@ -113,7 +113,7 @@ def find_contradicted_inputs(
 
     Files are added one at a time, the most contradicted first, as it may be what moves
     the others. It is ``before``, with whose priors the bundle was fitted, if no other
-    is contradicted. ``excess`` (p, p) is that of
+    is contradicted. ``excess`` (p, p) as in
     `lightpen.estimation.bundle.noise_correlation.Correlation`.
     """
     fits = _fits(rig, bundle, priors, excess)
@@ -145,8 +145,8 @@ def contradictions_of(
 ) -> tuple[Contradiction, ...]:
     """Return the contradictions of the files of cameras and rig, the worst first.
 
-    ``excess`` is that of `find_contradicted_inputs`; the bundle is fitted with the
-    priors of ``inputs``.
+    ``excess`` as in `find_contradicted_inputs`; the bundle is fitted with the priors of
+    ``inputs``.
     """
     if not inputs.numbers:
         return ()

@@ -214,8 +214,8 @@ def gain_of(
 ) -> float:
     """Return twice the log likelihood ratio of k unknowns with a prior to none.
 
-    ``S`` and ``right`` are those of `size_of`; the prior has a covariance (k, k) and
-    means (k,).
+    ``S`` and ``right`` as in `size_of`; the prior has a covariance (k, k) and means
+    (k,).
     """
     left = right - S @ means
     spectrum = _Spectrum.of(S, left, _root_of(prior))
@@ -272,7 +272,7 @@ class ConeMoves(NamedTuple):
 def cone_moves(rotations: FloatArray, axes: FloatArray) -> ConeMoves:
     """Return the moves of the tip in images of rotations rig_from_pen (N, 3, 3).
 
-    ``axes`` (3, 3) are those of the cone, see `axes_of_cone`.
+    ``axes`` (3, 3) are the axes of the cone, see `axes_of_cone`.
     """
     along = rotations[:, :, 1]
     lean = along @ axes[:2].T
@@ -365,7 +365,7 @@ def _timing(
 ) -> list[Effect]:
     """Return the effects of delays between LEDs, cameras and rows, if the pen moves.
 
-    Images between which the pen does not move evenly on the whole tell nothing of it.
+    Images between which the pen moves unevenly do not determine them.
     """
     speed = _speeds(np.where(used[..., None], pixels, np.nan))
     if speed is None:

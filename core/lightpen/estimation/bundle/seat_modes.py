@@ -30,7 +30,7 @@ class SeatModes(NamedTuple):
 def seat_modes_of(rotations: FloatArray, shifts: FloatArray | None = None) -> SeatModes:
     """Return the modes of images with rotations rig_from_pen (N, 3, 3).
 
-    ``shifts`` are those of `drift_modes`.
+    ``shifts`` as in `drift_modes`.
     """
     lean, oval = tilt_modes(rotations), oval_seat(rotations)
     return SeatModes(lean, oval, drift_modes(len(rotations), shifts))

@@ -1,7 +1,7 @@
 """The frames of a pen with displaced LEDs.
 
-Where an LED is displaced it is ambiguous what the frame of the file is: that in which
-the other LEDs fit the file best, or that of all LEDs as they are. The tip differs.
+A displaced LED makes the frame of the file ambiguous: either the other LEDs define it
+by their best fit, or all LEDs at their actual positions do. The tip differs.
 """
 
 from typing import NamedTuple

@@ -5,8 +5,8 @@ is a random walk, of the first order or of the second, whichever is likelier; it
 is estimated beside the noise of a lamp's centre by maximum likelihood. The coefficients
 of the cosine transform are independent [1]_; each is filtered of its noise (Wiener).
 
-A lamp may move by itself, too, so the shift is removed from the images only where the
-pen shifts with it.
+A lamp itself may move, so the shift is removed from the images only if the pen shifts
+with it.
 
 References
 ----------

@@ -1,8 +1,8 @@
 """Detection of other conventions of poses: frames, order of numbers, units.
 
-Poses in another convention are rotations and translations, too, and may even fit a tip
-badly. Only the scatter shows: each usual mistake is undone in turn, and one that brings
-the poses much closer to a common tip is what happened.
+Poses in another convention are valid rotations and translations and may even fit a tip
+badly; only their scatter shows it. So each usual mistake is undone in turn; one that
+brings the poses much closer to a common tip is reported.
 
 Inverted poses are the exception. They fit as well, since ``R tip + t = pivot`` also
 reads ``R^T pivot - R^T t = tip``: tip and pivot change places. Only a tip farther from

@@ -5,8 +5,8 @@ result is shown against. The residual of image i is the distance
 
     f_i = |R_i x0 + T_i - u0|                                              (3)
 
-and the iteration (9) to (12) of [1]_ minimises the sum of its squares. The optimum is
-that of linear least squares on eq. (2), the algebraic one-step method.
+and the iteration (9) to (12) of [1]_ minimises the sum of its squares. The optimum
+equals linear least squares on eq. (2), the algebraic one-step method.
 
 References
 ----------
@@ -109,7 +109,7 @@ def propagated_covariance(
 ) -> FloatArray:
     """Return the covariance of (tip_pen, cone_cam), given that of poses, (6, 6), mm^2.
 
-    Its arguments are those of `lightpen.estimation.pivot.pivot.tip_covariances`.
+    Arguments as of `lightpen.estimation.pivot.pivot.tip_covariances`.
     """
     M = contact_matrix(rotations)
     inverse = np.linalg.inv(np.einsum("nki,nkj->ij", M, M))

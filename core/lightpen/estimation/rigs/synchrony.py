@@ -1,8 +1,8 @@
 """Check that the cameras of a rig took their images at the same moments.
 
-Two cameras that stand fast see the pen turn alike. A camera that takes its images later
-sees a moving pen turned on by the lag times its speed; one whose images are paired with
-those of other moments sees it turned anyhow.
+Two fixed cameras see the same rotation of the pen. A camera that takes its images later
+sees a moving pen rotated further by lag times speed; images that are paired with wrong
+moments show arbitrary rotations.
 """
 
 from dataclasses import dataclass

@@ -26,8 +26,8 @@ class Map(Protocol):
     ) -> list[T]:
         """Return the results of the function for all items, in order.
 
-        ``report`` is called with the fraction done; what it raises ends the
-        computation, and what was not begun is not done any more.
+        ``report`` is called with the fraction done; an exception from it ends the
+        computation, and pending items are dropped.
         """
 
 

@@ -26,10 +26,10 @@ Sizes of random effects are estimated from the images. One that is not significa
 not fitted, but budgeted by its expected variance, equation (6). U = 2 sqrt(diag C) with
 the sum C, equation (21).
 
-Residuals of successive images are correlated. The factor on the noise is that of the
-autoregression (`noise_correlation`), or that of the scatter between blocks of
-consecutive images (cluster-robust [1]_), equation (20), where that is larger and
-significant. Monte Carlo trials check the whole law (`lightpen.estimation.monte_carlo`).
+Residuals of successive images are correlated. The factor on the noise follows from the
+autoregression (`noise_correlation`), or from the scatter between blocks of consecutive
+images (cluster-robust [1]_), equation (20), if that is significantly larger. Monte
+Carlo trials check the whole law (`lightpen.estimation.monte_carlo`).
 
 References
 ----------

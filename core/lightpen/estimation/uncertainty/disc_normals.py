@@ -1,8 +1,8 @@
 """The common normal of the discs as an uncertain parameter.
 
-The centre of a disc's image lies off that of the disc by where it faces. The adjustment
-holds the normals. What a turn of all of them adds to the uncertainty is found with it
-as one more unknown of the same equations.
+The centre of a disc's image deviates from the image of its centre, depending on the
+normal. The adjustment holds the normals fixed. The uncertainty by a common rotation of
+them is found with this rotation as a further unknown of the same equations.
 """
 
 from dataclasses import replace

@@ -2,7 +2,7 @@
 
 Errors that the calibration leaves are common to every point that is measured
 afterwards, and correlated: an error of the focal length comes with one of the LEDs and
-one of the tip. So the covariance is that of all parameters together.
+one of the tip. So the covariance covers all parameters jointly.
 """
 
 from dataclasses import dataclass

@@ -48,7 +48,7 @@ class SecondImages:
     ) -> tuple[BundleState, FloatArray]:
         """Return start values and images of both swings.
 
-        ``first`` and ``pixels`` (N, 1, L, 2), px, are those of the first.
+        ``first`` and ``pixels`` (N, 1, L, 2), px, belong to the first swing.
         """
         numbers = [len(pixels), len(self.pixels)]
         state = replace(

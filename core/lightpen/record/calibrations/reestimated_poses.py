@@ -1,8 +1,8 @@
 """Poses of a calibration's images estimated again, from its file alone.
 
-Camera and pen are as the calibration left them, so that the poses, and what is left of
-each LED, are those of its fit but for the cone that holds the tip in one place. LEDs
-face along the pen's z axis: a file does not keep how they are turned.
+Camera and pen are as adjusted by the calibration, so that poses and residuals are those
+of its fit without the constraint of the tip to the cone. The normals of the LEDs are
+the pen's z axis: a file does not store them.
 """
 
 from dataclasses import dataclass

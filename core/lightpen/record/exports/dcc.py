@@ -1,7 +1,7 @@
 """A calibration as a Digital Calibration Certificate of PTB, schema 3.2.1 [1]_.
 
-The form is that of a certificate, and it says itself that it is none: it holds the
-record of a calibration, without accreditation and without a statement of conformity.
+It has the form of a certificate and states that it is none: it holds the record of a
+calibration, without accreditation and without a statement of conformity.
 
 References
 ----------

@@ -1,6 +1,6 @@
 """Changes of password, limits and station key of a data folder, one file each.
 
-Each file has the hash of the one before and the signatures of the station and of the
+Each file has the hash of the previous one and the signatures of the station and of the
 supervisor who made the change, see `lightpen.record.library.signing`. The first
 introduces the station key. Where a supervisor introduces a key or a password, the
 hashes of the files that count until then are listed: all others must be signed by the

@@ -86,9 +86,9 @@ def change_item(
 ) -> Library:
     """Put another version of an item in its place, and return the library.
 
-    One that is as it was is not kept once more. ``before`` is the item as it was shown
-    while it was edited. Raises `UsageError` if it is not in the library, an entry makes
-    no sense, or it was changed since it was shown; see also `add_item`.
+    An unchanged item is not stored again. ``before`` is the item as it was shown while
+    it was edited. Raises `UsageError` if it is not in the library, an entry makes no
+    sense, or it was changed since it was shown; see also `add_item`.
     """
     item = _sensible(item)
     while True:
@@ -129,8 +129,8 @@ def adopt_change(
 ) -> Library:
     """Store a change of another station in this library; see `add_item`.
 
-    It keeps the time, station and operator of the original. Where there is a password,
-    the signature is that of a supervisor of this station.
+    It keeps the time, station and operator of the original. If there is a password, a
+    supervisor of this station must sign.
     """
     item = _sensible(change.item)
     by = Author(change.station, change.operator, change.reason, signature)

@@ -20,8 +20,8 @@ MISSING = ".missing"
 def add_numbered(folder: Path, data: bytes | Callable[[Path], bytes]) -> Path:
     """Add a file, the newest of all, and return it.
 
-    When this returns, it is kept whatever happens next; when it raises, or is killed,
-    it is kept whole or not at all. The content may depend on the file.
+    When this returns, the file is durable; when it raises or is killed, it is stored
+    whole or not at all. The content may depend on the file.
     """
     make_folder(folder)
     for free in count(1 + newest_number(folder)):

@@ -95,8 +95,8 @@ class Supervision:
     ) -> None:
         """Refuse a file of a guarded folder that is not signed as it must be.
 
-        It must be by keys that count, or as it was when a supervisor introduced them.
-        ``text`` is the JSON object with the signatures; it may name a supervisor.
+        It must be signed by valid keys, or unchanged since a supervisor introduced
+        them. ``text`` is the JSON object with the signatures; it may name a supervisor.
         """
         place = place_in(data, file)
         if self.password is None or self.known.get(place) == entries_sha256(text):

@@ -1,9 +1,9 @@
 """Acceptance of the tip of a swing: one transaction of archive and record.
 
-The result is stored first, whole or not at all, and then the swing is concluded. What
-is stored says which images of which swing it is of, so that a program killed between
-the two leaves nothing undecided: the tip is current, and whoever finds the swing
-without its verdict next concludes it.
+The result is stored first, whole or not at all, and then the swing is concluded. The
+stored result names its swing and images, so that a program killed between the two steps
+leaves nothing undecided: the tip is current, and the next program that finds the swing
+without its verdict concludes it.
 
 The grade decides how: a tip that passes is accepted as it is, one that is to be checked
 only with a reason, which is stored, and one that is to be repeated not at all. Where a

@@ -50,13 +50,12 @@ _logger = logging.getLogger(__name__)
 class FolderArchive:
     """Keeps every result that was accepted; the newest of a pen and tip is current.
 
-    Results are added and never changed or removed: one that is revoked is kept, and
-    the one before is current again. Those of a simulated pen are kept apart, and
-    none of them is current for a real one. All methods may take as long as a disk
-    or a network does, and may be called from any thread. Of a result of another
-    pen, tip or swing only the first entries are read, so that thousands of them
-    cost little. ``confirm`` raises an `AcceptanceError` where the limits are not
-    those of the archive.
+    Results are added and never changed or removed: a revoked one is kept, and its
+    predecessor is current again. Results of a simulated pen are kept apart and are
+    never current for a real one. All methods may take as long as a disk or a network
+    does, and may be called from any thread. Of a result of another pen, tip or swing
+    only the first entries are read, so that thousands of them cost little. ``confirm``
+    raises an `AcceptanceError` where the limits are not those of the archive.
     """
 
     def __init__(
@@ -75,8 +74,8 @@ class FolderArchive:
     def store(self, result: Result, supervisor: SigningKey | None = None) -> None:
         """Make a result current, signed by the supervisor whom it names.
 
-        When this returns, the result is kept whatever happens next; when it raises, or
-        is killed, it is kept whole or not at all.
+        When this returns, the result is durable; when it raises or is killed, it is
+        stored whole or not at all.
         """
         root, record = self._root(result.is_simulated), self.place_of(result.record)
         sign = self._signing(read_supervision(self._data), supervisor)

@@ -143,8 +143,8 @@ def header_bytes(header: Header) -> bytes:
 def read_header(folder: Path) -> Header:
     """Read the header of a record and check its copies.
 
-    Raises `FileError` if it is damaged, of a later version of the program, or a copy is
-    not as it was recorded.
+    Raises `FileError` if it is damaged, of a later version of the program, or a copy
+    was changed.
     """
     path = folder / HEADER
     data = read_bytes(path, message("file.header"), HEADER_LIMIT)

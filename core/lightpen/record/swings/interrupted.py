@@ -80,8 +80,7 @@ def discard_swing(folder: Path) -> None:
 def discard_damaged(folder: Path) -> None:
     """Conclude an unreadable swing without a verdict; the files are kept.
 
-    Nothing but the verdict is added, so that whoever restores the damaged file has the
-    swing as it was.
+    Only the verdict is added, so that restoring the damaged file restores the swing.
     """
     with RecordWriter.of_damaged(folder) as writer:
         writer.conclude(DISCARDED)

@@ -1,8 +1,8 @@
 """The journal of a swing: a line for each thing that happened, appended, never changed.
 
-Each line is a JSON object with its checksum. Of the last line a crash may leave a part,
-and a power cut zeros: it was not acknowledged and is passed over. Whatever else is not
-as it was written is damage.
+Each line is a JSON object with its checksum. A crash may leave a part of the last line,
+and a power cut zeros: it was not acknowledged and is ignored. Any other change is
+damage.
 """
 
 import json

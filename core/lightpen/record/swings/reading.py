@@ -15,8 +15,8 @@ A record is a folder:
 ``swing.lightpen``   opens the swing in the program; holds nothing that is needed
 ==================== ===================================================================
 
-The images of the touches of a verification are kept in such a record, too; each then
-says of which touch it is.
+Images of the touches of a verification are stored in the same form, each with its
+touch.
 
 `lightpen.record.swings.writing` puts an image on the disk before its line, and its line
 before it acknowledges the image; `lightpen.record.swings.lock` keeps a second program

@@ -90,7 +90,7 @@ def visible_fields(outlook: GuidanceInput) -> BoolArray:
 def image_information(outlook: GuidanceInput, rotations: FloatArray) -> FloatArray:
     """Predict the information (N, 6, 6), 1/mm^2, of images about (tip, cone).
 
-    Their rotations (N, 3, 3) are those of cam_from_pen.
+    Their rotations (N, 3, 3) are cam_from_pen.
     """
     rig, pen = outlook.rig, outlook.pen
     none = np.zeros((len(rotations), rig.n_cameras, pen.n_leds, 2))

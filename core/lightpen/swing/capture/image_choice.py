@@ -1,8 +1,8 @@
 """Which images of a capture are kept, and why the others are of no use.
 
-All are of a tip that rests in the cone. An image is kept where its posture differs from
-that of all kept ones. An image of no use, and a kept one whose tip turns out to have
-slipped, are counted by their reason.
+In all of them the tip rests in the cone. An image is kept if its posture differs from
+those of all kept images. Unusable images, and kept ones whose tip turns out to have
+slipped, are counted by reason.
 """
 
 from dataclasses import replace

@@ -27,8 +27,8 @@ class SimultaneousPoses(NamedTuple):
 def seen_by_rig(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
     """Return a detection with the pose by another camera where the first has none.
 
-    It is that of the first camera, with the simultaneous ones of the others. Unchanged
-    if the first camera shows enough of the pen, or none does.
+    It is the detection of the first camera, with the simultaneous ones of the others.
+    Unchanged if the first camera shows enough of the pen, or none does.
     """
     for c, seen in enumerate((detection, *detection.others)):
         if seen.has_pose and seen.n_leds >= certain_leds(pen) and not seen.is_blurred:

@@ -170,7 +170,7 @@ def start_again(
 ) -> SwingState:
     """Return an interrupted swing with its accepted images; see `kept_before`.
 
-    ``next_number`` is that of the next image in the swing's record.
+    ``next_number`` is the number of the next image in the swing's record.
     """
     state = start_swing(setup, time)
     trace = trace_of(setup.rig, setup.pen, kept)

@@ -1,8 +1,8 @@
 """Tip and cone by a few poses, and distances of poses from them.
 
 The equations are those of `estimation.pivot.pivot`, R_i tip_pen + t_i = cone_cam,
-weighed by the covariances of the poses. What is known of the tip beforehand joins them
-as a prior, so that a second of hardly moving poses already gives the cone point.
+weighed by the covariances of the poses. Prior knowledge of the tip is added, so that a
+second of hardly moving poses already gives the cone point.
 """
 
 from dataclasses import dataclass

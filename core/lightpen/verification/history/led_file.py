@@ -89,8 +89,8 @@ def improve_pen(
 ) -> ImprovedPen:
     """Improve the LEDs of a pen by several swings; the last one has to confirm it.
 
-    If the files were found from one of the swings, all is begun from what was known
-    before, so that each swing counts once. The scale of the pen is from certified
+    If the files were found from one of the swings, the prior knowledge before it is
+    used, so that each swing counts once. The scale of the pen is from certified
     lengths; ``report`` is called with the fraction done, 0 to 1; what it raises ends
     the work. With ``must_gain`` the last swing has to fit the new LEDs better than the
     old ones; without, it has to agree with the others within its uncertainty. Raises

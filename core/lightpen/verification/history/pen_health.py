@@ -78,9 +78,9 @@ def examine_pen(
 ) -> PenHealth:
     """Examine a pen by at least two calibrations, the oldest first.
 
-    The camera is that of all swings as in its file; without it the growth is not
-    determined. The LEDs (L, 3), mm, are those of the pen file. Raises `UsageError` for
-    different pens.
+    ``camera`` is the common camera of all swings, from its file; without it the growth
+    is not determined. ``leds`` (L, 3), mm, are the LEDs of the pen file. Raises
+    `UsageError` for different pens.
     """
     require_one_pen(calibrations)
     if len(calibrations) < MIN_SWINGS:

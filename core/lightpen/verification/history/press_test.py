@@ -1,9 +1,9 @@
 """Press test: a swing with usual pressure against one with firm pressure.
 
-Same tip, cone, pen and camera. Both swings are fitted with one instrument held as it
-is, once that of the one swing and once that of the other, and the differences of tip
-and cone are averaged: the errors of camera, LEDs and scale cancel. What does not, as
-the postures differ, is about as large as the two differences disagree.
+Same tip, cone, pen and camera. Both swings are fitted with one instrument held fixed,
+first the instrument of one swing, then of the other, and the differences of tip and
+cone are averaged: errors of camera, LEDs and scale cancel. The rest, due to different
+postures, is about as large as the disagreement of the two differences.
 
 A stylus, ball thread or seat that gives way by ``c`` times the sine of the lean
 (`lightpen.estimation.bundle.effects`) moves the tip of a fit along the pen, and its

@@ -75,8 +75,8 @@ def instrument_of(
 ) -> Instrument:
     """Return the instrument as adjusted by a calibration of the same pen.
 
-    Before other cameras than those of the calibration, tip and LEDs are as the swing
-    left them and the cameras are as their files have them.
+    With other cameras than in the calibration, tip and LEDs are taken from the swing
+    and the cameras from their files.
     """
     record = calibration.calibration
     if sha256(pen_file) != calibration.pen_sha256 or pen.n_leds != len(record.leds):
@@ -134,9 +134,9 @@ def touch_run(
     """Find the touches in images.
 
     With one image a touch, and none to settle, each image is a touch; else the pen must
-    be held still through as many as the rules say. Images of which it is recorded what
-    touch they are of need no rules. Raises `CalibrationError` if no image shows the
-    pen, or its LEDs are not those of the pen.
+    be held still through as many as the rules say. Images with a recorded touch need no
+    rules. Raises `CalibrationError` if no image shows the pen, or the LEDs are of
+    another pen.
     """
     seen = observe_place(place, instrument)
     return touches_of(place.name, seen, instrument, rules, place.touches)

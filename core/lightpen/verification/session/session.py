@@ -130,7 +130,7 @@ def touch_again(
 ) -> SessionState:
     """Return the session with earlier touches of the current run.
 
-    One that would end the run must be taken again: so it was not ended by it.
+    A touch that would end the run is omitted, as the run was not ended.
     """
     task = state.task(setup)
     if task is None:

@@ -1,9 +1,9 @@
 """The images of live touches on the disk, from which a verification can be repeated.
 
 Each run is a separate record, see `lightpen.record.swings.reading`: an image is
-written before it counts, with the touch that it is of; one that counts no more is taken
-out. So a run can be given to whatever takes recorded images, and what a crash leaves is
-whole.
+written, with the number of its touch, before it counts; one that no longer counts is
+excluded. So a run can be read like any recorded images, and a crash leaves complete
+data.
 """
 
 from collections.abc import Callable, Collection, Sequence

@@ -1,8 +1,8 @@
 """An interrupted verification: read back to resume it, or concluded as abandoned.
 
-What was touched is measured again from the LED centres in the records of the touches,
-run by run, so that all is found again as it was. A touch that was not complete does not
-count. Fixed lamps are looked for once more in the images of these records.
+Points are measured again from the LED centres in the records of the touches, run by
+run, which gives the same results. An incomplete touch does not count. Fixed lamps are
+searched again in the images of these records.
 """
 
 from contextlib import suppress

@@ -1,7 +1,7 @@
 """Verifications in the data folder: a file for each task that was done, never changed.
 
-Each is what the command of its kind writes, and can be given to whatever reads that. It
-says besides who verified what in which session. Those of simulated pens are kept apart.
+Each has the format that the command of its kind writes, with operator, item and session
+in addition. Files of simulated pens are kept apart.
 """
 
 from collections.abc import Mapping

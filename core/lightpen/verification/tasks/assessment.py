@@ -95,8 +95,7 @@ def judged_error(
 ) -> VerificationAssessment | None:
     """Return the assessment of an error with its U (k = 2), mm; None if it passes.
 
-    Reason and next step of a significant error are those of ``blamed``, its grade is
-    not.
+    A significant error takes reason and next step, but not the grade, from ``blamed``.
     """
     grade = graded(error, uncertainty, limit, limits, n_values)
     if grade is Grade.PASS:

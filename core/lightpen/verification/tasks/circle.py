@@ -1,7 +1,7 @@
 """A circle through touches, against its certified radius: the paper's Table 3.
 
-The covariance of the points, with what they share, gives that of the radius. A form is
-compared with what noise alone makes of an ideal ring.
+The joint covariance of the points gives the uncertainty of the radius. A form error is
+compared with the form that noise alone gives an ideal ring.
 """
 
 from collections.abc import Sequence
@@ -151,10 +151,9 @@ def measure_circle(
 ) -> Circle:
     """Measure a ring in one or several runs.
 
-    The radius within a bore is larger than that of the tip centres by that of the ball,
-    and round a boss smaller. It is off by as much as the camera moves halfway round.
-    Raises `CalibrationError` if points are too few, no circle, or cover too little of
-    it.
+    The radius of a bore is the radius of the tip centres plus the ball radius, of a
+    boss minus it. A motion of the camera halfway round is an error of it. Raises
+    `CalibrationError` if points are too few, no circle, or cover too little of it.
     """
     instrument, drift = conditions.instrument, conditions.drift
     certified = options.radius

@@ -1,6 +1,6 @@
 """A circle of least squares through points in space.
 
-The fit is that of `lightpen.measuring`. The error of its radius is, to first order,
+`lightpen.measuring` does the fit. The error of its radius is, to first order,
 
     dr = sum_i g_i . dX_i
 

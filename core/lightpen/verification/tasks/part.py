@@ -1,7 +1,8 @@
 """A part measured by a plan, one run for each of its features.
 
-The geometry is that of `lightpen.measuring`; here are its touches, its course and what
-is shown and recorded of it. A plan that is ended early gives what was probed of it.
+`lightpen.measuring` does the geometry; here are the touches, their order, and the shown
+and recorded results. A plan that is ended early gives the results of the probed
+features.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,7 @@
 """The course of a part: its plan, run by run, with the datum points of moved parts.
 
 A run is a feature of the plan. If part or camera was moved, three features are probed
-again before the others; all runs since then are those of another position.
+again before the others; all runs since then belong to another position.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """A plate of known flatness: the range of probed points about their best plane.
 
-The plane is that of least squares of the distances along its normal. The distances
-``d`` follow errors ``e`` of the points along the normal by ``(I - H) e``, where ``H``
-projects on the planes over the places of the points, and flatness is the range of
-``d``. A range obeys the triangle inequality, so that for a plate of any form
+The plane minimises the squared distances along its normal. The distances ``d`` follow
+errors ``e`` of the points along the normal by ``(I - H) e``, where ``H`` projects on
+the planes over the places of the points, and flatness is the range of ``d``. A range
+obeys the triangle inequality, so that for a plate of any form
 
     | range(d + r) - range(d) | <= range(r),    r = (I - H) e
 

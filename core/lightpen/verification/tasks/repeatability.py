@@ -134,8 +134,8 @@ def measure_repeatability(
 ) -> Repeatability:
     """Return the repeatability of calibrations of one tip.
 
-    A ``tolerance``, the width of that of a coordinate, mm, adds the capability C_g,
-    with a ``reference`` (3,), the tip by a better instrument, mm, also C_gk.
+    A ``tolerance``, the width of the tolerance of a coordinate, mm, adds the capability
+    C_g, with a ``reference`` (3,), the tip by a better instrument, mm, also C_gk.
     ``touched`` is a fixed point touched with the tip. Raises `CalibrationError` for
     fewer than two tips.
     """

@@ -323,7 +323,7 @@ def _figures_so_far(
 def sphere_directions(n_points: int = USUAL_POINTS) -> FloatArray:
     """Return unit vectors of the points of the standard, pole first, repeated, (N, 3).
 
-    Each ring is turned against the one before.
+    Each ring is rotated against the previous one.
     """
     directions = []
     for k, (n, degrees) in enumerate(RINGS):

@@ -57,7 +57,7 @@ def simulated_ranges(root: FloatArray, n_rows: int = 1) -> FloatArray:
 def form_by_noise(covariance: FloatArray, n_rows: int = 1) -> float:
     """Return the quantile of the form that noise gives an ideal surface, mm.
 
-    ``covariance`` is that of its residuals, mm^2; see `simulated_ranges`.
+    ``covariance`` is the covariance of its residuals, mm^2; see `simulated_ranges`.
     """
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))

@@ -7,8 +7,8 @@ chain is the hash of the public key. So the first key of a chain needs no certif
 and another key takes its place only if it is introduced by the old key or a supervisor.
 
 A supervisor's key follows from the password by Argon2id [2]_ with a random salt. Only
-the salt and the public key are stored. What is signed by it proves that the password
-was entered, to anybody who has the public key, and even to whoever has the station key.
+the salt and the public key are stored. A signature by it proves to anybody with the
+public key that the password was entered; the station key does not suffice to forge it.
 The parameters of Argon2id are those below; none is read from a file.
 
 References

@@ -4,9 +4,9 @@
 begin with the same one, whichever is first. Which keys count from then on, the signed
 limits and entries say; the file is not asked again.
 
-What is remembered stands beside the private keys, outside of the data folder: how many
-changes of limits it had. So one who removes or rolls back the limits is found even
-where the archive was removed, too.
+The number of changes of limits is remembered beside the private keys, outside of the
+data folder. So removed or rolled-back limits are detected even if the archive was
+removed as well.
 """
 
 from contextlib import suppress
