@@ -61,7 +61,7 @@ REFRESHERS = {"update-desktop-database": "applications", "update-mime-database":
 def install_entry() -> int:
     """Write the entry, the icon and the file type on Linux; return the exit status."""
     data = _data_folder()
-    program = Path(sys.argv[0]).absolute()  # a link, such as that of pipx, stays one
+    program = Path(sys.argv[0]).absolute()  # a link, such as pipx makes, stays one
     entry = ENTRY.format(
         program=_quoted(str(program)), tried=program, mime_type=MIME_TYPE
     )

@@ -5,7 +5,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 
 MANY = 400  # arrows; more are shown as their means
-N_CELLS = 20  # across, of which each shows the mean of its arrows
+N_CELLS = 20  # across; each shows the mean of its arrows
 
 
 def cell_means(

@@ -28,7 +28,7 @@ Cell: TypeAlias = (
     QWidget | int | tuple[QWidget, int] | tuple[QWidget, int, Qt.AlignmentFlag]
 )
 GridPlace: TypeAlias = tuple[int, int] | tuple[int, int, int, int]
-Margins: TypeAlias = int | tuple[int, int, int, int] | None  # None: those of the style
+Margins: TypeAlias = int | tuple[int, int, int, int] | None  # None: the style's
 
 
 def vertical_layout(

@@ -157,7 +157,7 @@ def led_blocks(calibration: CalibrationRecord) -> Iterable[Block]:
         rows,
     )
     title = translate("paper", "Camera parameters from the images")
-    if calibration.inputs.cameras:  # of a rig; the record has those of the first
+    if calibration.inputs.cameras:  # of a rig; the record itself has the first camera's
         title = f"{title} ({calibration.inputs.cameras[0].file})"
     yield subheading(title)
     yield from table(

@@ -60,7 +60,7 @@ class Walk(QObject):
         self._workbench = wizard.workbench
         self._swing = swing
         self._next: Callable[[], bool] = self._open
-        self.doing = ""  # what it waits for, and what the window says
+        self.doing = ""  # the awaited event, and the texts of the window
         self._timer = QTimer(self, interval=TICK_MS)
         self._timer.timeout.connect(self._on_tick)
 

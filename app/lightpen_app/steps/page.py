@@ -56,7 +56,7 @@ class Page(Translated, QWidget):
     shows_images = False  # whether live images are shown on it
     changed = Signal()  # properties of the page, such as its main action, have changed
     advance_requested = Signal()  # show the next step
-    # Key of the step to show, such as that of a resumed swing.
+    # Key of the step to show, such as the one of a resumed swing.
     step_requested = Signal(str)
     operator_value_changed = Signal(object)  # OperatorValue
     data_folder_requested = Signal()  # choose another data folder

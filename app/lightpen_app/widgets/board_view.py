@@ -93,7 +93,7 @@ class BoardView(ImageView):
             4 * columns,
             QImage.Format.Format_RGBA8888,
         )
-        # The samples lie on the border of the image, those of a picture within.
+        # The samples lie on the border of the image, the pixels of a picture within.
         x, y = size.width() / (columns - 1) / 2, size.height() / (rows - 1) / 2
         right, bottom = float(size.width()), float(size.height())
         whole = self.place_of(-x, -y), self.place_of(right + x, bottom + y)

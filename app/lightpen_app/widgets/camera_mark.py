@@ -10,7 +10,7 @@ from lightpen_app.look.theme import GRID, font
 
 TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the circle, degrees
 FLAGS = int(Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextDontClip)
-DISTANCE = 1.085  # from the middle of the dial to that of the mark; radius = 1
+DISTANCE = 1.085  # from the centre of the dial to the mark's; radius = 1
 
 
 @dataclass(frozen=True, eq=False)

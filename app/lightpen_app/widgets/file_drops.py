@@ -24,7 +24,7 @@ class FileDrops(QObject):
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if not isinstance(event, QDropEvent):  # entering and moving are such, too
+        if not isinstance(event, QDropEvent):  # also entering and moving
             return False
         path = _path_of(event.mimeData())
         if not path:

@@ -34,7 +34,7 @@ def fit_screen(window: QWidget) -> None:
 class FittedWindow(WidgetMixin):
     """Put before the base of a window, it keeps that within the screen when shown."""
 
-    # Keys that close the window, for a dialog in addition to those of Qt.
+    # Keys that close the window, for a dialog in addition to Qt's.
     CLOSING_KEYS: tuple[Qt.Key, ...] = ()
 
     @override

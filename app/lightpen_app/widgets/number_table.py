@@ -16,7 +16,7 @@ from typing_extensions import override
 from lightpen_app.look.theme import GRID, TextSize, set_size
 from lightpen_app.widgets.row_table import LEFT, RIGHT
 
-ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; that of the head likewise
+ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; also of the header
 
 
 @dataclass(frozen=True)

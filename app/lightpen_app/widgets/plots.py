@@ -83,7 +83,7 @@ class Plot(QWidget):
         self._graphics = Canvas(parent=self, axisItems=axes_of_sides, enableMenu=False)
         self._item = self._graphics.getPlotItem()
         self._item.hideButtons()
-        title = self._item.titleLabel  # above the left axis, too, which gives it room
+        title = self._item.titleLabel  # also above the left axis, for more room
         self._item.layout.removeItem(title)
         self._item.layout.addItem(title, 0, 0, 1, 3)
         self._item.setMouseEnabled(x=False, y=False)

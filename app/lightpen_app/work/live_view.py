@@ -57,7 +57,7 @@ class LiveView(QObject):
     connection_changed = Signal(object)  # Connection
     # Connection: the camera that is not chosen is in this state now
     other_changed = Signal(object)
-    settings_applied = Signal(object)  # CameraSettings: those of the camera now
+    settings_applied = Signal(object)  # CameraSettings now in use
     # int, CameraSettings: index of a camera, and its settings now
     configured = Signal(int, object)
     failed = Signal()  # no more images come until another `open`; `why_no_images` shows

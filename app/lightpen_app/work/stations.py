@@ -49,7 +49,7 @@ class Station:
     """Last choices at a station."""
 
     names: Names = field(default_factory=Names)
-    # Its centre by design, mm, pen frame; None for that of the LED file.
+    # Nominal tip centre, mm, pen frame; None: the LED file's.
     nominal_tip: Triple | None = None
     camera: StoredCamera = field(default_factory=StoredCamera)
     second: StoredCamera | None = None  # None for a single camera

@@ -142,7 +142,7 @@ def _infos() -> Iterator[tuple[Any, Any]]:
     for name in LAYERS:
         if name in known:
             layer = factory.CreateTl(name)
-            if layer is not None:  # what it needs of the system is not there
+            if layer is not None:  # None: a system component is missing
                 yield from ((layer, info) for info in layer.EnumerateDevices())
 
 

@@ -24,7 +24,7 @@ CLOCK_SET_NS = 1_000_000_000  # jump of a clock that is set manually
 SAME_CLOCK_NS = 50_000_000  # apart at most; clocks of two cameras are hours apart
 MUCH_FASTER = 0.25  # of the time between two frames
 NEAR = 0.6  # of the time between two frames; more than half, as times jitter
-MIN_TIMED, N_TIMED = 8, 32  # moments of which the lag is the median
+MIN_TIMED, N_TIMED = 8, 32  # moments for the median lag
 LEAST_LAG_MS = 1.0  # a pen moves 0.1 mm meanwhile
 PEN_SPEED = 100.0  # mm/s
 

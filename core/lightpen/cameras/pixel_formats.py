@@ -54,7 +54,7 @@ class PixelFormat:
 
 
 # PFNC names a pattern by its first two pixels, as these constants of OpenCV do; its
-# older ones name that of the second row and column.
+# older ones name the colour of the second row and column.
 _BAYER = {
     "RG": cv2.COLOR_BayerRGGB2GRAY,
     "GR": cv2.COLOR_BayerGRBG2GRAY,

@@ -158,7 +158,7 @@ class Region:
 class RegionLimits:
     """Regions that a camera can read out."""
 
-    width: Range  # up to that of the sensor
+    width: Range  # up to the sensor's
     height: Range
     x_step: int = 0  # of the position; 0 if it is fixed
     y_step: int = 0

@@ -399,7 +399,7 @@ class CameraWorker:
         self._settings = known
         try:
             self._start(known)
-        except ConfigError as error:  # it is not what it was when they were kept
+        except ConfigError as error:  # the camera changed since they were stored
             self._settings = CameraSettings()
             self._start(self._settings)
             # When images come, which take back others.

@@ -249,7 +249,7 @@ def _measured(
         disc = measure_disc(scene.image, boxes.pop(), level, scene.noise, floor)
         if disc is None:
             continue
-        # Two regions of which each is another of the other would go round for ever.
+        # Two regions that each lead to the other would loop for ever.
         new = [
             each for each in disc.others if each.size < box.size and each not in seen
         ]

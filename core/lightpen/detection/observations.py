@@ -30,7 +30,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
-SAME = 0.002  # px, rms: the noise of any two images is more, that of a new coding less
+SAME = 0.002  # px, rms: between the noise of two images and of recoding one
 SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and the saturated ones
 
 Report = Callable[[float], None]
@@ -186,7 +186,7 @@ def without_copies(seen: Observations) -> Observations:
     known = np.isfinite(pixels)
     pixels = np.where(known, pixels, 0.0)
     counts = np.maximum(known.sum(axis=1), 1)
-    means = pixels.sum(axis=1) / counts  # those of copies differ by less than SAME
+    means = pixels.sum(axis=1) / counts  # means of copies differ by less than SAME
     order, firsts = np.argsort(means, kind="stable"), np.arange(len(used))
     for step in range(1, len(used)):
         near = means[order[step:]] - means[order[:-step]] < SAME

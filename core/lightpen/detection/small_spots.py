@@ -191,7 +191,7 @@ def _windows(image: Image, centers: FloatArray, radii: FloatArray) -> _Windows:
 def _about_the_middles(soft: FloatArray) -> FloatArray:
     """Return soft-thresholded windows without the regions beside the middle ones."""
     half = soft.shape[1] // 2
-    # A dark row between windows parts the regions of one from those of the next.
+    # A dark row between windows separates their regions.
     lit = np.pad(soft > 0, ((0, 0), (0, 1), (0, 0))).view(np.uint8)
     _, labels = cv2.connectedComponents(lit.reshape(-1, soft.shape[2]))
     regions = labels.reshape(lit.shape)[:, :-1]

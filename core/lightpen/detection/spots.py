@@ -37,7 +37,7 @@ CHANGED = 0.1  # of the mean area and contrast of all spots
 
 SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
 
-HARDLY_AREA = 18.0  # px^2, usual, of spots of which some may be too small
+HARDLY_AREA = 18.0  # px^2, usual area at which some spots may be too small
 FEWEST_TINY = 4
 FOUND_TINY = 0.75  # of as many tiny ones, that are found where LEDs are large enough
 LEAST_OF_USUAL = 0.3  # of the height of others, above which tiny ones are counted
@@ -82,7 +82,7 @@ class Spots:
     # (N,), standard deviation of one coordinate of each centre, px, by the estimator
     # that found it; `EXACT_SIGMA` for discs that are wide enough to have a rim.
     sigmas: FloatArray
-    # (N, 2), by how much the centre of the bright region is off that of the disc, px
+    # (N, 2), offset of the centre of the bright region from the disc's, px
     offsets: FloatArray
     # Whether there is light, but no spot: discs moved by many times their size during
     # the exposure leave streaks, a dark image leaves nothing.

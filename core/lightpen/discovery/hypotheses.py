@@ -80,9 +80,9 @@ class Seed:
 
     images: IntArray  # (M,)
     pieces: IntArray  # (L,)
-    start: Start  # LED j is that of ``pieces[j]``
+    start: Start  # LED j is ``pieces[j]``
     hypotheses: tuple[Hypothesis, ...]
-    margin: float  # least misfit of another shape over that of the start
+    margin: float  # least misfit of another shape, relative to the start's
 
 
 def solve_seed(

@@ -60,7 +60,7 @@ def label(
     search = _Search(seed.start.state, certain, spots, width)
     search.rotations[seed.images] = seed.start.state.rotations
     search.solved[seed.images] = True
-    # Of the joined pieces, those certain ones of which the seed is made fit.
+    # Of the joined pieces, the certain ones that make the seed fit.
     search.name_pieces()
     for _ in range(ROUNDS):
         progressed = search.turn_next()

@@ -15,7 +15,7 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 TO_MICROMETRES = 1000.0
-OTHER_CAMERA = 3.0  # standard deviations, of the focal length from that of the file
+OTHER_CAMERA = 3.0  # standard deviations, of the focal length from the file's
 
 
 def discovery_record(discovery: Discovery) -> dict[str, Any]:

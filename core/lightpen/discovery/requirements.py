@@ -23,7 +23,7 @@ from lightpen.model.posture import tilts_of
 
 MIN_IMAGES = 40
 MIN_LEDS = 5
-SECOND_PEN = 3  # lights that move with one another, beside those of the pen
+SECOND_PEN = 3  # lights that move together, besides the LEDs of the pen
 OTHER_SIZE = 0.1  # relative: discs that are another size than stated
 ZOOMED = 1e-3  # of the focal length, between both halves of a swing, and
 HALVES_APART = 6.0  # standard deviations of the difference
@@ -39,7 +39,7 @@ class Halves(NamedTuple):
 
     focal_lengths: FloatArray  # (2,), px
     sigmas: FloatArray  # (2,), their standard uncertainties, px
-    misfit: float  # noise about the common start, by that of the noisier half alone
+    misfit: float  # noise about the common start, over the noisier half's own
 
 
 def require_enough(sightings: Sightings) -> None:

@@ -53,7 +53,7 @@ class HeldOut:
 class Together:
     """Joint result of several swings."""
 
-    found: Discovery  # of all; its calibration is that of the first swing
+    found: Discovery  # of all; its calibration is of the first swing
     swings: tuple[Discovery, ...]  # of each
     held_out: HeldOut  # the last swing against the others
 
@@ -216,7 +216,7 @@ def _prior_information(each: Discovery) -> FloatArray:
 def _prior_values(each: Discovery) -> FloatArray:
     """Return the parameters, (q,), with camera and discs at their prior means."""
     values = _started_at(each, _values(each, each))
-    if each.lens_choice is not None:  # else the camera is that of a file
+    if each.lens_choice is not None:  # else the camera is from a file
         values[each.parameters.cameras[0]] = any_camera(each.camera).intrinsics
     return values
 

@@ -21,7 +21,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.model.assignment import assigned_columns
 
-REACH = 0.06  # of the image width: farthest step beside the one before
+REACH = 0.06  # of the image width: largest change from the previous step
 NEAR = 0.006  # of the image width: farthest from the prediction by the others
 COASTING = 8  # images in which a spot may be missing
 USUAL = 0.75  # of the spots, found at their predicted places

@@ -291,7 +291,7 @@ class _Start:
     """Step 2: the fit that the adjustment starts from, parameters of the files held."""
 
     rig: Rig  # cameras of the file, with extrinsics by the images
-    extrinsics: FloatArray  # (6 (C - 1),), these less those of the file, rad and mm
+    extrinsics: FloatArray  # (6 (C - 1),), deviation from the file's, rad and mm
     lags: tuple[TimeLag | None, ...]
     reasons: npt.NDArray[np.object_]  # (N, C)
     moments: IntArray  # (M,), moments with an image that takes part

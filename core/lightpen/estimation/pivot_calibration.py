@@ -39,7 +39,7 @@ NOT_COVERED = message("pivot.not-covered")
 class PivotCalibration:
     """Tip and pivot of poses, with covariance and warnings."""
 
-    fit: PivotFit  # its covariance is that of independent noise
+    fit: PivotFit  # its covariance assumes independent noise
     # (6, 6), of (tip_pen, pivot_cam) by correlated residuals, mm^2.
     covariance: FloatArray
     # Set if the poses have two tips or pivots; the fit uses the larger group.

@@ -54,7 +54,7 @@ class UnlabelledCenters:
     """Images of unknown LEDs in a series of frames."""
 
     frames: IntArray  # (F,), ascending, also those without a centre
-    centers: tuple[FloatArray, ...]  # (S, 2), those of each frame, in any order, px
+    centers: tuple[FloatArray, ...]  # (S, 2) in each frame, in any order, px
     path: Path
 
 

@@ -15,7 +15,7 @@ from lightpen.formats.image_headers import check_pixels, read_image_header
 from lightpen.messages import Message, message, printable
 
 MAX_VIDEO_FRAMES = 30_000
-MAX_VIDEO_PIXELS = 20_000_000  # of a frame, of which a decoder keeps several
+MAX_VIDEO_PIXELS = 20_000_000  # of a frame; a decoder keeps several
 MOTION_JPEG = "MJPG"
 # Anything else FFmpeg may take for raw pixels, of a layout that it has not.
 CODECS = frozenset(

@@ -44,7 +44,7 @@ UNHURRIED = 0.5  # s from image to image while nothing moves
 LIVELY_NS = 2_000_000_000  # after the last motion, in which every image is taken
 # The same during a capture, longer than the pen is held still for it.
 PATIENT_NS = 10_000_000_000
-FULL_SCAN = 20  # images of a swing, of which one is read in full
+FULL_SCAN = 20  # images of a swing for each that is searched in full
 MAY_REST = (Phase.CAPTURING, Phase.PAUSED)  # a pen at rest changes nothing
 
 _logger = logging.getLogger(__name__)

@@ -258,7 +258,7 @@ def _determined(planned: PlannedFeature, touches: PartTouches, at: IntArray) -> 
     _require_determined(feature, touches, at)
     if planned.criterion == NEVER:
         return feature
-    # The points that touch the zone carry it; its U is that of least squares.
+    # The points that touch the zone define it; its U is taken from least squares.
     origin, axes, sizes, _ = fit_zone(kind, points, Criterion(planned.criterion))
     return replace(feature, origin=origin, axes=axes, sizes=sizes)
 

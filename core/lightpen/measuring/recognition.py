@@ -24,7 +24,7 @@ FORM = 0.05  # mm, off a feature that is of its kind
 DEVIATIONS = 4.0  # of the noise, likewise
 LARGEST = 20.0  # times the extent of the points: a larger radius is a plane's
 FACING = 0.7  # cosine of approach and normal, from which a face was touched
-SURE = 5  # points on a circle that are not those of a plane by chance
+SURE = 5  # points on a circle that are not on a plane by chance
 FLATTEST, SHARPEST = np.radians([80.0, 1.0])  # half angles of a cone
 
 

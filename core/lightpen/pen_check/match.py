@@ -51,7 +51,7 @@ class MatchFinding(StrEnum):
     ADVICE = "advice"
     EXCHANGED = "exchanged"  # two LEDs, axes
     SHIFTED = "shifted"  # LED, by
-    SHIFTED_EITHER = "shifted either"  # two LEDs, of which one is; by
+    SHIFTED_EITHER = "shifted either"  # one of two LEDs; by
     UNSEEN = "unseen"  # LED
     UNKNOWN_LED = "unknown LED"  # by: its place in the pen frame
     MISFIT = "misfit"

@@ -40,7 +40,7 @@ class Shift:
     """An LED that sits off its place in the file."""
 
     led: int  # its number, from 1
-    by: tuple[float, float, float]  # place minus that of the file, pen frame, mm
+    by: tuple[float, float, float]  # position minus file position, pen frame, mm
     sigma: float  # standard deviation of `by` in its weakest direction, mm
     rival: int = 0  # another LED whose shift would explain the images as well, or 0
 

@@ -48,7 +48,7 @@ BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
 
 N_BUFFERED = 16  # images that wait for a late reader, as with real cameras
 MAX_POSES = 64  # through one exposure
-TURNING_TIME = 60.0  # s, in which it turns as far as the scene says
+TURNING_TIME = 60.0  # s, for the whole rotation of the camera in the scene
 STILL = 0.02  # px moved during the exposure that blur hides
 
 

@@ -37,7 +37,7 @@ POLYGON_SAMPLES = 4
 DEFOCUS_SAMPLES = 9  # per pixel and axis, of the defocus kernel
 HALO_SIGMA = 15.0  # px
 BOARD_SIGMA = 2.0  # px
-HALO_REACH = 3.0  # standard deviations after which it is nil
+HALO_REACH = 3.0  # standard deviations; zero beyond
 
 
 class Window(NamedTuple):

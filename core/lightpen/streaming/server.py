@@ -34,7 +34,7 @@ LAST_PORT = 65535
 MOST_CLIENTS = 16
 ON_THE_WAY = 16_384  # bytes; a slow client misses poses rather than get old ones
 ROOM = 4096  # bytes; what clients send is ignored
-RECENT = 40  # poses offered to a client, of which it is slow if it misses
+RECENT = 40  # poses offered to a client, by which it is judged slow
 SLOW = 4  # or more
 IDLE_S = 20.0  # a client that takes no data for so long is dropped
 # Of the system, so that a client whose line was cut is found.

@@ -57,7 +57,7 @@ class Preparation:
     """The choices for a calibration."""
 
     names: Names = field(default_factory=Names)
-    nominal_tip: FloatArray | None = None  # (3,), mm; None: that of the LED file
+    nominal_tip: FloatArray | None = None  # (3,), mm; None: the LED file's
     source: SourceChoice = field(default_factory=SourceChoice)
     image_size: tuple[int, int] | None = None  # px; None while there are no images
     camera_in_use: CameraInUse | None = None  # None until one is open

@@ -99,7 +99,7 @@ class SwingWorkflow:
         self._status = SwingStatus()
         self._presence = OperatorPresence()
         self._recorder: SwingRecorder | None = None
-        self._record: Record | None = None  # as it was when it was entered
+        self._record: Record | None = None  # at its entry
         self._first: tuple[SwingStatus, Record] | None = None  # during a press test
         self._wanted: Mapping[int, str] = {}  # images to exclude
         self._tried: Mapping[int, str] = {}  # of them, those being computed without

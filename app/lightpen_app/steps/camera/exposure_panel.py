@@ -50,7 +50,7 @@ class ExposurePanel(Translated, QFrame):
         self._gain_name.setBuddy(self._gain)
         self._adjust = PushButton()
         self._why_fixed = text_label(TextSize.BODY, Tone.QUIET)
-        self._why_fixed.setMinimumHeight(5 * GRID)  # that of the fields it stands for
+        self._why_fixed.setMinimumHeight(5 * GRID)  # as the fields in its place
 
         # Layout
         layout = vertical_layout(self, self._bar, margins=PADDING)

@@ -29,7 +29,7 @@ from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_images import DisplayedImage
 
 HEAD_GAP = 3 * GRID  # px, between the words above the image
-N_TIMED = 40  # images of which the rate is the mean: two seconds
+N_TIMED = 40  # images for the mean rate: two seconds
 WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 
 

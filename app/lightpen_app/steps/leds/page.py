@@ -188,7 +188,7 @@ class LedsPage(ResponsiveLayout, Page):
     def _refresh(self) -> None:
         """Show the state of the draft and the nominal tip in use."""
         pen, tip = self._leds.state.check.pen, self._selection.preparation.nominal_tip
-        overriding = ""  # where it is not that of the table
+        overriding = ""  # nominal tip in use, if not the table's
         if tip is not None and pen is not None:
             overriding = "  ".join(f"{each:g}" for each in tip.tolist())
         elif pen is not None:

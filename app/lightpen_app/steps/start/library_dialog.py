@@ -78,7 +78,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._pen = ""
         self._is_guarded = False
         self._item: AnyItem | None = None  # that is being added or changed
-        self._before: AnyItem | None = None  # as it was shown
+        self._before: AnyItem | None = None  # as first shown
         self._is_new = False
         self._asked: RequestedChange | None = (
             None  # of which it is not known if it is kept

@@ -157,7 +157,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
         self._pictured = None if self._picture is None else self._picture.make()
         self._tables = tuple(FiguresView() for _ in range(MOST_TABLES))
 
-        # Layout: only tables scroll; those of a part are as wide as the page and have
+        # Layout: only tables scroll; tables of a part are as wide as the page and have
         # the picture below
         results, scroll = QWidget(), PageScroll()
         scroll.setMinimumHeight(LEAST_HEIGHT)

@@ -112,7 +112,7 @@ class VerifyPresenter(QObject):
     def _status(self) -> VerificationStatus:
         return self._verification.status
 
-    # What the page says of itself
+    # State of the page
 
     def _lead(self) -> str:
         status = self._status

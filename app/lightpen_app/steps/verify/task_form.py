@@ -111,7 +111,7 @@ class TaskForm(Translated, QWidget):
             else:
                 field.activated.connect(self._on_changed)
 
-        self._is_chosen.setVisible(task in TASKS)  # that of a part is not chosen
+        self._is_chosen.setVisible(task in TASKS)  # a part is not a selectable task
         self._retranslate()
 
     def value(self) -> VerificationChoices:

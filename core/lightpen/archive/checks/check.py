@@ -134,13 +134,13 @@ def _walked(
     while True:
         rows = _rows_after(database, head.chain, number)
         if not rows:
-            # As it is now, or as it was if the chain is gone.
+            # The present state, or the last one of a lost chain.
             head = next((h for h in heads(database) if h.chain == head.chain), head)
             if number >= head.number or not _rows_after(database, head.chain, number):
                 break
         sound = []
         for row in rows:
-            if not isinstance(row.number, int):  # SQLite keeps a text there, too
+            if not isinstance(row.number, int):  # SQLite also stores a text there
                 yield _changed(head.chain, number + 1)
                 return
             if row.number > number + 1:
@@ -191,7 +191,7 @@ def _strays(database: Database) -> Iterator[Message]:
 
 
 def _changed_records(database: Database) -> Iterator[Message]:
-    n_read = 0  # not paged by hash: a hash may be damaged, too
+    n_read = 0  # not paged by hash, which may be damaged
     in_order = select(RECORDS).order_by(RECORDS.c.sha256).limit(BATCH)
     while True:
         found = database.rows(in_order.offset(n_read))

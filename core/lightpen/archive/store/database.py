@@ -49,7 +49,7 @@ MIGRATIONS = Path(__file__).parent.with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
 LONGEST_FAREWELL_S = 2  # for its users at closing
 MALFORMED = "database disk image is malformed"  # as SQLite says it
-LONGEST_WAIT_S = 10  # for another program to finish what it writes
+LONGEST_WAIT_S = 10  # for another program to finish writing
 PAUSE_S = 0.02  # between two attempts where SQLite does not retry
 # A proxy may keep a connection open whose other end is gone.
 LONGEST_ANSWER_S = 120.0

@@ -26,9 +26,9 @@ from lightpen.detection.labelling.spot_arrays import SpotArrays
 from lightpen.model.ellipse import conic_images
 from lightpen.model.rigid import reflection
 
-MAX_SPOTS = 14  # of which triples are made
+MAX_SPOTS = 14  # for triples
 MAX_GAP = 1.15  # between two LEDs, over the size of the pen
-MIN_AREA = 0.1  # of a triangle of spots over that of the pen's largest, seen face on
+MIN_AREA = 0.1  # of a triangle of spots over the pen's largest, seen face on
 RANGE_SIGMA = 0.02  # of the distance known from one spot, relative
 SCALE_SIGMA = 0.1  # of all distances alike: blur, threshold, disc diameter
 COARSE_SHAPE_TOLERANCE = 0.25  # difference of shapes over their trace

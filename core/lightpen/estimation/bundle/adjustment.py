@@ -59,7 +59,7 @@ class Adjustment:
     # Estimate, with assumed camera priors shrunk and without unlikely mechanics.
     bundle: Bundle
     unshrunk: Bundle  # the same with the priors as assumed
-    whole: Bundle  # the same with all mechanics, too; its covariance is the uncertainty
+    whole: Bundle  # the same with all mechanics; its covariance is the uncertainty
     priors: Priors  # priors of ``unshrunk`` with contradicted numbers released
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation

@@ -116,7 +116,7 @@ def _view(
     if c > 0:
         by_turn = np.cross((points - t_c)[:, :, None], by_point)
         own = np.concatenate([own, by_turn, by_point], axis=3)
-    # The centre of a disc's image lies off that of the disc with the diameter squared.
+    # The centre of a disc's image deviates by the square of the diameter.
     offset = (pixels - residuals) - camera.pixels(normalised)
     return CameraView(
         residuals=residuals,

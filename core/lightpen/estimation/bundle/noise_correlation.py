@@ -117,7 +117,7 @@ class _NoiseModel(NamedTuple):
     """The likeliest model with one coefficient of autoregression."""
 
     cost: float  # twice the negative logarithm of the restricted likelihood
-    variance: float  # noise variance, relative to that of the LED weights
+    variance: float  # noise variance, relative to the LED weights' variance
     components: Components
 
 

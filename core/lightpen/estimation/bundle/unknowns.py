@@ -60,7 +60,7 @@ class Unknowns:
     # and 1 at the second cone.
     forms: FloatArray
     oval: FloatArray  # (21, 2), moves in the seat modes by an oval seat
-    basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs but those of the pen as a whole
+    basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs without moves of the whole pen
     scaling: FloatArray  # (3 L,), move of the LEDs by a scale of 1
     priors: Priors
     effects: tuple[Effect, ...]  # the fitted ones

@@ -31,7 +31,7 @@ from lightpen.model.rigid import rotation_from_vector
 
 MIN_IMAGES = 10
 LEAST = 1e-6  # px, of noise and motion; exact lamps would divide by zero
-RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variance of a step to that of a lamp
+RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variances of a step and of a lamp
 HALF = 0.5  # of the lamp shift, by which the pen shifts at least if the camera moved
 WITH_LAMPS = 1.5  # times the lamp shift, largest shift of a pen beside them
 FAR = 3.0  # times the usual distance; what lies farther has slipped
@@ -71,7 +71,7 @@ def pose_steadily(camera: Camera, pen: Pen, observations: Observations) -> Stead
     path = _way_of(observations)
     if path is None:
         return SteadyImages(observations, pose_images(camera, pen, observations), path)
-    with suppress(CalibrationError):  # that of a camera which moves too far
+    with suppress(CalibrationError):  # raised for a camera that moves too far
         posed = pose_images(camera, pen, observations)
         if _share_of_pen(camera, path, posed) < HALF:
             return SteadyImages(observations, posed, path)

@@ -130,7 +130,7 @@ def fit_contact(
         state, reduced = _descend(model, state, used, tolerance)
         if np.array_equal(inliers(state.residuals), used):
             break
-    if is_near:  # the last step was too small for what it leaves to matter
+    if is_near:  # the rest after so small a step does not matter
         return _fit_from(state, used, reduced)
     return joint_at(model, state.rotations, state.tip_pen, state.cone_cam, used)
 

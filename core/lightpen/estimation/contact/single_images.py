@@ -34,8 +34,8 @@ class PosedImages:
     poses: Poses
     # (F,), images whose pose most LEDs agree with; ``pivot`` is of these.
     fitted: IntArray
-    kept: IntArray  # (K,), those of the M whose tip agrees with most
-    pivot: PivotFit  # tip and cone, from poses of which most are ``kept``
+    kept: IntArray  # (K,), indices among the M whose tip agrees with most
+    pivot: PivotFit  # tip and cone, from poses mostly in ``kept``
 
     @property
     def chosen(self) -> IntArray:

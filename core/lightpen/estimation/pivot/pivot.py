@@ -22,7 +22,7 @@ from lightpen.model.rigid import skew
 MIN_POSES = 6  # the paper starts from six images
 N_SAMPLES = 300  # of four poses; 40 % outliers leave no clean one with 1e-18
 SAMPLE_SIZE = 4
-FEW = 12  # poses, of which four fix the others too poorly to judge them
+FEW = 12  # poses; four of them predict the others too poorly
 SHARE_OF_FEW = 0.75  # of so few poses that make a sample
 OUTLIER = 1e-5  # probability that a correct pose is excluded
 LOOSE_THRESHOLD = 8.0  # where covariances are not given: real trackers have heavy tails

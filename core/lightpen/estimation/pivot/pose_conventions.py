@@ -24,9 +24,9 @@ from lightpen.messages import Message, message
 Poses: TypeAlias = tuple[FloatArray, FloatArray]
 
 MUCH_CLOSER = 0.6  # of the scatter as read
-ROUNDING = 1e-6  # of the length of the translations: exact poses scatter by it
+ROUNDING = 1e-6  # of the length of the translations: scatter of exact poses
 AGREEING = 0.5  # of the poses, at least
-FEW = 20  # poses, of which half would agree with anything
+FEW = 20  # poses; half of fewer would agree with anything
 AGREEING_OF_FEW = 0.9
 MAX_LOOKED_AT = 200  # poses examined; all have one convention
 SHORT = 10.0  # mm; no tracked pen is that close to its tracker in most poses

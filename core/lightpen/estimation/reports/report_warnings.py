@@ -136,7 +136,7 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
     bundle, found = calibration.bundle, calibration.bundle.budget_components
     warnings = []
     jitter = found.jitter.covariance
-    # Ball and cone that are as round as assumed move the tip by so much as well.
+    # Ball and cone within the assumed form error move the tip as much.
     by_form = calibration.priors.form_error * float(np.sqrt(N_CONE * sum(MODE_COUNTS)))
     distance = 0.0 if jitter is None else float(np.sqrt(np.trace(jitter)))
     if distance > by_form:

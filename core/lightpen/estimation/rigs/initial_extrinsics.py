@@ -28,7 +28,7 @@ class InitialExtrinsics:
     rig: Rig  # with the file's cameras, without a covariance
     # Of each camera but the first; None: not determined.
     lags: tuple[TimeLag | None, ...]
-    apart: BoolArray  # (N, C), images of other moments than those of the cameras before
+    apart: BoolArray  # (N, C), images not simultaneous with those of earlier cameras
 
     def deviations(self, file: Rig) -> FloatArray:
         """Return the deviations from a file's extrinsics, as in `Rig.covariance`."""

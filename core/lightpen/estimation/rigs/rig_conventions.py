@@ -25,7 +25,7 @@ from lightpen.model.rigid import vector_from_rotation
 
 USUAL_ANGLE = np.radians(5.0)  # by which a camera may have been bumped
 USUAL_SHARE = 0.1  # of its distance from the reference
-LEAST_DISTANCE = 100.0  # mm, of which that share is taken at least
+LEAST_DISTANCE = 100.0  # mm, lower bound of the distance for that share
 EXPLAINED = 0.4  # of these, left once a mistake is corrected
 FAR_OFF = 3.0  # times these: no rig to start from
 CLEARLY = 0.8  # of the noise with the camera files as they are

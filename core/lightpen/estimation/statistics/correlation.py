@@ -131,7 +131,7 @@ def _products(equations: FloatArray, weights: FloatArray) -> FloatArray:
 
 def _spectra(n_kept: int, n_poses: int) -> FloatArray:
     """Return the spectra to try, (M, K), each 1 on average, the white one first."""
-    # At zero the spectrum is that of all lengths up to the whole swing.
+    # At zero the spectrum averages all lengths up to the whole swing.
     angles = np.pi / n_poses * np.maximum(np.arange(n_kept), 0.5)
     shortest = max(SHORTEST, n_poses / n_kept / np.pi)
     spectra = [np.ones(n_kept)]

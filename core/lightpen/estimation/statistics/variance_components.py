@@ -197,7 +197,7 @@ def find_jitter(
         n_free = variance**2 * float(np.sum((values + variance) ** -2))
         n_free = max(n_free, LEAST_FREE)
         return RandomEffect(variance * n_free / (n_free - 2) * np.eye(3), expected)
-    # The mean of what it may be, an inverse Wishart distribution.
+    # The posterior mean, of an inverse Wishart distribution.
     n_images = len(alone)
     return RandomEffect(jitter * n_images / max(n_images - 4, 1), expected)
 

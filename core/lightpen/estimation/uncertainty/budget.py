@@ -384,7 +384,7 @@ def _by_shift_along_normals(bundle: Bundle) -> FloatArray:
     )
     at, shape = bundle.layout.leds, bundle.unknowns.basis.T @ moves
     off = -bundle.covariance[:6, at] @ bundle.prior_information[at, at] @ shape
-    # A move of the pen as a whole is no error of its LEDs: the tip is off by it.
+    # A move of the whole pen is no error of its LEDs but moves the tip.
     off[:3] += np.cross(turn, pen.leds.mean(axis=0) - tip) - shift
     return np.asarray(off)
 

@@ -48,7 +48,7 @@ class CalibrationFile:
     doubts: tuple[StoredMessage, ...]
     origin: Origin | None
     names: Names = NOBODY  # empty of a record that nobody accepted
-    accepted: datetime | None = None  # None for such a record, too
+    accepted: datetime | None = None  # None also for such a record
     reason: str = ""  # for acceptance despite a CHECK, or for reinstating
     change: TipChange | None = None
     restores: str | None = None  # hash of the entry that it reinstates

@@ -7,7 +7,7 @@ from typing import Any
 from lightpen.record.library.tip_library import AnyItem, ItemKind, Library
 from lightpen.record.swings.names import Names
 
-SAME = 1e-6  # mm, between a certified value and that of a verification
+SAME = 1e-6  # mm, between the certified values of library and verification
 CERTIFIED, IN_MM = "certified_", "_mm"  # of the names of such values in its record
 
 

@@ -36,7 +36,7 @@ class ExportFormat(FileFormat):
     """A format of exported calibrations; its `text` takes a `CalibrationFile`."""
 
     description: Message
-    needs_laboratory: bool = False  # `text` takes a `Laboratory`, too
+    needs_laboratory: bool = False  # `text` also takes a `Laboratory`
     has_status: bool = True  # states what the library says of pen and tip
 
     def content(

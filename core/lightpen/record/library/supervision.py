@@ -55,7 +55,7 @@ class Supervision:
     """Limits and guard set by the supervisors of a data folder."""
 
     password: PasswordVerifier | None = None  # without one, anybody may change limits
-    # By the name of the station, as it was written last
+    # By the name of the station, as last written
     limits: Mapping[str, StationLimits] = field(default_factory=dict)
     chain: str = ""  # begun by the first station key; empty without files
     station_keys: tuple[str, ...] = ()  # valid keys, the present one last

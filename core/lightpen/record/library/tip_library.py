@@ -148,12 +148,12 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
     kind: ClassVar[ItemKind] = ItemKind.TIP
 
     ball_diameter_mm: Annotated[float, Meta(gt=0, le=LARGEST_BALL)] | None = None
-    nominal_tip_mm: Vector | None = None  # pen frame; None for that of the LEDs
+    nominal_tip_mm: Vector | None = None  # pen frame; None: the LED file's
     stylus_axis: Vector | None = None  # from ball into pen, of length 1
     axis_origin: AxisOrigin | None = None
     # Since the current tip; None for no limit but the uncertainty of the change
     max_change_mm: Annotated[float, Meta(gt=0, le=LARGEST_CHANGE)] | None = None
-    # `DueRule` of its own; None for that of the station
+    # `DueRule` of its own; None: the station's
     max_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)] | None = None
     max_swings: Annotated[int, Meta(ge=1, le=MOST_SWINGS)] | None = None
     picture: Picture | None = None

@@ -257,7 +257,7 @@ class FolderArchive:
 
     def read(self, file: Path) -> Result:
         """Return the result in a file of the archive."""
-        located = self._data.joinpath  # where an absolute folder stays what it is
+        located = self._data.joinpath  # an absolute folder stays absolute
         return parse_result(read_bytes(file, WHAT, LARGEST_RECORD), file, located)
 
 

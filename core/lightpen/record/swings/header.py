@@ -91,8 +91,8 @@ class Header(Struct, frozen=True, kw_only=True):
     camera_file: FileCopy
     pen_file: FileCopy
     units: str | None = None  # units given for a pen file without units
-    led_diameter_mm: Length | None = None  # replaces that of the pen file
-    nominal_tip_mm: Vector | None = None  # replaces that of the pen file
+    led_diameter_mm: Length | None = None  # replaces the pen file's
+    nominal_tip_mm: Vector | None = None  # replaces the pen file's
     mask_px: tuple[Vector, ...] = ()  # circles of stray light: centre x, y and radius
     settings: Mapping[str, Plain] = {}  # further: exposure, limits, camera
     rig: RigCopies | None = None

@@ -160,7 +160,7 @@ def last_verdict(folder: Path) -> str | None:
     for line in reversed(lines):
         try:
             last = _parse_line(line)
-        except DamagedError:  # torn, or cut by the limit, too
+        except DamagedError:  # torn, or cut by the limit
             return None
         if isinstance(last, VerdictLine):
             return last.verdict

@@ -217,7 +217,7 @@ class RecordWriter:
         """Close the journal and let other writers in."""
         if self._journal.closed:
             return
-        with self._journal, suppress(OSError):  # closing does it, too
+        with self._journal, suppress(OSError):  # closing unlocks it anyway
             unlock_journal(self._journal)
 
     def _write_line(self, entries: Line) -> None:

@@ -37,7 +37,7 @@ MIN_GAP = 4.0  # px between the edges of two LEDs; blur joins closer ones
 class GuidanceInput:
     """Inputs for the choice of the next posture."""
 
-    rig: Rig  # of which one camera must see enough of the pen
+    rig: Rig  # one of its cameras must see enough of the pen
     pen: Pen
     tip_pen: FloatArray  # (3,), mm
     cone_cam: FloatArray  # (3,), mm

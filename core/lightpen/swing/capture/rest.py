@@ -16,7 +16,7 @@ BATCH = 1.0  # s, of images in which the tip must rest
 FULL = 0.8  # of a batch, that its images must span
 MIN_BATCH = 6  # images
 STEADY = 3.0  # median distance of the tip, standard deviations; 1.5 is usual
-MIN_KEPT = 3  # images whose noise is better known than that of the last ones
+MIN_KEPT = 3  # images for a better noise estimate than the last ones give
 
 
 def seat_of(state: SwingState) -> Seat | None:

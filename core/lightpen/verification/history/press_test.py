@@ -47,8 +47,8 @@ MORE_IMAGES = message("press-test.more-images")
 class PressTest:
     """Change of the tip by firm pressure."""
 
-    # (6,), tip in the pen frame and cone in the camera frame, firm less usual,
-    # mm; the cone without the move that comes with that of the tip along the pen
+    # (6,), tip in the pen frame and cone in the camera frame, firm less usual, mm; the
+    # cone without the move caused by that of the tip along the pen
     change: FloatArray
     uncertainty: FloatArray  # (6,), U (k = 2), mm
     assessment: VerificationAssessment
@@ -89,7 +89,7 @@ def press_test(usual: Calibration, firm: Calibration) -> PressTest:
     uneven = 0.5 * (second - first)
     change = 0.5 * (first + second)
     covariance = noise + np.outer(uneven, uneven)
-    # The cone without the move that comes with that of the tip along the pen.
+    # The cone without the move caused by the move of the tip along the pen.
     taken = np.eye(6)
     taken[CONE, ALONG_PEN] = -by_pressure[CONE] / by_pressure[ALONG_PEN]
     change = taken @ change

@@ -52,7 +52,7 @@ class CountingRun(Struct, frozen=True):
     """A run of live touches that counts."""
 
     task: TaskKind
-    folder: str  # of its record, in that of touches
+    folder: str  # of its record, in the folder of touches
     is_last: bool = False  # its task ended with it
 
 

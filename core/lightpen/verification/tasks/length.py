@@ -77,7 +77,7 @@ Ends: TypeAlias = tuple[tuple[ProbedPoint, ...], tuple[ProbedPoint, ...]]
 
 MIN_APART = 0.1  # of the certified length, between two ends
 MAX_WIDE = 0.1  # of the distance of the ends, that touches of one end may scatter
-ANOTHER = 0.1  # of the certified length: the ends are those of another one
+ANOTHER = 0.1  # of the certified length: another length was probed
 OTHER_END = 10.0  # mm from the first
 REFERENCE = 20.0  # degrees Celsius, for which a length is certified
 KNOWN_EXPANSION = 0.1  # U (k = 2) of an expansion coefficient, relative
@@ -125,7 +125,7 @@ class Length(Found):
     """A certified length measured at one or several places."""
 
     runs: tuple[LengthRun, ...]
-    # (N,), U (k = 2) with that of temperature and ball, mm.
+    # (N,), U (k = 2) including temperature and ball, mm.
     certified_uncertainties: FloatArray
     scale: Scale
     tip: TipEvidence

@@ -264,7 +264,7 @@ def _view(instrument: Instrument, c: int, poses: Poses) -> _Derivatives:
         start = at.extrinsics.start + 6 * (c - 1)
         by_turn = np.cross(from_rig[:, :, None], J[..., 3:])
         K[..., start : start + 3], K[..., start + 3 : start + 6] = by_turn, J[..., 3:]
-    # The centre of a disc's image lies off that of the disc with the diameter squared.
+    # The centre of a disc's image deviates by the square of the diameter.
     offset = -modelled - camera.pixels(normalised)
     K[..., at.diameter] = (2 / pen.diameter * offset)[..., None]
     by_led = J[..., 3:] @ R[:, None]

@@ -19,7 +19,7 @@ AnyTask: TypeAlias = VerificationTask[Any, Any]
 TASKS: tuple[AnyTask, ...] = (
     *(FIXED_POINT, CIRCLE, LENGTH, PLANE, SPHERE, ARTICULATION, DRIFT),
 )
-ALL_TASKS: tuple[AnyTask, ...] = (*TASKS, PART)  # with that of the step Measure
+ALL_TASKS: tuple[AnyTask, ...] = (*TASKS, PART)  # with the task of the step Measure
 
 _BY_KIND = {task.kind: task for task in ALL_TASKS}
 

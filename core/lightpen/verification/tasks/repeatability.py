@@ -73,7 +73,7 @@ class RepeatedPoint:
 class Capability:
     """A type-1 gauge study, per coordinate."""
 
-    tolerance: float  # width of that of a coordinate, mm
+    tolerance: float  # width, per coordinate, mm
     cg: FloatArray  # (3,), a fifth of the tolerance over six standard deviations
     cgk: FloatArray | None  # (3,), less the bias; None without a reference
 
