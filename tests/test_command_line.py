@@ -905,7 +905,7 @@ class WitnessingDesktop:
     def languages(self) -> tuple[str, ...]:
         return languages()
 
-    def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
+    def write_report(self, result: Path, out: Path | None, language: str) -> Path:
         self.papers.append((result, out, language))
         return out or Path("named.pdf")
 

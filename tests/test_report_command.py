@@ -19,8 +19,8 @@ from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
     VerificationAssessment,
 )
-from lightpen_app.print_report.verification import verification_paper
-from lightpen_app.reporting import write_paper
+from lightpen_app.print_report.verification import verification_print_report
+from lightpen_app.reporting import write_report
 
 UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
 
@@ -69,13 +69,13 @@ def test_a_verification_is_put_on_paper(
     assert outcome.returncode == 0, outcome.stderr
     assert out.read_bytes().startswith(b"%PDF-1.4")
     content, file = verification.read_bytes(), InputFile(verification, "0" * 64)
-    paper = verification_paper(
+    report = verification_print_report(
         InputFile(verification, file.sha256, content),
         read_verification(content, verification),
         None,
     )
-    assert paper.margins.badges == ("SIMULATED", "CHECK")
-    assert paper.margins.subject == "Pen LP-04, tip T-10, drift"
+    assert report.margins.badges == ("SIMULATED", "CHECK")
+    assert report.margins.subject == "Pen LP-04, tip T-10, drift"
 
 
 def test_a_tampered_verification_is_not_put_on_paper(
@@ -84,7 +84,7 @@ def test_a_tampered_verification_is_not_put_on_paper(
     verification.write_bytes(verification.read_bytes().replace(b"0.003", b"0.001"))
 
     with pytest.raises(FileError, match="damaged"):
-        write_paper(verification, tmp_path / "drift.pdf", "en")
+        write_report(verification, tmp_path / "drift.pdf", "en")
 
 
 def test_a_tampered_record_is_not_put_on_paper(
@@ -94,7 +94,7 @@ def test_a_tampered_record_is_not_put_on_paper(
     record.write_bytes(record_bytes(stated).replace(b'"recorded"', b'"live camera"'))
 
     with pytest.raises(FileError, match="was modified or damaged after it was written"):
-        write_paper(record, out, "en")
+        write_report(record, out, "en")
 
     assert not out.exists()
 

@@ -65,11 +65,11 @@ class Launchers:
 
         return languages()
 
-    def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
+    def write_report(self, result: Path, out: Path | None, language: str) -> Path:
         """Write the calibration report as PDF; return its path."""
-        from lightpen_app.reporting import write_paper
+        from lightpen_app.reporting import write_report
 
-        return write_paper(result, out, language)
+        return write_report(result, out, language)
 
 
 def main() -> int:

@@ -17,15 +17,15 @@ from lightpen_app.print_report.control import (
     read_calibration_file,
     read_kept_verification,
 )
-from lightpen_app.print_report.printing import paper_of, paper_stem, pdf_of
+from lightpen_app.print_report.printing import pdf_of, print_report_of, report_stem
 from lightpen_app.work.settings import Settings, settings_file
 
 
-def write_paper(result: Path, out: Path | None, language: str) -> Path:
+def write_report(result: Path, out: Path | None, language: str) -> Path:
     """Write the report of a calibration or a verification as PDF; return its file.
 
     The result is an accepted one, or what ``lightpen calibrate``, ``verify`` or
-    ``repeatability`` wrote; a file without all that is put on paper is refused. By
+    ``repeatability`` wrote; a file that lacks content of the report is refused. By
     default the report has a name of its own in the current folder.
     """
     if is_verification(read_bytes(result, A_FILE, LARGEST_RECORD)):
@@ -33,20 +33,20 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     found = read_calibration_file(result)
     with _application_in(language):
         content = found.calibration_file, found.reestimated, found.entered
-        pdf = pdf_of(paper_of(*content, _laboratory()))
-    return _written(pdf, paper_stem(found.calibration_file), out)
+        pdf = pdf_of(print_report_of(*content, _laboratory()))
+    return _written(pdf, report_stem(found.calibration_file), out)
 
 
 def _write_verification(file: Path, out: Path | None, language: str) -> Path:
     # Few reports are of one.
     from lightpen_app.print_report.verification import (
-        verification_paper,
+        verification_print_report,
         verification_stem,
     )
 
     found = read_kept_verification(file)
     with _application_in(language):
-        pdf = pdf_of(verification_paper(*found, _laboratory()))
+        pdf = pdf_of(verification_print_report(*found, _laboratory()))
     return _written(pdf, verification_stem(file, found.done), out)
 
 

@@ -53,7 +53,7 @@ def read_calibration_file(file: Path) -> ReportContent:
     """Read the content of the report of a calibration.
 
     Raises `FileError` if the calibration is not the one that was entered, `UsageError`
-    if the file holds none, or not all that is put on paper.
+    if the file holds none, or lacks content of the report.
     """
     calibration_file = with_status(read_calibration(file), local_now())
     reestimated = reestimate_poses(calibration_file.calibration)
@@ -116,30 +116,30 @@ class PrintReportControl(QObject):
 
     def _show(self, found: ReportContent) -> None:
         # Printing takes long to be imported, and few swings are printed.
-        from lightpen_app.print_report.printing import paper_of, paper_stem
+        from lightpen_app.print_report.printing import print_report_of, report_stem
 
-        paper = paper_of(
+        report = print_report_of(
             found.calibration_file,
             found.reestimated,
             found.entered,
             self._place.settings.laboratory(),
         )
-        self._open(paper, paper_stem(found.calibration_file))
+        self._open(report, report_stem(found.calibration_file))
 
     def _show_verification(self, found: KeptVerification) -> None:
         from lightpen_app.print_report.verification import (
-            verification_paper,
+            verification_print_report,
             verification_stem,
         )
 
         stem = verification_stem(found.file.path, found.done)
         laboratory = self._place.settings.laboratory()
-        self._open(verification_paper(*found, laboratory), stem)
+        self._open(verification_print_report(*found, laboratory), stem)
 
-    def _open(self, paper: "PrintReport", stem: str) -> None:
+    def _open(self, report: "PrintReport", stem: str) -> None:
         from lightpen_app.print_report.preview import PrintReportWindow
 
-        window = PrintReportWindow(paper, self._place, stem, self._page)
+        window = PrintReportWindow(report, self._place, stem, self._page)
         window.saved.connect(self.saved)
         window.failed.connect(self.failed)
         window.show()

@@ -85,13 +85,13 @@ def lay_out(
     return tuple(map(tuple, pages))
 
 
-def paint_page(paper: PrintReport, number: int, painter: QPainter) -> None:
+def paint_page(report: PrintReport, number: int, painter: QPainter) -> None:
     """Draw a page in dots, from the corner of the paper."""
     painter.save()
     painter.translate(LEFT_MARGIN, 0)
-    _paint_header(paper.margins, painter)
-    _paint_footer(paper, number, painter)
-    for placed in paper.pages[number - 1]:
+    _paint_header(report.margins, painter)
+    _paint_footer(report, number, painter)
+    for placed in report.pages[number - 1]:
         painter.save()
         painter.translate(0, TOP + placed.top)
         placed.block.paint(painter)
@@ -136,11 +136,11 @@ def _paint_badges(badges: Sequence[str], painter: QPainter) -> None:
         right -= width + BADGE_PADDING
 
 
-def _paint_footer(paper: PrintReport, number: int, painter: QPainter) -> None:
+def _paint_footer(report: PrintReport, number: int, painter: QPainter) -> None:
     top = PAGE_HEIGHT - FOOTER
     painter.setPen(line_pen(LIGHT.edge))
     painter.drawLine(0, round(top), round(WIDTH), round(top))
     area = QRectF(0, top + 25, WIDTH, PrintSize.SMALL)
-    draw_text(painter, area, paper.margins.foot, PrintSize.SMALL, LIGHT.muted)
-    text = translate("paper", "Page {0} of {1}").format(number, paper.n_pages)
+    draw_text(painter, area, report.margins.foot, PrintSize.SMALL, LIGHT.muted)
+    text = translate("paper", "Page {0} of {1}").format(number, report.n_pages)
     draw_text(painter, area, text, PrintSize.SMALL, LIGHT.text, RIGHT)

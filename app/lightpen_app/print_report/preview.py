@@ -35,7 +35,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     def __init__(
         self,
-        paper: PrintReport,
+        report: PrintReport,
         place: SavePlace,
         stem: str,
         parent: QWidget | None = None,
@@ -43,7 +43,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         super().__init__(parent, Qt.WindowType.Window)
         self.setObjectName("paper")
         self.resize(100 * GRID, 110 * GRID)
-        self._paper = paper
+        self._report = report
         self._place = place
         self._stem = stem
         self._saving: Job | None = None
@@ -68,7 +68,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         horizontal_layout(layout, *zoom, 1, self._print, self._save, self._close)
 
         # Connections
-        self._pages.paintRequested.connect(partial(paint_on, paper))
+        self._pages.paintRequested.connect(partial(paint_on, report))
         self._smaller.clicked.connect(self._pages.zoomOut)
         self._larger.clicked.connect(self._pages.zoomIn)
         self._save.clicked.connect(self._ask_file)
@@ -88,7 +88,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         return self._pages.pageCount()
 
     def _retranslate(self) -> None:
-        self.setWindowTitle(self._paper.margins.title)
+        self.setWindowTitle(self._report.margins.title)
         self._pages.setAccessibleName(self.tr("Pages"))
         self._smaller.setText(self.tr("Smaller"))
         self._larger.setText(self.tr("Larger"))
@@ -103,7 +103,7 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
     def write(self, path: Path) -> None:
         """Save it as PDF in a file."""
         self._place.remember(path.parent)
-        pdf = pdf_of(self._paper)
+        pdf = pdf_of(self._report)
         self._saving = job = Job(lambda _: write_whole(path, pdf), self)
         job.start(
             lambda _: self.saved.emit(path), self.failed, ended=self._on_saving_ended
@@ -122,4 +122,4 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     def _on_printer_chosen(self, answer: int) -> None:
         if answer == QDialog.DialogCode.Accepted:
-            paint_on(self._paper, self._printer)
+            paint_on(self._report, self._printer)

@@ -42,7 +42,7 @@ A4 = QPageLayout(
 )
 
 
-def paper_of(
+def print_report_of(
     calibration_file: CalibrationFile,
     reestimated: ReestimatedPoses | None,
     entered: ArchivePlace | None = None,
@@ -59,35 +59,35 @@ def paper_of(
     )
 
 
-def pdf_of(paper: PrintReport) -> bytes:
+def pdf_of(report: PrintReport) -> bytes:
     """Return pages as PDF/A-1b."""
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     writer = QPdfWriter(buffer)
     writer.setPdfVersion(QPagedPaintDevice.PdfVersion.PdfVersion_A1b)
     writer.setResolution(DOTS_AN_INCH)
-    writer.setTitle(f"{paper.margins.title}, {paper.margins.subject}")
-    writer.setAuthor(paper.author)
+    writer.setTitle(f"{report.margins.title}, {report.margins.subject}")
+    writer.setAuthor(report.author)
     writer.setCreator("Lightpen")
-    paint_on(paper, writer)
+    paint_on(report, writer)
     buffer.close()
     return bytes(buffer.data().data()).replace(CMYK, IN_ITS_PLACE)
 
 
-def paint_on(paper: PrintReport, device: QPagedPaintDevice) -> None:
+def paint_on(report: PrintReport, device: QPagedPaintDevice) -> None:
     """Draw all pages on a device that has pages, such as a printer."""
     device.setPageLayout(A4)
     painter = QPainter(device)
     times = device.logicalDpiX() / DOTS_AN_INCH
     painter.scale(times, times)
-    for number in range(1, paper.n_pages + 1):
+    for number in range(1, report.n_pages + 1):
         if number > 1:
             device.newPage()
-        paint_page(paper, number, painter)
+        paint_page(report, number, painter)
     painter.end()
 
 
-def paper_stem(calibration_file: CalibrationFile) -> str:
+def report_stem(calibration_file: CalibrationFile) -> str:
     """Return the beginning of the default file name."""
     if calibration_file.accepted is None:
         return calibration_file.path.stem

@@ -61,7 +61,7 @@ N_DIGITS = 6  # of another number
 LONGEST_TABLE = 50  # rows
 
 
-def verification_paper(
+def verification_print_report(
     file: InputFile,
     done: StoredVerification,
     entered: ArchivePlace | None,

@@ -33,7 +33,7 @@ class Desktop(Protocol):
     def languages(self) -> tuple[str, ...]:
         """Return the languages of the program, English first."""
 
-    def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
+    def write_report(self, result: Path, out: Path | None, language: str) -> Path:
         """Write the calibration report as PDF; return its path."""
 
 
@@ -102,7 +102,7 @@ def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
 def _report(desktop: Desktop, options: argparse.Namespace) -> None:
     if options.out is not None and are_same(options.result, options.out):
         raise UsageError("cli.report-over-result", out=options.out)
-    path = desktop.write_paper(options.result, options.out, options.language)
+    path = desktop.write_report(options.result, options.out, options.language)
     print(shown(f"The record is in {path}."))
 
 

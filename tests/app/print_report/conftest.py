@@ -32,7 +32,7 @@ from lightpen_app.print_report.pages import (
     PrintReport,
     paint_page,
 )
-from lightpen_app.print_report.printing import paper_of
+from lightpen_app.print_report.printing import print_report_of
 
 SVG = "{http://www.w3.org/2000/svg}text"
 
@@ -101,7 +101,7 @@ def printed(tmp_path: Path) -> Callable[..., PrintReport]:
             read_calibration(path), traced=traced, library_status=status
         )
         poses = reestimate_poses(calibration_file.calibration)
-        return paper_of(calibration_file, poses, entered, laboratory)
+        return print_report_of(calibration_file, poses, entered, laboratory)
 
     return put_on_paper
 

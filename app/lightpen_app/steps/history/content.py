@@ -58,7 +58,7 @@ class HistoryContent(Translated, QWidget):
         self._folder, self._now = workbench.folder, workbench.around.now
         self._logbook = workbench.run.logbook
         self._reader = HistoryReader(self._logbook, self)
-        self._paper = PrintReportControl(workbench.save_place, self)
+        self._print_report = PrintReportControl(workbench.save_place, self)
         self._trend = Trend()
         self._followed: EntryFilter | None = None  # whose trend it is
 
@@ -97,9 +97,9 @@ class HistoryContent(Translated, QWidget):
         self.table.selection_changed.connect(self._on_selection_changed)
         self._entry.note_given.connect(self._enter_note)
         self._entry.restore_requested.connect(self._restore)
-        self._entry.paper_requested.connect(self._show_paper)
-        self._paper.saved.connect(self._on_paper_saved)
-        self._paper.failed.connect(self._show_fault)
+        self._entry.report_requested.connect(self._show_report)
+        self._print_report.saved.connect(self._on_report_saved)
+        self._print_report.failed.connect(self._show_fault)
         self._selection.adjust_requested.connect(self._adjust_together)
         self._selection.report_requested.connect(self._report_study)
         self._due.rule_changed.connect(self._on_rule_changed)
@@ -122,7 +122,7 @@ class HistoryContent(Translated, QWidget):
     def shut_down(self) -> None:
         """Cancel running jobs."""
         self._reader.shut_down()
-        self._paper.shut_down()
+        self._print_report.shut_down()
         self._whole.shut_down()
 
     def _show_fault(self, sentence: str) -> None:
@@ -287,14 +287,14 @@ class HistoryContent(Translated, QWidget):
 
     # What is printed
 
-    def _show_paper(self, entry: StoredEntry) -> None:
+    def _show_report(self, entry: StoredEntry) -> None:
         result, folder = entry.entry.event.result, self._folder
         if result is None:
             return
         if entry.entry.event.kind is Kind.VERIFICATION:
-            self._paper.show_verification(folder / result.place)
+            self._print_report.show_verification(folder / result.place)
         else:
-            self._paper.show(lambda: folder / result.place)
+            self._print_report.show(lambda: folder / result.place)
 
     def _report_study(self) -> None:
         """Keep and enter the repeatability that is shown, and show its report."""
@@ -312,10 +312,10 @@ class HistoryContent(Translated, QWidget):
 
         job = Job(keep, self)
 
-        job.succeeded.connect(self._paper.show_verification)
+        job.succeeded.connect(self._print_report.show_verification)
         job.start(lambda _: self.read_anew(), self._show_fault)
 
-    def _on_paper_saved(self, path: Path) -> None:
+    def _on_report_saved(self, path: Path) -> None:
         self._notices.show_status(self.tr("Saved in {0}").format(path.parent))
 
 

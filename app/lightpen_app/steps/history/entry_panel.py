@@ -40,7 +40,7 @@ class EntryPanel(Translated, QWidget):
     note_given = Signal(object, str)  # Written, str: a note on an entry
     # Written, str, Signature or None: entry whose tip to reinstate, and reason.
     restore_requested = Signal(object, str, object)
-    paper_requested = Signal(object)  # Written: entry whose printed report to show
+    report_requested = Signal(object)  # Written: entry whose printed report to show
 
     def __init__(self) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ class EntryPanel(Translated, QWidget):
         self._texts = (self._what, self._who, self._why, self._notes, self._kept)
         self._note = PushButton()
         self._restore = PushButton()
-        self._paper = PushButton()
+        self._report = PushButton()
         self._reason = ReasonBar()
 
         # Layout
@@ -72,13 +72,13 @@ class EntryPanel(Translated, QWidget):
             self, self._changed, *self._texts, spacing=GRID // 2, margins=margins
         )
         layout.addSpacing(GRID)
-        horizontal_layout(layout, self._note, self._restore, self._paper, 1)
+        horizontal_layout(layout, self._note, self._restore, self._report, 1)
         fill(layout, self._reason, 1)
 
         # Connections
         self._note.clicked.connect(lambda: self._ask(restores=False))
         self._restore.clicked.connect(lambda: self._ask(restores=True))
-        self._paper.clicked.connect(self._ask_paper)
+        self._report.clicked.connect(self._request_report)
         self._reason.given.connect(self._on_given)
 
         self._retranslate()
@@ -140,9 +140,9 @@ class EntryPanel(Translated, QWidget):
                 self.tr("Cancel"),
             )
 
-    def _ask_paper(self) -> None:
+    def _request_report(self) -> None:
         if self._line is not None and self._line.entry is not None:
-            self.paper_requested.emit(self._line.entry)
+            self.report_requested.emit(self._line.entry)
 
     def _on_given(self, text: str, signature: Signature | None) -> None:
         if self._restores:
@@ -173,13 +173,13 @@ class EntryPanel(Translated, QWidget):
             nothing or self._why_not_restored(line), self.tr("Adds a new entry")
         )
         kind = None if entry is None else entry.entry.event.kind
-        self._paper.setText(
+        self._report.setText(
             self.tr("Verification report...")
             if kind is Kind.VERIFICATION
             else self.tr("Calibration report...")
         )
-        self._paper.set_why_not(
-            nothing or self._why_not_on_paper(line),
+        self._report.set_why_not(
+            nothing or self._why_no_report(line),
             self.tr("Preview, save as PDF, or print"),
         )
 
@@ -228,7 +228,7 @@ class EntryPanel(Translated, QWidget):
             return self.tr("This tip is current.")
         return ""
 
-    def _why_not_on_paper(self, line: Line | None) -> str:
+    def _why_no_report(self, line: Line | None) -> str:
         if line is None or line.entry is None:
             return ""
         if line.entry.entry.event.kind not in (*IN_FORCE_BY, Kind.VERIFICATION):

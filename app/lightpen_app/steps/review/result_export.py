@@ -45,22 +45,22 @@ class ResultExport(QObject):
         self._draw_plots = draw_plots
         self._page = page
         self._saving: Job | None = None
-        self._paper = PrintReportControl(place, page)
+        self._print_report = PrintReportControl(place, page)
 
         # Connections
-        self._paper.saved.connect(lambda path: self._report_saved(path.parent))
-        self._paper.failed.connect(self.failed)
+        self._print_report.saved.connect(lambda path: self._report_saved(path.parent))
+        self._print_report.failed.connect(self.failed)
 
     def follow(self, tools: ResultTools) -> None:
         """Connect the requests of the buttons."""
         tools.folder_requested.connect(self._open_folder)
         tools.copy_requested.connect(self._copy_tip)
         tools.save_requested.connect(self._ask_laboratory)
-        tools.paper_requested.connect(self._show_paper)
+        tools.report_requested.connect(self._show_report)
 
     def shut_down(self) -> None:
         """Disconnect from all signals."""
-        self._paper.shut_down()
+        self._print_report.shut_down()
         if self._saving is not None:
             self._saving.cancel()
 
@@ -128,11 +128,11 @@ class ResultExport(QObject):
         self._saving = job = Job(write, self)
         job.start(lambda _: self._report_saved(folder), self.failed)
 
-    def _show_paper(self) -> None:
+    def _show_report(self) -> None:
         """Open the report of the stored result."""
         result, archive = self._run.status.result, self._run.archive
         if result is not None:
-            self._paper.show(lambda: archive.file_of(result))
+            self._print_report.show(lambda: archive.file_of(result))
 
     def _report_saved(self, folder: Path) -> None:
         self.message_sent.emit(self.tr("Saved in {0}").format(folder))

@@ -31,7 +31,7 @@ class ResultTools(Translated, QWidget):
     folder_requested = Signal()  # open the folder of the swing
     copy_requested = Signal()  # copy the tip to the clipboard
     save_requested = Signal(object)  # Export
-    paper_requested = Signal()  # show the printed report
+    report_requested = Signal()  # show the printed report
     press_requested = Signal()  # start the press test
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class ResultTools(Translated, QWidget):
         self._actions = [(export, menu.addAction("")) for export in EXPORTS]
         menu.addSeparator()
         menu.setToolTipsVisible(True)
-        self._paper, self._folder = menu.addAction(""), menu.addAction("")
+        self._report, self._folder = menu.addAction(""), menu.addAction("")
         self._save.setMenu(menu)
         self._press = PushButton()
 
@@ -58,7 +58,7 @@ class ResultTools(Translated, QWidget):
             action.triggered.connect(
                 lambda _=False, export=export: self.save_requested.emit(export)
             )
-        self._paper.triggered.connect(self.paper_requested)
+        self._report.triggered.connect(self.report_requested)
         self._folder.triggered.connect(self.folder_requested)
         self._press.clicked.connect(self.press_requested)
 
@@ -71,11 +71,11 @@ class ResultTools(Translated, QWidget):
         words = self.tr("Save results and plots, named by pen, tip and date")
         self._save.set_why_not(why_not, words)
 
-    def set_paper_why_not(self, why_not: str) -> None:
+    def set_report_why_not(self, why_not: str) -> None:
         """Disable the report with a reason, or enable it."""
-        self._paper.setEnabled(not why_not)
+        self._report.setEnabled(not why_not)
         tooltip = self.tr("Preview, save as PDF, or print")
-        self._paper.setToolTip(why_not or tooltip)
+        self._report.setToolTip(why_not or tooltip)
 
     def set_press_why_not(self, why_not: str) -> None:
         """Disable the press test with a reason, or enable it."""
@@ -86,7 +86,7 @@ class ResultTools(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._press.setText(self.tr("Press test"))
-        self._paper.setText(self.tr("Calibration report..."))
+        self._report.setText(self.tr("Calibration report..."))
         self._folder.setText(self.tr("Open folder"))
         self._folder.setToolTip(self.tr("Open the folder of the swing"))
         self._copy.setText(self.tr("Copy tip"))

@@ -104,7 +104,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.accept.setVisible(state.takes_reason)
         self.accept.set_why_not(state.why_not_accepted, self.tr("Accept with a reason"))
         self.tools.set_why_not(state.why_not_saved)
-        self.tools.set_paper_why_not(state.why_not_printed)
+        self.tools.set_report_why_not(state.why_not_printed)
         self.tools.set_press_why_not(state.why_not_pressed)
         for button in (self.repeat, self.capture_more):
             is_main = button.text() == state.main.text

@@ -66,7 +66,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._instruction.setMinimumHeight(4 * GRID)
         self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
         self._report = PushButton()
-        self._paper = PrintReportControl(workbench.save_place, self)
+        self._print_report = PrintReportControl(workbench.save_place, self)
         self._undo = PushButton()
         self._undo.setShortcut(QKeySequence.StandardKey.Undo)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
@@ -99,8 +99,8 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._question.agreed.connect(self._begin_anew)
         self._accept.clicked.connect(self._ask_reason)
         self._report.clicked.connect(self._on_report_clicked)
-        self._paper.failed.connect(partial(workbench.notifications.notify, self))
-        self._paper.saved.connect(self._on_saved)
+        self._print_report.failed.connect(partial(workbench.notifications.notify, self))
+        self._print_report.saved.connect(self._on_saved)
         self._reason.given.connect(self._on_reason_given)
         self._reason.declined.connect(self._accept.setFocus)
 
@@ -182,7 +182,9 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
     def _on_report_clicked(self) -> None:
         """Show the report of the only task, or of the conclusion of several."""
         *tasks, conclusion = self._run.status.files
-        self._paper.show_verification(tasks[0] if len(tasks) == 1 else conclusion)
+        self._print_report.show_verification(
+            tasks[0] if len(tasks) == 1 else conclusion
+        )
 
     def _on_saved(self, path: Path) -> None:
         words = self.tr("Saved: {0}").format(path)

@@ -1489,7 +1489,7 @@ def test_a_result_that_is_gone_is_not_put_on_paper(
     shutil.rmtree(bed.workbench.run.archive.folder)
 
     with qtbot.waitSignal(bed.workbench.notifications.raised) as reported:
-        the(page, ResultTools).paper_requested.emit()
+        the(page, ResultTools).report_requested.emit()
 
     assert "LP-04" in reported.args[0]
     assert page.findChildren(PrintReportWindow) == []
