@@ -17,7 +17,7 @@ class SizeClass:
     is_narrow: bool = False
     is_low: bool = False
     is_large: bool = False
-    is_vast: bool = False  # whether there is room for more than the essentials
+    is_very_large: bool = False  # whether there is room for more than the essentials
 
     @property
     def margin(self) -> int:
@@ -39,7 +39,7 @@ class ResponsiveLayout(WidgetMixin):
     low_below = 0
     # Sizes from which the layout is large or very large; None: never.
     large_from: QSize | None = None
-    vast_from: QSize | None = None
+    very_large_from: QSize | None = None
     _room = SizeClass()
 
     def _use_room(self) -> None:
@@ -54,7 +54,7 @@ class ResponsiveLayout(WidgetMixin):
             is_narrow=size.width() < self.narrow_below,
             is_low=size.height() < self.low_below,
             is_large=_holds(size, self.large_from),
-            is_vast=_holds(size, self.vast_from),
+            is_very_large=_holds(size, self.very_large_from),
         )
         if room != self._room:
             self._room = room

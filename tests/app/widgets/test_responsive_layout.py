@@ -10,7 +10,7 @@ from lightpen_app.widgets.responsive_layout import ResponsiveLayout, SizeClass
 
 class Arranged(ResponsiveLayout, QWidget):
     narrow_below, low_below = 300, 200
-    large_from, vast_from = QSize(600, 500), QSize(1200, 900)
+    large_from, very_large_from = QSize(600, 500), QSize(1200, 900)
 
     def __init__(self) -> None:
         super().__init__()
@@ -48,6 +48,6 @@ def test_plenty_of_room_is_reported_where_there_is_plenty_both_ways(
 
     assert widget.arranged_for == [
         SizeClass(is_large=True),
-        SizeClass(is_large=True, is_vast=True),
+        SizeClass(is_large=True, is_very_large=True),
         SizeClass(),
     ]

@@ -25,7 +25,10 @@ from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.undo_buttons import UndoButtons
 from lightpen_app.work.workbench import Workbench
 
-SHARES, VAST_SHARES = (40, 29, 31), (26, 32, 42)  # of table, pen in space and image
+SHARES, VERY_LARGE_SHARES = (
+    (40, 29, 31),
+    (26, 32, 42),
+)  # of table, pen in space and image
 
 
 class LedsPage(ResponsiveLayout, Page):
@@ -39,7 +42,7 @@ class LedsPage(ResponsiveLayout, Page):
     shows_images = True
     narrow_below = 110 * GRID  # px; then two panels are side by side, not three
     low_below = 62 * GRID  # px; then it scrolls
-    vast_from = QSize(240 * GRID, 130 * GRID)  # px; then the live image is larger
+    very_large_from = QSize(240 * GRID, 130 * GRID)  # px; then the live image is larger
 
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
@@ -167,7 +170,7 @@ class LedsPage(ResponsiveLayout, Page):
 
     def _share_room(self) -> None:
         """Divide the width; on a very large page the table gets its full width."""
-        shares = VAST_SHARES if self._room.is_vast else SHARES
+        shares = VERY_LARGE_SHARES if self._room.is_very_large else SHARES
         panels = self._table, self._space, self._match
         for panel, share in zip(panels, shares, strict=True):
             self._panels.setStretchFactor(panel, share)

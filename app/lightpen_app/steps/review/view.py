@@ -37,7 +37,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     """Shows a solved swing: result and details."""
 
     narrow_below = 112 * GRID  # px; then it has the result in a tab
-    vast_from = QSize(190 * GRID, 100 * GRID)  # px; then the result is larger
+    very_large_from = QSize(190 * GRID, 100 * GRID)  # px; then the result is larger
 
     def __init__(self, run: SwingRun, place: SavePlace) -> None:
         super().__init__()
@@ -169,7 +169,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     def _use_room(self) -> None:
         """Place the result beside the tabs, or as first tab of a narrow page."""
         side = self._result_side
-        self.result.set_large(self._room.is_vast)
+        self.result.set_large(self._room.is_very_large)
         set_stacked(self._buttons, not self._room.is_narrow)
         if self._room.is_narrow:
             side.setMinimumWidth(0)
@@ -177,8 +177,8 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             self.tabs.insertTab(0, side, self.tr("Result"))
             self.tabs.setCurrentIndex(0)
         else:
-            is_vast = self._room.is_vast
-            side.setFixedWidth(LARGE_RESULT_WIDTH if is_vast else RESULT_WIDTH)
+            is_very_large = self._room.is_very_large
+            side.setFixedWidth(LARGE_RESULT_WIDTH if is_very_large else RESULT_WIDTH)
             self._columns.insertWidget(0, side)
             if side.parentWidget() is not None:  # else it would be a window
                 side.show()  # a tab that is not the current one is hidden

@@ -74,5 +74,5 @@ def _make_trend() -> "TrendPanel":
 
 def _make_pictures() -> Pictures:
     pictures = Pictures()
-    pictures.set_vast()
+    pictures.set_very_large()
     return pictures

@@ -34,7 +34,7 @@ class StartPage(ResponsiveLayout, Page):
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
-    vast_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
+    very_large_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
     def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
         super().__init__()
@@ -188,7 +188,7 @@ class StartPage(ResponsiveLayout, Page):
         self._day.set_narrow(is_narrow)
         self._setup.set_narrow(is_narrow)
         self._result.set_room(self._room)
-        self._large.setVisible(self._room.is_vast)
+        self._large.setVisible(self._room.is_very_large)
         self._last.show_trend()
 
     @override

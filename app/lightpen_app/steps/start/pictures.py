@@ -49,7 +49,7 @@ class Pictures(Translated, QWidget):
 
         self._retranslate()
 
-    def set_vast(self) -> None:
+    def set_very_large(self) -> None:
         """Set the large layout: steps beside larger pictures."""
         for picture in self._pictures:
             picture.setMaximumHeight(ANY_HEIGHT)

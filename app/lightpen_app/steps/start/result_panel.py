@@ -117,7 +117,7 @@ class LastResultPanel(Translated, QGroupBox):
 
     def set_room(self, room: SizeClass) -> None:
         """Scale its figures to the size of the window."""
-        age, words, figures = SIZES[room.is_large + room.is_vast]
+        age, words, figures = SIZES[room.is_large + room.is_very_large]
         set_size(self._age, age)
         for label in (self._when, *self._heads):
             set_size(label, words)

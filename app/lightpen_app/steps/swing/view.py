@@ -32,7 +32,10 @@ DIAL_SHARE, SIDE_SHARE = 2, 3  # of the width
 SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
-VAST_SIDE_SHARES, VAST_ROW_SHARES = (5, 0, 6), (1, 1)  # and where there is more
+VERY_LARGE_SIDE_SHARES, VERY_LARGE_ROW_SHARES = (
+    (5, 0, 6),
+    (1, 1),
+)  # and where there is more
 PEN_PLACE = 3  # below the count, its bar and its note
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
@@ -45,7 +48,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
     large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
-    vast_from = QSize(240 * GRID, 130 * GRID)  # px; then they are larger still
+    very_large_from = QSize(240 * GRID, 130 * GRID)  # px; then they are larger still
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -169,7 +172,7 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
             self._numbers.addWidget(self._banner)
             self._side.addWidget(self._plots, 1, 0, 1, 3)
             self._side.addWidget(self._image, 0, 2)
-        if self._room.is_vast:
+        if self._room.is_very_large:
             self._numbers.insertWidget(PEN_PLACE, self._pen, 100)
         else:
             self._side.addWidget(self._pen, 0, 1)
@@ -196,8 +199,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         columns, rows = SIDE_SHARES, ROW_SHARES
         if self._is_small:
             columns, rows = (*columns[:2], 0), (1, 0)
-        elif self._room.is_vast:
-            columns, rows = VAST_SIDE_SHARES, VAST_ROW_SHARES
+        elif self._room.is_very_large:
+            columns, rows = VERY_LARGE_SIDE_SHARES, VERY_LARGE_ROW_SHARES
         elif self._room.is_large:
             columns, rows = LARGE_SIDE_SHARES, LARGE_ROW_SHARES
         for column, share in enumerate(columns):

@@ -61,18 +61,18 @@ _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
 class SwingWords(QObject):
     """Puts a snapshot of a swing into words, signs and numbers."""
 
-    def operator_value(self, moment: SwingViewState) -> OperatorValue:
+    def operator_value(self, view: SwingViewState) -> OperatorValue:
         """Return the content of page and operator view."""
-        instruction = self._current_instruction(moment)
+        instruction = self._current_instruction(view)
         return OperatorValue(
             instruction=instruction.short,
             hint=instruction.hint,
-            state=self._banner(moment),
-            count=self._count(moment),
-            time_left=self._time_left(moment),
-            fraction=moment.fraction,
-            keys=self._keys(moment),
-            dial=moment.dial,
+            state=self._banner(view),
+            count=self._count(view),
+            time_left=self._time_left(view),
+            fraction=view.fraction,
+            keys=self._keys(view),
+            dial=view.dial,
         )
 
     def resting_value(self) -> OperatorValue:
@@ -105,114 +105,114 @@ class SwingWords(QObject):
             dial=DialValue(),
         )
 
-    def note(self, moment: SwingViewState) -> str:
+    def note(self, view: SwingViewState) -> str:
         """Return the text beside the count: time, limit and unused images."""
-        text = self.tr("at most {0} images").format(moment.setup.limits.max_images)
-        if moment.setup.is_recording:
-            text = self._read(moment) if moment.state.phase in ENDED else ""
+        text = self.tr("at most {0} images").format(view.setup.limits.max_images)
+        if view.setup.is_recording:
+            text = self._read(view) if view.state.phase in ENDED else ""
             text = text or self.tr("recorded images")
-        elif moment.state.phase in ENDED:
+        elif view.state.phase in ENDED:
             text = ""
-        n_dropped = sum(moment.state.n_dropped.values())
+        n_dropped = sum(view.state.n_dropped.values())
         rejected = self.tr("{0} rejected").format(n_dropped) if n_dropped else ""
-        parts = self._time_left(moment), text, rejected, self._why_more(moment)
+        parts = self._time_left(view), text, rejected, self._why_more(view)
         return PARTED.join(filter(None, parts))
 
-    def _why_more(self, moment: SwingViewState) -> str:
+    def _why_more(self, view: SwingViewState) -> str:
         """Return why more images are to go than before."""
-        is_counted = moment.state.phase is Phase.CAPTURING
-        if not is_counted or moment.to_go is None or not moment.to_go.has_risen:
+        is_counted = view.state.phase is Phase.CAPTURING
+        if not is_counted or view.to_go is None or not view.to_go.has_risen:
             return ""
-        short = moment.short
+        short = view.short
         if short.n_for_uncertainty >= short.n_more:
             return self.tr("More images needed: U (k = 2) has increased")
         return self.tr("More images needed to complete the postures")
 
-    def warning(self, moment: SwingViewState) -> StatusMessage:
+    def warning(self, view: SwingViewState) -> StatusMessage:
         """Return a warning that no swing can resolve."""
-        kept = moment.state.kept
-        why = out_of_reach(moment.setup.limits, moment.state, moment.short)
+        kept = view.state.kept
+        why = out_of_reach(view.setup.limits, view.state, view.short)
         if len(kept) >= LEAST_JUDGED and kept.sigma > USUAL_SIGMA:
             why = message(Code.LEDS_MISFIT, sigma=kept.sigma, usual=USUAL_SIGMA)
-        elif moment.has_unfit_spots and moment.state.phase in (Phase.WAIT, Phase.SEEN):
-            n_leds = moment.setup.pen.n_leds
+        elif view.has_unfit_spots and view.state.phase in (Phase.WAIT, Phase.SEEN):
+            n_leds = view.setup.pen.n_leds
             why = message("diagnosis.spots-do-not-fit", n_needed=n_leds, n_leds=n_leds)
-        is_asked = not moment.setup.is_recording
-        if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
+        is_asked = not view.setup.is_recording
+        if why is None or not is_asked or view.state.phase is Phase.VERDICT:
             return StatusMessage()
         return StatusMessage.warning(worded(why))
 
-    def pen_posture(self, moment: SwingViewState) -> DisplayedPosture | None:
-        """Return the view of the pen in space; None if its tip is unknown."""
-        pen, seat = moment.setup.pen, moment.state.kept.seat or moment.state.seat
+    def pen_posture(self, view: SwingViewState) -> DisplayedPosture | None:
+        """Return the posture of the drawn pen; None if its tip is unknown."""
+        pen, seat = view.setup.pen, view.state.kept.seat or view.state.seat
         tip = pen.nominal_tip if seat is None else seat.tip_pen
         if tip is None:
             return None
-        dial = moment.dial
+        dial = view.dial
         return DisplayedPosture(pen, tip, dial.posture, dial.target, dial.heading)
 
-    def _current_instruction(self, moment: SwingViewState) -> Instruction:
-        state = moment.state
+    def _current_instruction(self, view: SwingViewState) -> Instruction:
+        state = view.state
         message, heading = state.message, state.heading
-        if moment.lacks_images and state.pause is Pause.BY_USER:
+        if view.lacks_images and state.pause is Pause.BY_USER:
             hint = self.tr(
                 "The camera sends no images. No data is lost. Press Space to "
                 "continue when images are received."
             )
             return replace(self._no_images(), hint=hint)
-        if moment.lacks_images:
+        if view.lacks_images:
             return self._no_images()
-        if moment.is_unsolved:
+        if view.is_unsolved:
             return Instruction(
                 self.tr("Not computed"),
                 self.tr("The images are saved. Compute the tip again or start over."),
             )
         instruction = phrase(message, heading)
-        if moment.is_accepted:
+        if view.is_accepted:
             return Instruction(
                 self.tr("Accepted"), self.tr("You can put the pen down.")
             )
-        if moment.verdict is not None:
-            return self._next_step(moment, moment.verdict)
+        if view.verdict is not None:
+            return self._next_step(view, view.verdict)
         if state.phase is Phase.VERDICT:
             return Instruction(instruction.short)  # the banner has the reason
-        if moment.is_away and state.pause is Pause.BY_USER:
+        if view.is_away and state.pause is Pause.BY_USER:
             hint = self.tr("Return to the step Swing at the computer to continue.")
             return Instruction(instruction.short, hint)
-        if moment.has_fault and state.pause is Pause.BY_USER:
+        if view.has_fault and state.pause is Pause.BY_USER:
             hint = self.tr(
                 "An image could not be recorded (see the message at the top). "
                 "Correct the cause, then press Space."
             )
             return Instruction(instruction.short, hint)
-        if message.code == Code.SOLVING and moment.setup.is_recording:
+        if message.code == Code.SOLVING and view.setup.is_recording:
             return Instruction(instruction.short, self.tr("Computing the tip"))
-        if message.code == Code.SHOW_PEN and moment.is_simulated:
+        if message.code == Code.SHOW_PEN and view.is_simulated:
             hint = self.tr(
                 "Let the simulated operator swing; or press Seat and tilt the pen "
                 "by dragging the dial."
             )
             return Instruction(instruction.short, hint)
         if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
-            instruction = lean_phrase(state.target, moment.posture, heading)
-        if moment.setup.is_press_test and message.code in PRESSED:
+            instruction = lean_phrase(state.target, view.posture, heading)
+        if view.setup.is_press_test and message.code in PRESSED:
             hint = self.tr("Press test: press the tip firmly into the cone.")
             return replace(instruction, hint=hint)
         return instruction
 
-    def _next_step(self, moment: SwingViewState, verdict: Verdict) -> Instruction:
+    def _next_step(self, view: SwingViewState, verdict: Verdict) -> Instruction:
         steps = {
             Grade.PASS: self.tr("Done"),
             Grade.CHECK: self.tr("Check needed"),
             Grade.REPEAT: self.tr("Repeat swing"),
         }
-        step, is_recording = steps[verdict.grade], moment.setup.is_recording
+        step, is_recording = steps[verdict.grade], view.setup.is_recording
         can_go_on = verdict.next_step is NextStep.CAPTURE_MORE and not is_recording
         if not verdict.can_be_accepted and can_go_on:
             step = self.tr("Capture more")
-        if moment.is_away and is_recording:
+        if view.is_away and is_recording:
             hint = self.tr("Continue at the computer.")
-        elif moment.is_away:
+        elif view.is_away:
             hint = self.tr("Put the pen down. Continue at the computer.")
         elif is_recording:
             hint = self.tr("Continue with the review.")
@@ -229,92 +229,92 @@ class SwingWords(QObject):
             ),
         )
 
-    def _banner(self, moment: SwingViewState) -> State:
-        state = moment.state
+    def _banner(self, view: SwingViewState) -> State:
+        state = view.state
         word, (sign, tone) = phase_text(state.phase, state.pause), _LOOKS[state.phase]
         fraction = None
-        if moment.lacks_images:
+        if view.lacks_images:
             return State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)
-        if moment.is_unsolved:
+        if view.is_unsolved:
             word, sign, tone = self.tr("STOPPED"), Sign.PAUSE, Tone.WARN
         elif state.phase is Phase.SOLVING:
-            fraction = moment.solving
+            fraction = view.solving
         elif state.phase is Phase.COUNTDOWN:
             fraction = min((state.time - state.since) / COUNTDOWN, 1.0)
-        elif state.phase is Phase.CAPTURING and moment.setup.is_recording:
+        elif state.phase is Phase.CAPTURING and view.setup.is_recording:
             word, tone = self.tr("READING"), Tone.ACTIVE
         elif state.phase is Phase.CAPTURING and has_just_slipped(state):
             word, sign, tone = self.tr("TIP SLIPPED"), Sign.WARNING, Tone.BAD
         elif state.phase is Phase.CAPTURING and state.message.code in FLAWS:
             word, sign, tone = self.tr("NOT SAVED"), Sign.WARNING, Tone.WARN
         elif state.phase is Phase.VERDICT:
-            return self._verdict(moment)
+            return self._verdict(view)
         # What the last image shows is no news beside the pen being lost.
-        seen = "" if state.pause is Pause.LOST else moment.seen
+        seen = "" if state.pause is Pause.LOST else view.seen
         return State(word, seen, sign, tone, fraction)
 
-    def _verdict(self, moment: SwingViewState) -> State:
-        if moment.verdict is None:
+    def _verdict(self, view: SwingViewState) -> State:
+        if view.verdict is None:
             return State(
                 phase_text(Phase.VERDICT),
-                phrase(moment.state.message, moment.state.heading).hint,
+                phrase(view.state.message, view.state.heading).hint,
                 *_LOOKS[Phase.VERDICT],
             )
-        if moment.is_accepted:
-            instruction = accepted_phrase(moment.origin)
+        if view.is_accepted:
+            instruction = accepted_phrase(view.origin)
             words = instruction.hint or self.tr("The tip is now in use.")
-            return State(instruction.short, words, *GRADE_MARKS[moment.verdict.grade])
-        instruction = phrase(moment.verdict.reason, moment.state.heading)
-        grade = moment.verdict.grade
+            return State(instruction.short, words, *GRADE_MARKS[view.verdict.grade])
+        instruction = phrase(view.verdict.reason, view.state.heading)
+        grade = view.verdict.grade
         sign, tone = GRADE_MARKS[grade]
         word = grade_text(grade)
-        fraction = moment.stillness if moment.asks_upright else 0.0
+        fraction = view.stillness if view.asks_upright else 0.0
         return State(word, instruction.hint, sign, tone, fraction or None)
 
-    def _count(self, moment: SwingViewState) -> str:
-        state, n_kept = moment.state, moment.state.n_kept
+    def _count(self, view: SwingViewState) -> str:
+        state, n_kept = view.state, view.state.n_kept
         if state.phase is Phase.COUNTDOWN:
             return str(state.message.values["seconds"])
         if state.phase in ENDED:
             return n_images_text(n_kept)
-        if moment.setup.is_recording:
-            return self._read(moment)
+        if view.setup.is_recording:
+            return self._read(view)
         if not isfinite(state.kept.uncertainty):
-            least = moment.setup.limits.min_images
+            least = view.setup.limits.min_images
             return self.tr("{0} of {1} (minimum)").format(n_kept, least)
         words = self.tr("{0} of about {1} images")
-        return words.format(n_kept, moment.remaining.n_in_all)
+        return words.format(n_kept, view.remaining.n_in_all)
 
-    def _read(self, moment: SwingViewState) -> str:
+    def _read(self, view: SwingViewState) -> str:
         """Return the progress of reading a recording; empty before the first image."""
-        progress = moment.state.progress
+        progress = view.state.progress
         if not progress.n_images:
             return ""
         words = self.tr("{0} of {1} images loaded")
         return words.format(progress.n_read, progress.n_images)
 
-    def _time_left(self, moment: SwingViewState) -> str:
-        state, is_recording = moment.state, moment.setup.is_recording
+    def _time_left(self, view: SwingViewState) -> str:
+        state, is_recording = view.state, view.setup.is_recording
         is_on = state.phase is Phase.CAPTURING and not is_recording
         if not is_on or not isfinite(state.kept.uncertainty):
             return ""
         times = state.kept.times
         period = images_period(times[times > state.time - PACE_S])
-        if period is None or moment.lacks_images:
+        if period is None or view.lacks_images:
             return ""
-        seconds = moment.n_more * period
+        seconds = view.n_more * period
         if seconds > LONG_S:
             return self.tr("about {0} min left").format(ceil(seconds / 60))
         return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
 
-    def _keys(self, moment: SwingViewState) -> str:
-        if moment.is_away:
+    def _keys(self, view: SwingViewState) -> str:
+        if view.is_away:
             return ""
-        if moment.verdict is not None:
+        if view.verdict is not None:
             return self.tr("Enter: review")
-        if moment.state.phase in ENDED:
+        if view.state.phase in ENDED:
             return ""
-        if moment.state.pause is Pause.BY_USER:
+        if view.state.pause is Pause.BY_USER:
             return self.tr("Space: continue")
         return self.tr("Space: pause")
 
