@@ -11,7 +11,7 @@ TICK_MS = 100
 
 
 class EndSignals(QObject):
-    """Hears these signals, as a context.
+    """Handles these signals within a context.
 
     Python runs signal handlers between its own instructions; as there are none while Qt
     waits, a timer provides some.

@@ -43,7 +43,7 @@ class LanguageSwitch(QObject):
         self._translators: list[QTranslator] = []
 
     def set_language(self, language: str) -> None:
-        """Use another language, of numbers and of Qt's own texts too."""
+        """Switch the language, also of numbers and of Qt's own texts."""
         self.remove()
         QLocale.setDefault(QLocale(language))
         qt_folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
@@ -51,7 +51,7 @@ class LanguageSwitch(QObject):
         self._install(f"lightpen_{language}", str(TRANSLATIONS))
 
     def remove(self) -> None:
-        """Take the translations out; the texts in the program itself are left."""
+        """Remove the translations; the program's own texts remain."""
         for translator in self._translators:
             self._application.removeTranslator(translator)
             translator.deleteLater()

@@ -22,7 +22,7 @@ def decimals_for(uncertainty: float) -> int:
 
 
 def number_text(value: float, decimals: int) -> str:
-    """Return a number with so many decimals, without a sign before zero."""
+    """Return a number with fixed decimals, without a sign before zero."""
     return f"{Number(value):.{decimals}f}"
 
 

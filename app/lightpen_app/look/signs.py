@@ -50,7 +50,7 @@ def draw_arrow(
     color: QColor,
     halo: QColor,
 ) -> None:
-    """Draw an arrow with a halo that parts it from what lies beneath."""
+    """Draw an arrow with a halo that separates it from the background."""
     path = _arrow(start, end, width)
     painter.setPen(
         QPen(

@@ -203,7 +203,7 @@ def font(size: float, *, bold: bool = False) -> QFont:
 
 
 def letters_for(distance_m: float, dots_per_inch: float) -> int:
-    """Return the font size that is read with ease from a distance, px.
+    """Return the font size that is legible from a distance, px.
 
     Capitals of 20 minutes of arc, as ISO 9241-303 recommends.
     """
@@ -248,7 +248,7 @@ def set_tone(widget: QWidget, tone: Tone) -> None:
 
 
 def set_size(widget: QWidget, size: TextSize) -> None:
-    """Let a label or a table have another place of the type scale."""
+    """Set the size of a label or a table on the type scale."""
     set_styled(widget, "scale", size.name.lower())
 
 

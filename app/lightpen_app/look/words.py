@@ -21,12 +21,12 @@ def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:
 
 
 def listed(words: Iterable[str]) -> str:
-    """Return words one behind the other, parted by the comma of the language."""
+    """Return words joined by the comma of the language."""
     return QCoreApplication.translate("words", ", ").join(words)
 
 
 def breakable(text: str) -> str:
-    """Let words without a blank, as paths, take more than one line."""
+    """Allow line breaks in words without a blank, such as paths."""
     long_word = rf"\S{{{LONGEST_WORD},}}"
     return re.sub(long_word, lambda word: _parted(word.group()), text)
 
@@ -37,12 +37,12 @@ def unbroken(text: str) -> str:
 
 
 def on_one_line(text: str) -> str:
-    """Let a line end nowhere within a text."""
+    """Prevent line breaks within a text."""
     return JOINER.join(text.replace(" ", "\xa0"))
 
 
 def phrases_whole(text: str) -> str:
-    """Let a line end nowhere within a coverage factor or the number of a standard."""
+    """Prevent line breaks within coverage factors and numbers of standards."""
     phrase = r"k = \d|(?:ISO|JCGM) \d\S*"
     return re.sub(phrase, lambda found: found.group().replace(" ", "\xa0"), text)
 

@@ -111,7 +111,7 @@ def paragraph(
 
 
 def facts(rows: Sequence[tuple[str, str]], n_columns: int = 2) -> tuple[Block, ...]:
-    """Return names and what they name, side by side in columns."""
+    """Return names with their values, side by side in columns."""
     width = (WIDTH - (n_columns - 1) * GUTTER) / n_columns
     name_width = min(0.44 * width, 1100.0)
     value_width = width - name_width - GUTTER / 2
@@ -196,7 +196,7 @@ def text_width(text: str, size: float, *, bold: bool = False) -> float:
 
 
 def printed_text(text: str) -> str:
-    """Return words with the number of each character that no font here has."""
+    """Return a text with characters missing in all fonts replaced by their codes."""
     if text.isascii():
         return text
     return "".join(map(_printed, text))

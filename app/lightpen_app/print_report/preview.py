@@ -23,7 +23,7 @@ from lightpen_app.work.save_place import SavePlace
 
 
 class PrintReportWindow(FittedWindow, Translated, QWidget):
-    """Shows the pages by the strokes by which they are saved and printed.
+    """Shows the pages, drawn as they are saved and printed.
 
     ``stem`` begins the default name of a saved file.
     """

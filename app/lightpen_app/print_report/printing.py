@@ -48,7 +48,7 @@ def print_report_of(
     entered: ArchivePlace | None = None,
     laboratory: Laboratory | None = None,
 ) -> PrintReport:
-    """Return the pages of a record, in the language that is chosen.
+    """Return the pages of the report of a calibration, in the selected language.
 
     Without the reestimated images some plots are left out. ``entered`` is the archive
     entry of the calibration, the laboratory where it was made.

@@ -53,7 +53,7 @@ def all_sections(
     entered: ArchivePlace | None,
     laboratory: Laboratory | None = None,
 ) -> tuple[Block, ...]:
-    """Return the whole record, from its title to its end mark."""
+    """Return the blocks of the whole report, from its title to its end mark."""
     return (
         *_title(calibration_file),
         *_items(calibration_file),

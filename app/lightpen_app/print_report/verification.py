@@ -68,7 +68,7 @@ def verification_print_report(
     traced: Sequence[TracedItem] = (),
     laboratory: Laboratory | None = None,
 ) -> PrintReport:
-    """Return the pages of a verification, in the language that is chosen.
+    """Return the pages of the report of a verification, in the selected language.
 
     ``traced`` is what was verified and measured with, the laboratory where.
     """

@@ -343,7 +343,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         return page is not None
 
     def _end_tab_order(self) -> None:
-        """Have the Tab key reach the main button after the pages, then the steps."""
+        """Let the Tab key reach the main button after the pages, then the steps."""
         last = self.previousInFocusChain() or self
         while last.focusPolicy() is Qt.FocusPolicy.NoFocus:
             last = last.previousInFocusChain() or self

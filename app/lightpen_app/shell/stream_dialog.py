@@ -30,7 +30,7 @@ class StreamState:
 
 
 class StreamDialog(FittedWindow, Translated, QDialog):
-    """Shows and changes where the stream can be listened to."""
+    """Shows and changes the address of the stream."""
 
     # bool, StreamPlace: the user chose otherwise: whether it is on, and where
     value_changed = Signal(bool, object)

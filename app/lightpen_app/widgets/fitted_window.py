@@ -32,7 +32,7 @@ def fit_screen(window: QWidget) -> None:
 
 
 class FittedWindow(WidgetMixin):
-    """Put before the base of a window, it keeps that within the screen when shown."""
+    """Mixin before the base of a window: keeps it within the screen when shown."""
 
     # Keys that close the window, for a dialog in addition to Qt's.
     CLOSING_KEYS: tuple[Qt.Key, ...] = ()

@@ -1,4 +1,4 @@
-"""The focus, moved by the program."""
+"""Moving the focus by the program."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget

@@ -11,7 +11,7 @@ PAGE_KEYS = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 class LeavesPageKeys(WidgetMixin):
-    """Put before the base of a widget, it leaves the window the keys of the steps."""
+    """Mixin before the base of a widget: leaves the step keys to the window."""
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

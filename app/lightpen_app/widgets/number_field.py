@@ -76,7 +76,7 @@ class NumberField(LeavesPageKeys, QDoubleSpinBox):
 
     @override
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Turn the number only where the user works, not while the page scrolls."""
+        """Change the number only with the focus, not while the page scrolls."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:

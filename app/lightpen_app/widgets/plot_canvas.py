@@ -52,7 +52,7 @@ class ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
 
 def _with_equal_decimals(words: list[TextSpec]) -> list[TextSpec]:
-    """Return numbers with as many decimals as that with the most of them."""
+    """Return numbers as texts with equal decimals, the most that any needs."""
     if any("e" in text for _, _, text in words):
         return words
     n = max((len(text.partition(".")[2]) for _, _, text in words), default=0)

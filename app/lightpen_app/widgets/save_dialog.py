@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 def ask_file(
     parent: QWidget, title: str, path: Path, then: Callable[[Path], object]
 ) -> None:
-    """Ask for a file of the suffix of a path, which is offered, and pass it on."""
+    """Ask for a file to save, with a suggested path, and pass it on."""
     suffix = path.suffix
     dialog = QFileDialog(parent, title)
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

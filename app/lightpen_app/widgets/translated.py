@@ -13,7 +13,7 @@ else:  # a class of Qt's cannot be a base twice
 
 
 class Translated(WidgetMixin):
-    """Put before the base of a widget, it sets the texts again at a change of language.
+    """Mixin before the base of a widget: updates its texts with the language.
 
     The constructor of the widget arranges it once.
     """

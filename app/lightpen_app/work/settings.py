@@ -228,7 +228,7 @@ class Settings(QObject):
         self._thread.start()
 
     def _write(self) -> None:
-        """Write until nothing new is left; what cannot be written waits for more."""
+        """Write until nothing new is left; retry failed changes with later ones."""
         unwritten: Changes = {}
         while changes := self._taken_changes(unwritten):
             try:

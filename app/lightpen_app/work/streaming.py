@@ -125,7 +125,7 @@ def _what_counts(preparation: Preparation) -> tuple[object, ...]:
 
 
 def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None:
-    """Return the current tip; None if none may be measured with."""
+    """Return the current tip; None if it is unknown or unusable."""
     if preparation.camera_file is None or preparation.pen_file is None:
         return None
     try:

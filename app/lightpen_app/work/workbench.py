@@ -145,7 +145,7 @@ class Workbench(QObject):
         return jobs_ended and has_closed and has_ended and is_saved
 
     def _keep_heading(self) -> None:
-        """Remember for the next swings where the operator of this one stands."""
+        """Remember the operator's heading for the next swings."""
         status, chosen = self.run.status, self.selection.preparation
         if status.state is None or not status.is_capturing or status.is_recording:
             return

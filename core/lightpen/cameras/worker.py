@@ -179,7 +179,7 @@ class CameraWorker:
         return self._queue.take(timeout_s)
 
     def set_rest(self, rest: float | None) -> None:
-        """Pause between two images, s; None for as long as no other pause is set.
+        """Set the pause between two images, s; None: until another pause is set.
 
         Images that are missed meanwhile count as neither missed nor skipped, and the
         next may be as old as the rest. A camera on a link sends on during a finite

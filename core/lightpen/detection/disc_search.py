@@ -243,7 +243,7 @@ def _is_too_large(scene: Survey, box: PixelBox) -> bool:
 def _measured(
     scene: Survey, box: PixelBox, level: float, floor: float, budget: Iterator[int]
 ) -> Iterator[Disc]:
-    """Measure the region in a box, and others that coarse sampling took for one."""
+    """Measure the region in a box, and further ones that coarse sampling merged."""
     boxes, seen = [box], {box}
     while boxes and next(budget, None) is not None:
         disc = measure_disc(scene.image, boxes.pop(), level, scene.noise, floor)

@@ -288,7 +288,7 @@ def _edges(
 
 
 def _smooth(values: FloatArray, n_rays: int) -> FloatArray:
-    """Return the means of so many neighbouring rays round each rim."""
+    """Return running means over ``n_rays`` neighbouring rays of each rim, (D, N)."""
     reach = n_rays // 2
     wrapped = np.concatenate([values[:, -reach:], values, values[:, :reach]], axis=1)
     n = values.shape[1]

@@ -32,7 +32,7 @@ OF_OTHER_PEN = ("discover.sketch-count", "discover.other-sketch")
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """A swing that took no part, against the others.
+    """A held-out swing, compared with the others.
 
     The common error of the lengths is no part of the differences.
     """

@@ -66,7 +66,7 @@ def board_page(board: Board, paper: str | None = None) -> bytes:
 def _page_size(
     board: Board, drawing: _Drawing, paper: str | None
 ) -> tuple[float, float]:
-    """Return the size of the paper as it lies, mm."""
+    """Return the size of the sheet in its orientation, mm."""
     needed = drawing.width + 2 * MARGIN, drawing.height + MARGIN + FOOT
     sizes = PAPERS.values() if paper is None else [PAPERS[paper]]
     for short, long in sizes:

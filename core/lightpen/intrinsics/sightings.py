@@ -102,7 +102,7 @@ def _is_spread(points: FloatArray, board: Board) -> bool:
 
 
 def _from_front(points: FloatArray, board: Board) -> FloatArray:
-    """Return points that were numbered in mirrored rows as they are seen from ahead."""
+    """Return the points numbered as seen from the front, not mirrored."""
     rows = np.arange(board.n_points).reshape(board.rows, board.columns)
     corners = points[rows[[0, 0, -1, -1], [0, -1, -1, 0]]]
     x, y = (corners - corners.mean(axis=0)).T
@@ -148,7 +148,7 @@ def _grid_of(points: FloatArray, board: Board) -> FloatArray:
 
 
 def for_search(image: Image) -> Image:
-    """Return a large image as small as a board is searched in."""
+    """Return an image reduced to the size in which boards are searched."""
     small, _ = _smaller(_to_8_bit(image))
     return np.asarray(small, dtype=np.uint8)
 
@@ -349,12 +349,12 @@ def _circles(
 
 
 def _stretched(grey: Any) -> Any:
-    """Return a dim image as bright as any."""
+    """Return an image stretched to the full scale."""
     return cv2.normalize(grey, np.empty_like(grey), 0, 255, cv2.NORM_MINMAX)
 
 
 def _evened(grey: Any) -> Any:
-    """Return an image as it would be in even light."""
+    """Return an image with uneven lighting removed."""
     tiny = cv2.resize(grey, None, fx=0.125, fy=0.125, interpolation=cv2.INTER_AREA)
     around = cv2.GaussianBlur(tiny, (0, 0), EVENED * max(tiny.shape))
     around = cv2.resize(around, grey.shape[::-1])

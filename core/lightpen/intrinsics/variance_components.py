@@ -149,7 +149,7 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
 def _moved(
     views: Views, fitted: BoardFit, step: FloatArray, own: FloatArray
 ) -> BoardFit:
-    """Return a fit after a step of all but the effects, where it is linearised anew.
+    """Return the fit after a step of all but the effects, linearised there.
 
     Its scores are again those that priors balance.
     """

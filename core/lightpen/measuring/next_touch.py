@@ -67,7 +67,7 @@ def area_of(feature: Feature, points: FloatArray) -> ProbedArea:
 
 
 def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
-    """Return the area of a feature by design; None if its nominals do not tell."""
+    """Return the area of a feature by its nominals; None if they do not suffice."""
     if nominal.origin is None:
         return None
     z = np.array(nominal.axis or (0.0, 0.0, 1.0))

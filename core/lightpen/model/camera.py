@@ -47,7 +47,7 @@ class LensModel(StrEnum):
 
 
 def lens_model_of(n_coefficients: int) -> LensModel:
-    """Return the model that has as many distortion coefficients."""
+    """Return the model with this number of distortion coefficients."""
     is_fisheye = n_coefficients == fisheye.N_COEFFICIENTS
     return LensModel.KANNALA_BRANDT if is_fisheye else LensModel.BROWN
 
@@ -109,7 +109,7 @@ class Camera:
         return np.concatenate([[self.fx, self.fy, self.cx, self.cy], self.distortion])
 
     def with_intrinsics(self, values: FloatArray) -> "Camera":
-        """Return the camera with other `intrinsics`, of as many coefficients."""
+        """Return the camera with other `intrinsics` of the same number."""
         fx, fy, cx, cy = values[:4].tolist()
         return replace(self, fx=fx, fy=fy, cx=cx, cy=cy, distortion=values[4:])
 

@@ -48,7 +48,7 @@ def pursue(
     goal_rate: FloatArray,
     pursuit: TrackingMotion,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position and rate of a hand after one `STEP`, as it goes after a goal.
+    """Return position and rate of a hand after one `STEP` towards a goal.
 
     All are (3,), rad and rad/s, or mm and mm/s.
     """

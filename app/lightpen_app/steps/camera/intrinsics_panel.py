@@ -104,7 +104,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self._refresh()
 
     def forget_refused(self) -> None:
-        """Show the file in use again, whatever was chosen and is not used."""
+        """Show the file in use instead of a refused choice."""
         self._path.set_value("" if self._file is None else str(self._file.path))
         self.set_problem("")
 
@@ -242,7 +242,7 @@ def _coefficient_text(value: float) -> str:
 
 
 def _let_select(label: QLabel, selectable: bool) -> None:
-    """Let the words of a label be selected, or let it take no focus."""
+    """Make the text of a label selectable, or not focusable."""
     flags = Qt.TextInteractionFlag
     label.setTextInteractionFlags(
         flags.TextSelectableByMouse if selectable else flags.NoTextInteraction

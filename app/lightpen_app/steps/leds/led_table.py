@@ -269,7 +269,7 @@ class _DraftModel(TitledModel):
         return "" if flaw is None else worded(flaw.message)
 
     def _emit_data_changed(self, first: int, last: int) -> None:
-        """Have columns shown again; a cell among them that is typed in starts over."""
+        """Redraw columns; an open editor in one of them restarts."""
         end = self.index(self.rowCount() - 1, last)
         self.dataChanged.emit(self.index(0, first), end)
 

@@ -182,7 +182,7 @@ class InterruptedPanel(Translated, QGroupBox):
             row.set_waiting(why)
 
     def _hold_rows(self) -> None:
-        """Let the first rows be seen whole, however their words are wrapped."""
+        """Keep the first rows fully visible, however their text wraps."""
         width = self._scroll.viewport().width() - GRID
         heights = (row.height_for(width) + GRID for row in self._rows[:N_ROWS_SEEN])
         self._scroll.setFixedHeight(sum(heights))

@@ -142,7 +142,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._status.set_value(status_message(self._marked))
 
     def set_why_unverified(self, why_not: str) -> None:
-        """Say why the tip cannot be verified now, or let it."""
+        """Disable verification with a reason, or enable it."""
         tooltip = self.tr("Verify the tip on reference artefacts within minutes.")
         self._verify.set_why_not(why_not, tooltip)
 

@@ -283,7 +283,7 @@ def _with_lookalikes(
 
 
 def _best(sight: SpotArrays, pen: Constellation, candidates: Candidates) -> IntArray:
-    """Return the candidate of each image that chance would offer least, if credible."""
+    """Return the least accidental candidate of each image that has a credible one."""
     logs = log_false_alarms(sight, candidates)
     low, high = AREA_RANGE
     n = candidates.n_explained

@@ -141,7 +141,7 @@ def read_supervision(data: Path) -> Supervision:
 def require_supervisor(
     supervision: Supervision, signature: Signature | None
 ) -> SigningKey:
-    """Return the key of a supervisor; refuse who is none.
+    """Return the key of a supervisor; refuse anybody else.
 
     Raises `AcceptanceError` if there is no password yet, it is another one, the name is
     missing, or too many wrong passwords were entered just now.

@@ -176,7 +176,7 @@ def _change(guard: Supervision, now: datetime, signature: Signature) -> LimitsCh
 
 
 def _known(data: Path, guard: Supervision) -> dict[str, str]:
-    """Return the hashes of the files that count by now, by their places."""
+    """Return the hashes of the valid files by their paths."""
     known = {}
     for folder in SIGNED_FOLDERS:
         for file in numbered_files(data / folder):

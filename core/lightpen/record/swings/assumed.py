@@ -15,7 +15,7 @@ def assumption_entries(assumptions: Assumptions) -> dict[str, Plain]:
 
 
 def recorded_assumptions(settings: Mapping[str, Plain]) -> Assumptions:
-    """Return the assumptions among settings; the usual one for each that is missing.
+    """Return the assumptions among settings; defaults for missing ones.
 
     Raises `ValueError` if one makes no sense.
     """

@@ -262,7 +262,7 @@ def note_excluded(folder: Path, excluded: Mapping[int, str]) -> None:
 
 
 def _own_journal(folder: Path, length: int) -> FileIO:
-    """Open a journal of so many whole bytes for this writer alone."""
+    """Open a journal of ``length`` bytes exclusively; refuse another length."""
     path = folder / JOURNAL
     with ExitStack() as stack:
         try:

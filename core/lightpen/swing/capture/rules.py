@@ -84,7 +84,7 @@ CONFIRMING = 3.0  # s upright and still that confirm without a key
 def advance_swing(
     setup: SwingSetup, state: SwingState, detection: PenDetection, time: float
 ) -> Transition:
-    """Take one more image at a time, s, that never goes back.
+    """Return the swing after one more image at a time, s, that never decreases.
 
     An event `KEPT` asks for the image to be recorded under its number, before the next
     image is taken; one of `SLIPPED` names kept images that are dropped.
@@ -139,7 +139,7 @@ def conclude(state: SwingState, verdict: Message, passed: bool) -> Transition:
 
 
 def forget_side(state: SwingState) -> SwingState:
-    """Return the swing that asks again for the operator's right."""
+    """Return the swing with the operator's heading to be determined again."""
     return replace(state, heading=None, was_upright=False, target=None)
 
 

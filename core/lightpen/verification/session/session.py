@@ -224,7 +224,7 @@ def with_moved_part(setup: SessionSetup, state: SessionState) -> SessionSetup:
 def with_other_choices(
     setup: SessionSetup, state: SessionState, choices: VerificationChoices
 ) -> tuple[SessionSetup, SessionState]:
-    """Return a verification that continues by other choices.
+    """Return a verification that continues with other choices.
 
     Where the values of an artefact changed, its points are measured again by them; all
     else stays. Where another task is to be probed now, the points at hand are

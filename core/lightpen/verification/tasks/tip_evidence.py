@@ -8,8 +8,8 @@ points and in the ``k`` unknowns ``a`` of the artefact:
 
 Generalised least squares gives d with its covariance C, which contains the uncertainty
 of the calibrated tip. ``d^T C^-1 d`` is chi-square with three degrees of freedom if the
-tip is as calibrated. Its quantile is the gate, and the non-central distribution gives
-the error that exceeds the gate with 95 % probability along the worst direction [1]_.
+tip is as calibrated. Its quantile is the threshold, and the non-central distribution
+gives the error that exceeds it with 95 % probability along the worst direction [1]_.
 
 References
 ----------
