@@ -1,8 +1,8 @@
 """Handling of internal errors: a report is written and the program continues.
 
-An exception that nobody caught does not end the program: what was captured is on the
-disk, and the operator is informed in one sentence. A crash inside a library, which ends
-the program, leaves its trace in a file that the next report points to.
+An uncaught exception does not end the program: captured images are on the disk, and the
+operator is informed in one sentence. A crash inside a library, which ends the program,
+leaves its trace in a file that the next report points to.
 """
 
 import faulthandler

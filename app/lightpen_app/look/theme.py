@@ -1,7 +1,7 @@
 """The look: two palettes, one type scale, one spacing grid, one style sheet.
 
-What is drawn by hand takes its colours from `colors_of` its palette, all else from the
-style sheet in resources; so a change of theme reaches every widget by itself.
+Custom painting takes its colours from `colors_of` the palette, everything else from the
+style sheet in resources; so a change of theme reaches every widget.
 """
 
 import sys

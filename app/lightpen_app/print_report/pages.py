@@ -66,7 +66,7 @@ def lay_out(
 ) -> tuple[tuple[PlacedBlock, ...], ...]:
     """Return pieces on pages, in their order.
 
-    What keeps together begins on a new page where there is no room for all of it. A
+    Blocks that belong together begin on a new page if they do not fit as a whole. A
     piece higher than a page has one to itself.
     """
     pages: list[list[PlacedBlock]] = [[]]

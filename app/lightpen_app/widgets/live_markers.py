@@ -16,8 +16,8 @@ CLEARANCE = 2.0  # image px between spot and ring, at least
 def live_markers(seen: LiveImage) -> tuple[Marker, ...]:
     """Return a ring for each spot, numbered for LEDs.
 
-    Spots that are no LED are dashed; without intrinsics and pen file nobody can tell,
-    and all rings are plain.
+    Spots that are no LED are dashed; without intrinsics and pen file this is unknown,
+    and all rings are solid.
     """
     spots = seen.spots
     numbers = led_numbers(seen)

@@ -48,7 +48,7 @@ class StatusMessage:
 
 
 class SignLabel(QWidget):
-    """Shows a remark, in several lines if it wraps; hidden while there is none."""
+    """Shows a status message, in several lines if it wraps; hidden without one."""
 
     def __init__(self, *, wraps: bool = True) -> None:
         super().__init__()

@@ -122,7 +122,7 @@ class LibraryWatch(QObject):
         self.refresh()
 
     def change(self, asked: object, change: Change) -> None:
-        """Make a change of the library in its turn, and enter it in the archive.
+        """Queue a change of the library, and enter it in the archive.
 
         ``asked`` identifies the request in the signals about its outcome.
         """

@@ -111,8 +111,8 @@ class Workbench(QObject):
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel the jobs of all pages and wait for their end.
 
-        Returns whether all ended. What continues may be left behind: all that was
-        acknowledged is on the disk.
+        Returns whether all ended. Jobs that do not end in time are left behind:
+        acknowledged data is on the disk.
         """
         deadline = monotonic() + timeout_s
         for view in (self.run, self.verification, self.measuring):

@@ -127,8 +127,8 @@ class AravisFeatures:
 class AravisDevice:
     """A camera that Aravis drives, by its serial number or address.
 
-    By an address it is opened without a search, also where the network lets no
-    broadcast through.
+    With an address it is opened without a search, also if the network blocks
+    broadcasts.
     """
 
     def __init__(self, place: str) -> None:

@@ -51,8 +51,8 @@ class FrameQueue:
     def hand_over(self, frame: Frame, is_wanted: Callable[[], bool]) -> None:
         """Append a frame and wait until it is taken, or no longer wanted after `clear`.
 
-        Nothing is made ahead of its reader, so one who answers an image sees what comes
-        of it in the next but one.
+        No frame is made ahead of its reader, so a response to an image shows in the
+        next but one.
         """
         with self._changed:
             if self._is_ended:

@@ -49,8 +49,7 @@ class FramePairs:
     def lag_ms(self) -> float | None:
         """Lag of the second camera; None until it is known.
 
-        It is half the time between two frames at most: a camera that is later than that
-        is early for the next.
+        At most half a frame period: beyond that, a frame pairs with the next one.
         """
         if len(self._lags_ns) < MIN_TIMED:
             return None

@@ -91,7 +91,7 @@ def survey(image: Image, mask: FloatArray | None, stride: int) -> Survey:
 
 
 def _quantile(values: MatLike, share: float) -> int:
-    """Return the value that is larger than that share of all."""
+    """Return the quantile of values for a share."""
     rank = int(share * values.size)
     return int(np.partition(values, rank, axis=None)[rank])
 

@@ -1,9 +1,9 @@
 """Fixed lamps in view, by which motion of the camera is detected.
 
 A lamp is the light in a circle that was masked as stray, or a spot that nearly every
-image shows in the same place and that is no LED of the pen. When the camera
-is bumped all lamps jump at once: a light that disappears at one place and appears at
-another in the same image is one lamp.
+image shows in the same place and is no LED of the pen. When the camera is bumped all
+lamps jump at once: a light that disappears at one place and appears at another in the
+same image is one lamp.
 """
 
 from collections import defaultdict

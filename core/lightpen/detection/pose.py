@@ -348,7 +348,7 @@ def _poses_at(
 def _inverse(H: FloatArray) -> FloatArray:
     """Return the inverses of normal matrices (N, 6, 6), scaled to a unit diagonal.
 
-    A trace of ridge keeps an image of wrong LEDs, which may fix no pose at all, from
+    A small ridge keeps an image with wrong labels, which may not determine a pose, from
     stopping the others.
     """
     scale = np.sqrt(np.maximum(H[:, DIAGONAL, DIAGONAL], RIDGE))

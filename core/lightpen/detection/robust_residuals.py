@@ -82,7 +82,7 @@ def cauchy_weights(residuals: FloatArray, sigma: float | FloatArray) -> FloatArr
 def image_sigmas(residuals: FloatArray) -> FloatArray:
     """Return the common noise or each image's own scatter, the larger, px, (N,).
 
-    It lets an image whose start is spoilt by one wrong LED come in.
+    This admits an image whose start is spoilt by one wrong LED.
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     n_seen = np.isfinite(lengths).sum(axis=1)

@@ -117,7 +117,7 @@ def require_distance(
 def contradicting_distance(
     stated: float, implied: float, known: KnownLength
 ) -> CalibrationError:
-    """Return the error of a distance of two cones, mm, for that implied by a length."""
+    """Return the error of a cone distance, mm, that a known length contradicts."""
     return CalibrationError(
         "discover.cones-contradict",
         distance=stated,

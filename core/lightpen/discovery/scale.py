@@ -32,7 +32,7 @@ def known_lengths(
 ) -> tuple[KnownLength, ...]:
     """Return measured lengths by the indices of numbered LEDs (L, 3).
 
-    Raises `CalibrationError` if an LED is none of the pen's or given twice.
+    Raises `CalibrationError` if an LED is unknown or given twice.
     """
     return tuple(_known(each, leds) for each in measured)
 
@@ -111,7 +111,7 @@ def with_lengths_known(pen: Pen, lengths: Sequence[KnownLength]) -> Pen:
 def with_led_covariance(pen: Pen, covariance: FloatArray) -> Pen:
     """Return a pen with a covariance of its LEDs (3 L, 3 L), the scale stated apart.
 
-    Images fit a pen of any size, so the longest distance tells the scale.
+    Images fit a pen of any size, so the longest distance defines the scale.
     """
     first, second, _ = farthest_apart(pen.leds)
     longest = KnownLength(first, second, 0.0, 0.0)

@@ -519,7 +519,7 @@ def _of_camera(rig: Rig, c: int, work: Callable[[], SteadyImages]) -> SteadyImag
 
 
 def _reasons_of_moments(cameras: Sequence[CameraImages]) -> tuple[Reason, ...]:
-    """Return why each moment is left out; NONE where an image of it takes part."""
+    """Return why each moment is excluded; NONE if one of its images is used."""
     reasons = []
     for of_cameras in zip(*(each.reasons for each in cameras), strict=True):
         present = [reason for reason in of_cameras if reason is not Reason.ABSENT]

@@ -103,9 +103,9 @@ def read_text(path: Path, what: Message, limit: int) -> str:
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file atomically.
 
-    The data goes to a new file in the same folder, which takes the place of the old
-    one only when all of it is on the disk; what a write that was killed has left there
-    is removed. Pipes and devices are written straight to.
+    The data goes to a new file in the same folder, which replaces the old one once it
+    is completely on the disk; leftovers of killed writes are removed. Pipes and devices
+    are written straight to.
     """
     _require_file(path)
     try:
@@ -156,7 +156,7 @@ def is_reserved(name: str) -> bool:
 
 
 def _require_file(path: Path) -> None:
-    """Refuse the name of a device on Windows, where all that is written is lost."""
+    """Refuse the name of a device on Windows, which would discard the data."""
     if os.name == "nt" and is_reserved(path.name):
         raise FileError("write.reserved", path=path)
 

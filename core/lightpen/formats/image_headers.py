@@ -37,7 +37,7 @@ _TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackB
 
 @dataclass(frozen=True)
 class ImageHeader:
-    """Size of an image, px; memory of it decoded, and besides for that, bytes."""
+    """Size of an image, px; memory of the decoded image, and for decoding, bytes."""
 
     width: int
     height: int

@@ -23,7 +23,7 @@ WHAT = message("file.machine-settings")
 
 @dataclass(frozen=True)
 class MachineSettings:
-    """Default settings of the machine; an empty text is none."""
+    """Default settings of the machine; an empty text sets nothing."""
 
     language: str = ""
     archive_server: str = ""

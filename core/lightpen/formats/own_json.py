@@ -1,9 +1,9 @@
 """Read back the program's own JSON files with types, ranges and checksum checked.
 
-Records, results and settings all come in here. A text is turned into a declared type:
-what is missing, of another type or out of its range is refused, and so is what JSON as
-Python reads it lets pass, such as ``NaN``, a number too large for a float, or an entry
-given twice. A checksum as the last entry shows damage that leaves the text well-formed.
+Records, results and settings all come in here. A text is converted to a declared type:
+missing entries, other types and values out of range are refused, and so are leniencies
+of Python's JSON, such as ``NaN``, a number too large for a float, or an entry given
+twice. A checksum as the last entry shows damage that leaves the text well-formed.
 """
 
 import json

@@ -1,8 +1,8 @@
 """Temporary files for atomic writes, and their clean-up.
 
 A part is locked as long as it is written, so that one whose lock can be had was left
-behind by a program that was killed. Windows lets no open file be renamed, and some
-disks support no locks: there a part that was left is known by its age.
+behind by a program that was killed. Windows cannot rename open files, and some disks
+support no locks: there a leftover is recognised by its age.
 """
 
 import contextlib

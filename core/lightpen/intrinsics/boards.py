@@ -141,7 +141,7 @@ def marker_dictionary(board: Board) -> cv2.aruco.Dictionary:
 
 
 def parse_board(text: str) -> Board:
-    """Parse a board, see the module for the forms; `UsageError` if it is none."""
+    """Parse a board, see the module for the forms; `UsageError` if it is invalid."""
     kind_word, *parts = text.strip().split(":")
     kinds = {kind.value: kind for kind in BoardKind}
     kind = kinds.get(kind_word.casefold())

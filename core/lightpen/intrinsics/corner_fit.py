@@ -6,10 +6,10 @@ which each edge is blurred by its own sigma, the brightness is
     I(x, y) = m(x, y) + a(x, y) erf(d1 / (sqrt 2 sigma1)) erf(d2 / (sqrt 2 sigma2)),
 
 where m and a are linear, as light is uneven. Least squares by Gauss-Newton steps give
-the crossing, both directions, both blurs, m and a. That uses all that the edges show:
-on rendered boards the noise of a corner is a quarter of what the directions of
-gradients [1]_ leave. Where bright squares look larger than dark ones the four squares
-still meet evenly, so the corner stays.
+the crossing, both directions, both blurs, m and a. This uses the whole edges: on
+rendered boards the noise of a corner is a quarter of that by the directions of
+gradients [1]_. Where bright squares look larger than dark ones the four squares still
+meet evenly, so the corner stays.
 
 References
 ----------

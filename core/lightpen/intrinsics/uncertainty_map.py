@@ -1,8 +1,8 @@
 """Projection uncertainty of intrinsics over the image.
 
-An error of the intrinsics that a turn of the camera explains is none: where a camera
-looks is found again in each use. So the turn that explains most of it is taken out of
-the field of errors over the image [1]_.
+An error of the intrinsics that is equivalent to a rotation of the camera does not
+count: the orientation is estimated anew in each use. So the turn that explains most of
+it is taken out of the field of errors over the image [1]_.
 
 References
 ----------

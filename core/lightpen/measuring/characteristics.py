@@ -61,7 +61,7 @@ DEVIATIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A feature with all that characteristics are evaluated from."""
+    """A feature with all data for the evaluation of characteristics."""
 
     surface: TouchedSurface  # compensated by the ball radius, camera frame
     in_part: Quantity  # the same in the frame of the part

@@ -85,7 +85,7 @@ def angles(coefficients: FloatArray, distances: FloatArray) -> FloatArray:
 def is_within(coefficients: FloatArray, distances: FloatArray) -> BoolArray:
     """Tell which distances belong to directions up to `WIDEST`.
 
-    All are, where the coefficients fold the image before; `angles` tells where.
+    All do if the coefficients fold the image before that; see `angles`.
     """
     if np.any(
         _distance_slope(coefficients, np.linspace(0.0, WIDEST, STEPS_TO_FOLD)) <= 0

@@ -6,8 +6,8 @@ from enum import StrEnum
 class Origin(StrEnum):
     """Origin of images.
 
-    A simulated tip is never current for a pen; one of recorded images may be, as
-    whoever accepts it knows when and of what they were taken.
+    A simulated tip is never current for a pen; one of recorded images may be, as the
+    person who accepts it knows their date and subject.
     """
 
     LIVE = "live camera"

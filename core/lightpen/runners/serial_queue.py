@@ -185,7 +185,7 @@ class StartThread(Protocol):
         on_bug: Act,
         on_progress: Report,
     ) -> Task:
-        """Return the task; one of the three callables is called in its turn."""
+        """Return the task; one of the three callables is queued when it ends."""
 
 
 class BackgroundTask:

@@ -1,6 +1,6 @@
 """The images of a scene: draw everything random, then render.
 
-The seed of a scene fixes all of it. Each image draws from its own generator, so
+The seed of a scene determines everything. Each image draws from its own generator, so
 that it does not depend on which others are rendered, nor in which order.
 """
 

@@ -47,7 +47,7 @@ class SwingRunner:
         return self._workflow.status
 
     def ask(self, command: Callable[[SwingWorkflow], None]) -> None:
-        """Have a command carried out in its turn: a call of the workflow."""
+        """Queue a command: a call of the workflow."""
         self._queue.ask(lambda: command(self._workflow))
 
     def shut_down(self) -> None:

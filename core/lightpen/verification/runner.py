@@ -1,9 +1,9 @@
 """The one owner of a verification, from the current tip to its verdict.
 
-Its own thread has its workflow. Commands reach it through one queue, and so do
-the images, one at a time; it publishes every change and every event. Reading
-results and recorded images takes long and runs beside it; results are written in
-its turn, between two images.
+Its own thread has its workflow. Commands reach it through one queue, and so do the
+images, one at a time; it publishes every change and every event. Reading results and
+recorded images takes long and runs in background threads; results are written on its
+own thread, between two images.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ class VerificationRunner:
         return self._workflow.status
 
     def ask(self, command: Callable[[VerificationWorkflow], None]) -> None:
-        """Have a command carried out in its turn: a call of the workflow."""
+        """Queue a command: a call of the workflow."""
         self._queue.ask(lambda: command(self._workflow))
 
     def shut_down(self) -> None:

@@ -27,7 +27,7 @@ NOTICE = "history"  # cause of its notifications
 class ArchiveControl(QObject):
     """Carries out requests of the archive panel, one at a time.
 
-    The filter tells which entries are saved.
+    The filter selects the entries that are saved.
     """
 
     checked = Signal()  # a check has ended

@@ -31,7 +31,7 @@ from lightpen_app.work.live_images import DisplayedImage
 
 
 class FixableMessage(Translated, QWidget):
-    """Shows a remark; hidden while there is none."""
+    """Shows a message with a button to correct it; hidden without one."""
 
     correction_requested = Signal(object)  # Finding to correct: the button was pressed
 

@@ -29,7 +29,7 @@ class Changes(Enum):
 
 
 class LedTablePanel(Translated, QGroupBox):
-    """Shows a draft and lets it be edited."""
+    """Shows and edits a draft."""
 
     value_changed = Signal(object)  # PenDraft: the user changed it
     discard_requested = Signal()

@@ -25,8 +25,8 @@ class MisfitPlot(Plot):
     """The misfit of each image over its number; a click chooses an image.
 
     Images that do not take part are crosses. Where they are far off, they are drawn at
-    the upper edge, so that the others can still be distinguished. A line above those
-    that take part can be drawn down to the worse half of them, to take them out.
+    the upper edge, so that the others can still be distinguished. A line above the used
+    images can be dragged down to exclude up to the worse half of them.
     """
 
     number_chosen = Signal(int)  # of the image that was clicked

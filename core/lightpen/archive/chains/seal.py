@@ -2,9 +2,9 @@
 
 Chains and hashes tell of every entry and record that was changed, but a file of SQLite
 has bytes that belong to neither. As long as nothing was entered since, the file must be
-as it was sealed, bit by bit. Whatever was entered since, the archive must still hold
-the last entries of then: so one whose last entries were removed, with all that shows
-of them, is found, and one that was replaced by an older copy of itself.
+as it was sealed, bit by bit. Regardless of later entries, the archive must still hold
+the entries that were last at the sealing: so removed last entries are found, and an
+archive replaced by an older copy of itself.
 """
 
 from pathlib import Path

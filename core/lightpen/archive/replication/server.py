@@ -58,7 +58,7 @@ def open_server(address: str) -> Database:
 def server_url(address: str) -> URL:
     """Return the URL of the driver for an address of `open_server`, with the password.
 
-    Raises `ArchiveError` for an address that is none of PostgreSQL.
+    Raises `ArchiveError` for an address that is not of PostgreSQL.
     """
     try:
         url = make_url(address)

@@ -47,8 +47,8 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message | None
 def diagnose_mirror(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Message | None:
     """Return a message if a mirrored pen explains clearly more of the spots.
 
-    A pen that is symmetric but for a few LEDs lets most LEDs of its mirror image be
-    labelled, so this is worth a look where some LEDs are missing in all images.
+    Most LEDs of the mirror image of a nearly symmetric pen can be labelled, so this is
+    checked if some LEDs are missing in all images.
     """
     sample = _Sample.of(spots, camera, pen)
     return None if sample.is_explained else _mirror(camera, pen, sample.fits)

@@ -260,7 +260,7 @@ def with_effects(bundle: Bundle, effects: tuple[Effect, ...]) -> Bundle:
 def likely_effects(bundle: Bundle) -> tuple[Effect, ...]:
     """Return the effects of a fit, mechanics held at 0 if the images deny them.
 
-    One that they support by itself stays.
+    An effect that they support on its own stays.
     """
     effects, places = bundle.unknowns.effects, bundle.layout.effects
     of_mechanics = [

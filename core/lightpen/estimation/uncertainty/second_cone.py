@@ -109,7 +109,7 @@ class SecondCone:
 
     @property
     def n_used(self) -> int:
-        """Images of the second swing that take part."""
+        """Number of used images of the second swing."""
         return self.reasons.count(Reason.NONE)
 
 

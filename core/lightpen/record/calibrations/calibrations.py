@@ -1,7 +1,7 @@
 """A calibration read back from its file: what `lightpen calibrate` wrote, or a result.
 
-Both hold the same record of the calibration, and tell when they were changed since. The
-file alone is read; nothing that a running program knows besides comes into it.
+Both hold the same record of the calibration, and tell when they were changed since.
+Only the file is read; the state of a running program does not matter.
 """
 
 from collections.abc import Sequence

@@ -118,7 +118,7 @@ def _kept(file: FileRecord) -> InputFile:
 
 
 def _written(file: InputFile, place: Path) -> Path:
-    """Write a file with its own suffix, to be read from a disk as ever."""
+    """Write a file with its own suffix, to be read with the usual functions."""
     path = place.with_suffix(file.path.suffix)
     path.write_bytes(file.content or b"")
     return path

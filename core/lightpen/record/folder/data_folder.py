@@ -98,7 +98,7 @@ OLDEST = 1.0  # s; longest time between creating a folder and locking its journa
 def sweep_leftovers(data: Path) -> None:
     """Remove the parts of files, and folders of swings that never began.
 
-    What a running program is writing is left alone, and so is all that it cannot be.
+    Files that a running program is writing are left alone, and so are all other files.
     """
     sweep_parts(data / RESULTS)
     for root in (data, data / SIMULATED):

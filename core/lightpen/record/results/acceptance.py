@@ -5,10 +5,9 @@ stored result names its swing and images, so that a program killed between the t
 leaves nothing undecided: the tip is current, and the next program that finds the swing
 without its verdict concludes it.
 
-The grade decides how: a tip that passes is accepted as it is, one that is to be checked
-only with a reason, which is stored, and one that is to be repeated not at all. Where a
-supervisor has set a password, one beyond the limit of U is accepted by a
-supervisor only.
+The grade decides how: PASS is accepted without a reason, CHECK only with a reason,
+which is stored, and REPEAT not at all. Where a supervisor has set a password, one
+beyond the limit of U is accepted by a supervisor only.
 """
 
 import logging
@@ -181,7 +180,7 @@ def _result(
 
 
 def _stored_result(archive: FolderArchive, record: Record) -> Result | None:
-    """Return the result of a record with the images that take part in it now."""
+    """Return the stored result of a record if it uses the same images as now."""
     result = archive.of_record(record.folder)
     if result is None or result.images != _images_of(record):
         return None

@@ -147,8 +147,8 @@ def last_verdict(folder: Path) -> str | None:
     """Return the verdict at the end of the journal that no image follows.
 
     No more is read than its last lines, so that thousands of concluded records cost
-    little. That none is seen there does not mean that there is none. Raises `OSError`
-    without a journal.
+    little. None does not prove that there is no verdict. Raises `OSError` without a
+    journal.
     """
     path = folder / JOURNAL
     if path.exists() and not path.is_file():  # a pipe would never be read to its end

@@ -2,8 +2,8 @@
 
 The lock is one of the operating system on the open journal: it goes when the process
 ends, however it ends, and there is no file of its own that could be left behind. It
-keeps writers from each other; reading needs no lock and is never kept out. A disk of
-the network that supports no locks is written to as if nobody else did.
+keeps writers from each other; reading needs no lock and is never kept out. A network
+disk without locks is written to without this protection.
 """
 
 from pathlib import Path

@@ -1,9 +1,8 @@
 """The tip of a recorded swing: the one computation for all callers.
 
 The wizard, its review and the command line compute the tip of a record here, always
-from the images on the disk, so that they agree to the last digit. What was seen in the
-images does not depend on which of them take part; taking one out solves again and reads
-nothing.
+from the images on the disk, so that they agree to the last digit. Detections do not
+depend on which images are used; excluding one solves again without reading images.
 """
 
 import logging
@@ -55,8 +54,8 @@ class Solution:
     def misfits(self) -> FloatArray:
         """Root mean square residual of each image, px, (N,); NaN without the pen.
 
-        Of an image that takes part, over the LEDs that do; else over all. Of a rig,
-        over the images of all cameras.
+        Of a used image, over its used LEDs; else over all. Of a rig, over the images of
+        all cameras.
         """
         calibration = self.calibration
         squares = np.sum(self.residuals**2, axis=3)
@@ -102,8 +101,8 @@ def solve_record(
 def solve_again(solution: Solution, excluded: Mapping[int, str]) -> Solution:
     """Solve with other images excluded, from the same detections.
 
-    ``excluded`` has the numbers of all images that are not to take part, and why.
-    Raises `CalibrationError` if the rest does not determine the tip.
+    ``excluded`` has the numbers of all images to exclude, with the reason. Raises
+    `CalibrationError` if the rest does not determine the tip.
     """
     seen = (solution.observations, *solution.others)
     return _solved(solution.source, solution.numbers, seen, excluded)

@@ -214,7 +214,7 @@ class RecordWriter:
         self._write_line(VerdictLine(str(verdict)))
 
     def close(self) -> None:
-        """Close the journal and let other writers in."""
+        """Close and unlock the journal."""
         if self._journal.closed:
             return
         with self._journal, suppress(OSError):  # closing unlocks it anyway

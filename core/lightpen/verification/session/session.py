@@ -111,8 +111,8 @@ def run_again(
 ) -> SessionState:
     """Return the state with an earlier run, with its options of that time.
 
-    ``is_last``: the task at hand ended with it. Raises `CalibrationError` if it is none
-    of the task at hand.
+    ``is_last``: the task at hand ended with it. Raises `CalibrationError` if it does
+    not belong to the current task.
     """
     state, task = replace(state, touches=touches), state.task(setup)
     if task is None:

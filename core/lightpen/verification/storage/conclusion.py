@@ -1,10 +1,10 @@
 """End of a verification: accepted, refused or abandoned, in a permanent file.
 
-A verification is concluded when all that was chosen is done: accepted where the limits
-are kept, refused where they are not. Who accepts the tip all the same concludes it once
-more, with a reason, and so does who does one of its tasks again: the last conclusion of
-a session counts. One that is given up before all is done is abandoned. Each names all
-records of its session by their hashes, so that it stands for the whole.
+A verification is concluded when all selected tasks are complete: accepted if the limits
+are kept, else refused. Who accepts the tip all the same concludes it once more, with a
+reason, and so does who does one of its tasks again: the last conclusion of a session
+counts. One that is given up before all is done is abandoned. Each names all records of
+its session by their hashes, so that it stands for the whole.
 """
 
 from dataclasses import dataclass

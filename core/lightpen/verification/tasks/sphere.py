@@ -2,8 +2,8 @@
 
 25 points on a hemisphere, as that standard spreads them, give the Gaussian sphere of
 least squares. Size is its diameter, the ball compensated, less the certified one; form
-is the range of the distances from it. The covariance of the points, with what they
-share, gives U of the size, and what form noise alone makes of an ideal sphere.
+is the range of the distances from it. The joint covariance of the points gives U of the
+size, and the form that noise alone gives an ideal sphere.
 
 References
 ----------

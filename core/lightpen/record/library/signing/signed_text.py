@@ -34,7 +34,7 @@ class Signers:
 
 @dataclass(frozen=True)
 class FoundSignatures:
-    """The signatures of a text; empty where there is none, and what each is of."""
+    """The signatures of a text, empty if missing, and the content that each signs."""
 
     station: str = ""
     supervisor: str = ""
