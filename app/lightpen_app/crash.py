@@ -121,7 +121,7 @@ def _without_home(text: str) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of the program and its libraries."""
-    # With a library for e-mail, which the start of the window need not wait for.
+    # Imported here, as it imports an e-mail library and would delay the start.
     from importlib.metadata import PackageNotFoundError, version
 
     found = {"Python": platform.python_version(), "Qt": qVersion()}

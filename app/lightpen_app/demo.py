@@ -77,7 +77,7 @@ class Demo(QObject):
             self._go_on_accepted(key)
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
             self._end(self.tr("Demo ended: no tip to accept."))
-        elif key == "start":  # its main button leaves out what is ready
+        elif key == "start":  # its main button skips steps that are complete
             self._window.advance()
         elif key != "swing" or status.solution is not None:
             self._window.press_main()

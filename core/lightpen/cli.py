@@ -58,7 +58,7 @@ COMMANDS = (
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
-# What to type about what the core says, by its codes.
+# Advice for the command line, by the message codes of the core.
 ADVICE = {
     "pen-file.no-units": "Name them so: --units mm.",
     "pen-file.contradicting-units": "It is given by --units.",

@@ -15,5 +15,5 @@ def run_program(program: Callable[[], int]) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(SEARCH_AFTER)
     status = program()
-    gc.freeze()  # what is left is not searched once more as the process ends
+    gc.freeze()  # spares a search when the process ends
     return status

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from lightpen_resources import SOURCE_LANGUAGE, TRANSLATIONS, languages
 
-# Each language is named in itself, so that whoever cannot read the others finds it.
+# Each language is named in itself, for users who cannot read the others.
 OWN_NAME = str(QT_TRANSLATE_NOOP("language", "English"))
 
 

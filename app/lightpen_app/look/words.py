@@ -9,7 +9,7 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.local_time import local_time
 
 LONGEST_SHOWN = 32  # characters
-LONGEST_WORD = 24  # characters; what is longer may be parted
+LONGEST_WORD = 24  # characters; longer words may be split
 BREAK = "\u200b"  # where a line may end, though no blank is there
 JOINER = "\u2060"  # where a line may not end, though it could
 PARTED = "  \u00b7  "  # between items in one line

@@ -45,7 +45,7 @@ translate = QCoreApplication.translate
 
 CHART = 50 * MM  # high
 TALL_CHART = 66 * MM
-MOST_IMAGES = 40  # of those left out, that are named
+MOST_IMAGES = 40  # number of excluded images that are named
 PX_DECIMALS = 4
 UNKNOWN = "\u2013"
 

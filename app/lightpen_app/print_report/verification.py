@@ -49,7 +49,7 @@ from lightpen_app.print_report.sections import (
 
 translate = QCoreApplication.translate
 
-# Of the record: what stands elsewhere in the report, and what is too long for it.
+# Entries of the record that are elsewhere in the report, or too long for it.
 ELSEWHERE = {
     *("program", "created", "verification", "verdict", "session", "station"),
     *("operator", "pen", "tip", "origin", "inputs", "records", "checksum"),

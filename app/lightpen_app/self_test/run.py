@@ -93,7 +93,7 @@ def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
         for name in names:
             importlib.import_module(name)
         found.append(", ".join(names))
-    # All below needs what was just imported.
+    # Everything below needs these imports.
     from lightpen_app.self_test.desk import Desk
 
     with report.check("window system") as found:

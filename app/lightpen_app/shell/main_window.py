@@ -257,7 +257,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Take the keys that no control has taken."""
         key = event.key()
         if event.isAutoRepeat() and key in KEYS_THAT_LEAD_ON:
-            return  # of a key held too long, which would go through all steps
+            return  # auto-repeat of a held key would run through all steps
         if key in ENTER_KEYS:
             focused = QApplication.focusWidget()
             if (
@@ -290,7 +290,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             return
         self._later = None
         self._settings.save_geometry(self)
-        self.hide()  # what is under way may take its time to end
+        self.hide()  # jobs in progress may take long to end
         self.operator_view.close()
         self.help_window.close()
         self.page().left()

@@ -21,7 +21,7 @@ class OptionsMenu(Translated, QMenu):
 
     value_changed = Signal(object)  # Preferences: the user chose otherwise
     data_folder_chosen = Signal()  # the user wants to keep swings and results elsewhere
-    # The user wants others to follow the pen, or to see who does.
+    # The user wants to set up the stream or see its clients.
     stream_chosen = Signal()
     about_chosen = Signal()  # show the description of the program
 
@@ -90,7 +90,7 @@ class OptionsMenu(Translated, QMenu):
         return menu
 
     def _choose(self, **changes: object) -> None:
-        # Menus name the field that they change, whose type mypy cannot know.
+        # Menus name the field that they change; mypy cannot know its type.
         self._value = replace(self._value, **changes)  # type: ignore[arg-type]
         self.value_changed.emit(self._value)
 

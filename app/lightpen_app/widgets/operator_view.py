@@ -20,7 +20,7 @@ DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 NOTICE_SHARE, SMALL_SHARE = 0.12, 0.06  # of the height, at most
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
 LEGEND_SHARE = 0.04  # of the height, at most, for the letters of the dial
-LEAST_LETTERS = 0.46  # of those that the distance asks for: 8 mm high at 3 m
+LEAST_LETTERS = 0.46  # of the size for the viewing distance: 8 mm high at 3 m
 USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
 CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not show its size
 
@@ -46,7 +46,7 @@ class OperatorView(Translated, QWidget):
     large window they are larger.
     """
 
-    closed = Signal()  # the view was left; nothing else has ended by that
+    closed = Signal()  # the view was closed; nothing else ends
     advance_requested = Signal()  # Enter or PageDown
     pause_requested = Signal()  # Space
 

@@ -41,7 +41,7 @@ class PageScroll(QScrollArea):
         while around is not None and around is not self:
             layout = around.layout()
             if layout is not None:
-                layout.activate()  # as the events that are under way would by and by
+                layout.activate()  # as pending events would do later
             around = around.parentWidget()
         content.resize(content.width(), content.heightForWidth(content.width()))
         self._revealed = widget

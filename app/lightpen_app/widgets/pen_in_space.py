@@ -18,7 +18,7 @@ from lightpen_app.look.theme import Colors, colors_of
 from lightpen_app.widgets.translated import Translated
 
 RAISED = math.radians(24)  # of the eye above the plane of the cone
-WIDTH, HEIGHT = 1.15, 1.3  # of what is drawn, in lengths of the pen
+WIDTH, HEIGHT = 1.15, 1.3  # of the drawing, in lengths of the pen
 GROUND = 0.42  # radius of the ring about the cone, in lengths of the pen
 CONE = 0.05  # radius of the cone, likewise
 AWAY = 0.08  # lengths of the pen from where it should be, to be worth an arrow

@@ -109,7 +109,7 @@ class Plot(QWidget):
 
     def png(self, mark: str = "") -> bytes:
         """Return the plot, with a mark below it, as a picture at twice the size."""
-        self.grab()  # what was never shown gets its size, and room for its numbers
+        self.grab()  # lays out a plot that was never shown
         below = MARK_HEIGHT if mark else 0
         colors = colors_of(self.palette())
         size = self.size() + QSize(0, below)
@@ -366,7 +366,7 @@ class TracePlot(Plot):
     def _show_numbers(self, shown: bool) -> None:
         for side in ("left", "bottom"):
             axis = self._item.getAxis(side)
-            if axis.style["showValues"] is not shown:  # which draws the axis anew
+            if axis.style["showValues"] is not shown:  # it redraws the axis
                 axis.setStyle(showValues=shown)
 
     def _height(self, values: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
 
 LONGEST_REASON = 200  # characters
-LEAST_LETTERS = 10  # of a reason that says something; an ideograph counts twice
+LEAST_LETTERS = 10  # of an acceptable reason; an ideograph counts twice
 
 
 def n_letters(text: str) -> int:

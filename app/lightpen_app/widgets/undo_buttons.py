@@ -64,7 +64,7 @@ class UndoButtons(Translated, QWidget):
         self._why_locked = why
         self._refresh()
 
-    # A stack that is being deleted still shows these: it is not to be asked then.
+    # A stack that is being deleted still emits these: do not query it then.
 
     def _on_can_undo_changed(self, can_undo: bool) -> None:
         self._can_undo = can_undo  # a stack always shows the other next
@@ -80,7 +80,7 @@ class UndoButtons(Translated, QWidget):
             (self._undo, no_undo, QKeySequence.StandardKey.Undo),
             (self._redo, no_redo, QKeySequence.StandardKey.Redo),
         ]
-        shown.sort(key=lambda each: bool(each[1]))  # what is enabled takes the focus
+        shown.sort(key=lambda each: bool(each[1]))  # an enabled button takes the focus
         for button, nothing, keys in shown:
             if nothing and button.hasFocus() and shown[0][0].isEnabled():
                 shown[0][0].setFocus()

@@ -22,7 +22,7 @@ class GarbageCollector(QObject):
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         gc.disable()
-        gc.freeze()  # what is there now stays: the window is not to wait for a search
+        gc.freeze()  # present objects stay: no search delays the window
         for period_ms, action in (
             (PERIOD_MS, collect_if_due),
             (RELEASE_PERIOD_MS, release_freed_memory),

@@ -100,7 +100,7 @@ class LibraryWatch(QObject):
             library = read_library(folder)
             if not FolderArchive(folder).all_files():  # without any accepted result
                 return StationStatus(library, now=now())
-            with suppress(ArchiveError):  # which the runner reports
+            with suppress(ArchiveError):  # the runner reports it
                 opened = logbook.opened()
                 opened.enter_owed()
                 # Imported here: it takes 0.2 s.

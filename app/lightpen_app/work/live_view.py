@@ -41,7 +41,7 @@ from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
 WITHOUT_IMAGES = "without-images"  # cause of a notification
-CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
+CLOSING_TIME = 10.0  # s for everything in progress; a dead camera may take 8
 
 
 class LiveView(QObject):
@@ -52,7 +52,7 @@ class LiveView(QObject):
     the swing; the live stream gets the images of the first camera.
     """
 
-    # Shown: the newest image; those that the GUI had no time for are skipped
+    # Shown: the newest image; the GUI skips those that it has no time for
     image_shown = Signal(object)
     connection_changed = Signal(object)  # Connection
     # Connection: the camera that is not chosen is in this state now

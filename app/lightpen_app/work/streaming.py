@@ -35,7 +35,7 @@ class Streaming(QObject):
         self._reading = LatestJob(self)
         self._has_tip = False
         self._fault = ""
-        # It takes every image, on the thread that looks at them.
+        # It takes every image, on the thread of the pipeline.
         self.stream = PoseStream(clock, lambda status: self._status_changed.emit())
 
         # Connections

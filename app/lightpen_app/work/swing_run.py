@@ -40,7 +40,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
         address = ""
-        with suppress(FileError):  # which `Settings.fault` reports
+        with suppress(FileError):  # `Settings.fault` reports it
             address = server_address()
         self.logbook = LazyLogbook(folder, address)  # any thread may use it
         self.archive = FolderArchive(folder, self.logbook.confirm)

@@ -79,7 +79,7 @@ class Workbench(QObject):
         )
         self.save_place = SavePlace(settings, self.run, around.now)
 
-        # Connections: who computes knows a choice before who shows it
+        # Connections: models get a choice before views do
         self.selection.changed.connect(self._update_runners)
         self.camera = CameraSetup(self.selection, self.live, settings, around, self)
         samples = folder / SIMULATED
@@ -97,7 +97,7 @@ class Workbench(QObject):
         """Restore the last selection and open the camera."""
         if self.settings.fault is not None:
             self._on_settings_failed(self.settings.fault)
-        folder = self.folder  # a job that knew its parent would outlive it
+        folder = self.folder  # no reference to self, which a job could outlive
         Job(lambda _: sweep_leftovers(folder), self).start()
         self._look_for_update()
         self.run.runner.ask(lambda workflow: workflow.open_logbook())

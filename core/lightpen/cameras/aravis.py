@@ -237,7 +237,7 @@ class AravisDevice:
 
     def _gige_stream(self, aravis: Aravis, camera: int) -> int:
         """Return a stream that receives packets of this camera only."""
-        with suppress(AravisError):  # as a program that crashed let them come
+        with suppress(AravisError):  # a crashed program left it streaming
             aravis.camera_stop_acquisition(camera)
         aravis.camera_gv_set_stream_options(camera, ANY_SOCKET)
         stream: int

@@ -34,7 +34,7 @@ from lightpen.cameras.protocol import (
 )
 from lightpen.messages import Message
 
-SETTLING = 0.4  # s that images with the exposure before may still come
+SETTLING = 0.4  # s in which images with the previous exposure may arrive
 LOST_TRIGGER = 1.0  # s beyond the exposure without an image; it is given again
 LAST_SHORT_NUMBER = 65_535  # of GigE Vision 1; 1 follows, as 0 is left out
 MOST_MISSED = 10_000  # at once; a larger gap is a restarted frame counter
@@ -44,7 +44,7 @@ MOST_MISSED = 10_000  # at once; a larger gap is a restarted frame counter
 class DeliveredFrame:
     """An image as a library delivers it."""
 
-    data: Bytes  # (N,), a copy of what was sent
+    data: Bytes  # (N,), a copy of the sent bytes
     width: int
     height: int
     number: int  # frame number of the camera

@@ -23,7 +23,7 @@ EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
 GAINS = ("Gain", "GainAbs", "GainRaw")  # the last one in steps of the camera's own
 FRAME_RATES = ("AcquisitionFrameRate", "AcquisitionFrameRateAbs")
 FRAME_RATE_SWITCHES = ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled")
-AUTOMATICS = ("ExposureAuto", "GainAuto")  # would change what is measured
+AUTOMATICS = ("ExposureAuto", "GainAuto")  # would change the measured brightness
 PACKET_SIZE = "GevSCPSPacketSize"
 
 

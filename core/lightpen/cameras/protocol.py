@@ -22,7 +22,7 @@ GAIN = message("camera.gain")
 Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]  # as records hold it
 
 
-class CameraFailure(LightpenError):  # noqa: N818 - its children tell what is wrong
+class CameraFailure(LightpenError):  # noqa: N818 - its subclasses name the error
     """Base of the errors of an image source."""
 
 

@@ -153,7 +153,7 @@ class CameraWorker:
             raise DeviceLost(
                 "camera.did-not-stop", serial=self.serial, waited=timeout_s
             )
-        self._queue.clear()  # images are large, and who stopped it may be kept long
+        self._queue.clear()  # images are large, and a stopped worker may live long
         self._mailbox.take()
 
     def latest(self) -> Frame | None:
@@ -402,7 +402,7 @@ class CameraWorker:
         except ConfigError as error:  # the camera changed since they were stored
             self._settings = CameraSettings()
             self._start(self._settings)
-            # When images come, which take back others.
+            # After the start, as arriving images clear earlier faults.
             self._on_event(FaultRaised(error))
 
     def _start(self, settings: CameraSettings) -> None:

@@ -128,5 +128,5 @@ def is_absent(path: Path) -> bool:
     """Return whether there is surely no such file or folder."""
     try:
         return not path.exists()
-    except OSError:  # no access, which the window says
+    except OSError:  # no access; the window reports it
         return False

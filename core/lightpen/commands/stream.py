@@ -124,7 +124,7 @@ def _stream(options: argparse.Namespace) -> None:
             "Ctrl+C ends it.",
             flush=True,
         )
-        while not is_heard.wait(LONGEST_WAIT):  # recorded images wait for who listens
+        while not is_heard.wait(LONGEST_WAIT):  # recorded images wait for a client
             pass
         _play(listened, stream)
 

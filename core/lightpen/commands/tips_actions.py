@@ -49,7 +49,7 @@ from lightpen.record.library.tip_library import (
     read_library,
 )
 
-OF_TIPS = {  # options, by what they say of a tip
+OF_TIPS = {  # options, by their entry of a tip
     "ball_diameter_mm": "ball_diameter",
     "nominal_tip_mm": "nominal",
     "stylus_axis": "axis",

@@ -200,7 +200,7 @@ def with_rims(
     for i in unclear:
         disc = discs[i]
         rim = next(rims) if disc.rim else None
-        # What looks blurred may be a dome without light at its rim, which is sharp.
+        # An apparently blurred disc may be a sharp dome that is dark at its rim.
         wide = disc.moments.edge_width if disc.is_even else float("inf")
         moments = None
         if rim and rim.is_whole and GAUSSIAN_RISE * rim.sigma < SHARPER * wide:

@@ -189,7 +189,7 @@ def _adjusted(
     )
     try:
         require_certain(discovery, sightings)
-    except CalibrationError:  # perhaps for that reason
+    except CalibrationError:  # perhaps because the focal length changed
         require_one_focal_length(swing.pieces, sightings.size, request.camera)
         raise
     return replace(discovery, hypotheses=swing.hypotheses, n_lamps=swing.n_lamps)

@@ -27,7 +27,7 @@ COASTING = 8  # images in which a spot may be missing
 USUAL = 0.75  # of the spots, found at their predicted places
 CONFUSED = 6.0  # times the usual error of a prediction, within which spots are alike
 FINEST = 0.7  # px, of that error
-STILL, MOVED = 3.0, 12.0  # px: a lamp, and what moves beside it
+STILL, MOVED = 3.0, 12.0  # px: a lamp, and spots that move
 LASTING = 15  # images, after which that is reported
 AFFINE = 4  # spots that fix an affine map, and check it
 

@@ -9,7 +9,7 @@ import csv
 import io
 from collections.abc import Iterable
 
-# What a text that a spreadsheet calculates begins with, also in full width.
+# First characters of texts that a spreadsheet evaluates, also in full width.
 _FORMULA = (*"=+-@\t\r\n", *"\uff1d\uff0b\uff0d\uff20")
 
 

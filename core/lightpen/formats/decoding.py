@@ -36,12 +36,12 @@ PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
 MAX_PNG_CHUNKS = (
     30_000  # the largest image in chunks of 8 kB, as libpng writes, has 18,000
 )
-PNG_RESERVE = 2**16  # bytes of compressed data beyond what an image can come to
+PNG_RESERVE = 2**16  # bytes of compressed data beyond the largest possible image
 MAX_SCANS = 64  # of a JPEG; each takes as long as the image, 10 are usual
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
 MAX_KEPT_MEMORY = 64 * 2**20
-MAX_ARENAS = 1  # of threads; what stays free in one is of no use to another
+MAX_ARENAS = 1  # of threads; free memory in one is unusable for another
 
 
 def keep_freed_memory() -> None:

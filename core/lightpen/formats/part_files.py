@@ -70,7 +70,7 @@ def _own_part(folder: Path, mode: int) -> tuple[Path, IO[bytes]]:
         part = folder / f".{os.urandom(8).hex()}.part"
         stream = open(part, "xb", opener=partial(os.open, mode=mode))  # noqa: SIM115
         try:
-            # One who sweeps may have come between the making and the locking.
+            # A clean-up may have run between creation and lock.
             if locked(stream.fileno(), patience_s=PATIENCE) and part.exists():
                 return part, stream
         except OSError:  # a disk without locks

@@ -20,7 +20,7 @@ MAX_CELL_LENGTH = 500  # characters
 MAX_CELLS = 2_000_000
 LARGEST_WHOLE = 2**31 - 1  # of frame and LED numbers
 
-# No digit can be matched in two ways, so that what is no number is so at once.
+# No digit can match in two ways, so that mismatches are found without backtracking.
 _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"

@@ -104,7 +104,7 @@ if sys.platform == "win32":
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-STDERR = 2  # for what is not written by Python
+STDERR = 2  # file descriptor, for output of libraries
 MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 
 
@@ -168,7 +168,7 @@ def _serve(
     with suppress(OSError):  # a program with a window may have no console
         _silence_decoders()
     keep_freed_memory()
-    with suppress(OSError):  # a video that is sound needs none
+    with suppress(OSError):  # a sound video needs no limit
         limit_memory(MAX_DECODER_MEMORY)
     try:
         send(to, path, *arguments)

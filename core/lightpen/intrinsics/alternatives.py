@@ -38,7 +38,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.quantiles import chi_square_quantile
 
 MAX_ROUNDS = 8
-CORRELATED = 4.0  # points of a view that tell as much as an independent one
+CORRELATED = 4.0  # points of a view that count as one independent point
 MAX_PASSES = 8  # of turning one view
 ENOUGH = 0.998  # of the rms before; less gain justifies no further turned view
 LESSENED = 0.97  # of the rms without it; above, an alternative explains nothing
@@ -127,7 +127,7 @@ def explain(
         if apart is not None:
             useless = useless or error
     turned, enough = _turned(views, tolerances, near), HALVED * nothing
-    if groups is not None:  # turned images show all by which these differ
+    if groups is not None:  # turned images explain the whole difference
         enough = groups.rms / LESSENED
     if turned is not None and nothing**2 - turned[1] ** 2 > LEAST_EFFECT**2:
         which, rms = turned

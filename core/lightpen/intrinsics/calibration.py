@@ -266,7 +266,7 @@ def _calibrated(
     left_out = tuple(name for name in views.names if name not in kept.names)
     fitted = fit_camera(kept, tolerances, first.state.cameras[0])
     denied = board_contradictions(fitted, tolerances)
-    if denied.any():  # then the views determine it, and not what was stated
+    if denied.any():  # the views contradict the tolerances
         tolerances = released_tolerances(tolerances)
         fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
     report(0.2)

@@ -34,7 +34,7 @@ class VarianceComponents:
     between: float
     lenses: tuple[float, ...]  # amplitude of the residual field of each camera, px
     # Of the mean offset of a column of points along the rows, or of a row along the
-    # columns, mm; by independent points it is that of a point by the root of their
+    # columns, mm; for independent points, that of one point over the root of their
     # number.
     lines: float
 

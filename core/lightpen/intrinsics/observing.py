@@ -115,7 +115,7 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Message |
             return message(
                 "intrinsics.other-layout", board=board.name, other=other.name
             )
-    if board.kind is BoardKind.CHESSBOARD:  # which lies as it likes
+    if board.kind is BoardKind.CHESSBOARD:  # whose orientation is arbitrary
         return _other_count(images(), board)
     across = replace(board, columns=board.rows, rows=board.columns)
     if across != board and _is_found(images(), across):

@@ -152,7 +152,7 @@ def calibrate_pair(
         )
         cameras = tuple(each.camera for each in alone)
         views = _as_alone(views, alone)
-        # With what keeps their images from folding.
+        # With the priors that keep their images from folding.
         stated: tuple[FloatArray | None, ...] = tuple(
             each.adjustment.prior_of(0) for each in alone
         )

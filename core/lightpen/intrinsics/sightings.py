@@ -56,7 +56,7 @@ QUICK = (
     | cv2.CALIB_CB_FAST_CHECK
 )
 THOROUGH = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
-# Each finds some boards that the others miss.
+# Each search finds some boards that the others miss.
 WAYS = (THOROUGH, THOROUGH | cv2.CALIB_CB_ACCURACY, 0)
 _THOROUGHLY = Lock()  # one at a time, as each takes some 200 MB
 EVENED = 0.1  # of the longer side: what is darker over more than that is uneven light

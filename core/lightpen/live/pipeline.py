@@ -177,7 +177,7 @@ class Live:
         if self._thread.ident is not None:
             self._thread.join(LONGEST_STOP)
         self._pairs = FramePairs()  # frees its images now
-        with ExitStack() as stack:  # one that does not stop keeps none from it
+        with ExitStack() as stack:  # an error in one does not prevent the others
             for worker in self._workers:
                 stack.callback(worker.stop)
 
@@ -209,7 +209,7 @@ class Live:
                 self._notice_stage()
                 rest = self._rest()
                 is_paired = self._measures and len(self._workers) > 1
-                for worker in self._workers:  # two that rest rarely meet a moment
+                for worker in self._workers:  # resting cameras are rarely simultaneous
                     worker.set_rest(0.0 if is_paired and rest is not None else rest)
                 if self._measures:
                     self._take_next(captured, rest if is_paired else None)
@@ -333,7 +333,7 @@ class Live:
         if rest is not None and frame.host_ts_ns - self._seen_ns < rest * 1e9:
             return
         frames = (frame, *frame.others)[: len(wanted.regions)]
-        # The whole image shows now and then what else has come into view.
+        # A full search now and then finds new spots.
         is_followed = captured.swing is not None and frame.seq % FULL_SCAN != 0
         images = [
             self._look(each, wanted, c, is_followed=is_followed)
@@ -388,7 +388,7 @@ class Live:
         wanted = self._pairs.wanted
         try:
             frame = self._workers[wanted].next_frame(LONGEST_WAIT)
-        except FrameTimeout:  # what the other has sent continues, and finds no partner
+        except FrameTimeout:  # frames of the other camera stay unpaired
             wanted = 1 - wanted
             frame = self._workers[wanted].next_frame(0.0)
         self._pairs.add(wanted, frame)

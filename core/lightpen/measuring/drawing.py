@@ -12,7 +12,7 @@ from lightpen.measuring.starts import frame_about
 from lightpen.measuring.surfaces import FeatureKind
 
 N_ROUND = 73  # points of a closed circle
-MARK = 1.0  # mm, half of the cross of a point, and of what was not touched
+MARK = 1.0  # mm, half size of the cross of a point, and of an untouched feature
 CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 
-EXACT = 1e-6  # standard deviation of what is taken as exact, in its own unit
+EXACT = 1e-6  # standard deviation that counts as exact, in the unit of the value
 
 
 def known_by(covariance: FloatArray) -> FloatArray:

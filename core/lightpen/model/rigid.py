@@ -14,7 +14,7 @@ GENERATORS = np.array(
     ],
     dtype=np.float64,
 )
-TINY = 1e-200  # rad^2; added to no angle that differs from 0
+TINY = 1e-200  # rad^2; avoids 0 / 0 and is lost in any other angle
 
 
 def rotation_from_vector(vectors: FloatArray) -> FloatArray:

@@ -42,7 +42,7 @@ PASSED = 8.0  # mm from a place on the way that is near enough
 CAUGHT = 1.0  # mm from which the cone pulls the tip in
 ARRIVED = 3.0  # mm
 FREE_TREMOR = 0.3  # mm, standard deviation of a tip in the air
-FREE_AT = 5.0  # mm from the cone where that tremor is whole
+FREE_AT = 5.0  # mm from the cone, of full tremor
 SLIP_TIME = 0.05  # s that a slip takes
 
 GUIDED = TrackingMotion(gain=3.0, lag=0.13, top_speed=np.radians(30))

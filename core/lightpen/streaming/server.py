@@ -37,7 +37,7 @@ ROOM = 4096  # bytes; what clients send is ignored
 RECENT = 40  # poses offered to a client, by which it is judged slow
 SLOW = 4  # or more
 IDLE_S = 20.0  # a client that takes no data for so long is dropped
-# Of the system, so that a client whose line was cut is found.
+# TCP keep-alive of the system, to detect clients with a cut connection.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 
 _logger = logging.getLogger(__name__)

@@ -147,7 +147,7 @@ class FrameCounters:
         last = self.last
         if last is None:
             return type(self)(self.total, stats)
-        if stats.delivered < last.delivered:  # another camera, which began with none
+        if stats.delivered < last.delivered:  # another camera, counting from 0
             last = Stats()
         return type(self)(self.total.and_then(stats.since(last)), stats)
 

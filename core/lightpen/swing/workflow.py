@@ -164,7 +164,7 @@ class SwingWorkflow:
         """Begin with the next image, or resume a swing that was paused by leaving."""
         was_paused = self._presence.paused_by_leaving
         self._presence = self._presence.come()
-        if self._status.result is not None:  # nothing more belongs to that swing
+        if self._status.result is not None:  # that swing is concluded
             self.abandon()
         if was_paused:
             self._change(lambda state: Transition(resume(state)))

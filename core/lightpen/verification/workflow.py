@@ -290,7 +290,7 @@ class VerificationWorkflow:
             self._on_runs_unread(error.message)
             return
         self._faults.end()
-        self._choices = before.setup.choices.with_moves(())  # which are its own
+        self._choices = before.setup.choices.with_moves(())  # of that session
         self._publish(
             VerificationStatus(
                 tip=before.tip,
@@ -395,7 +395,7 @@ class VerificationWorkflow:
             return
         self._choices = choices
         if self._status.reading is ReadingState.IMAGES:
-            self.cancel()  # they are measured by what was chosen before
+            self.cancel()  # they use the previous choices
         status, setup, state = self._status, self._status.setup, self._status.state
         if setup is None or state is None:
             return

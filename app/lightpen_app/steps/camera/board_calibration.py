@@ -97,7 +97,7 @@ class BoardCalibration(QObject):
             return
         found = self._computed.found
         trial = self._trial(TrialOutcome.ACCEPTED)
-        self._is_saved = True  # unless that is denied
+        self._is_saved = True  # reset if saving fails
         camera = replace(found.camera, serial=trial.serial)
         job = Job(partial(save_camera, camera, path), self)
         job.start(partial(self._on_saved, trial), partial(self._on_save_refused, trial))

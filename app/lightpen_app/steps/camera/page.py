@@ -121,12 +121,12 @@ class CameraPage(Page):
         now = self._selection.preparation
         self._view.source.set_value(now.source)
         if self._beside.follow(now.source):
-            self._show_connection()  # what was lacking is another thing now
+            self._show_connection()  # the missing input may have changed
         self._view.intrinsics.set_value(now.camera_file)
         self._view.intrinsics.set_image_size(now.image_size)
         self._view.intrinsics.setVisible(now.second is None)
         self._show_camera(self._live.chosen)
-        self._show_connection()  # what is missing to open one may be another
+        self._show_connection()  # the missing input may have changed
         is_recorded = now.source.kind == SourceKind.RECORDED
         self._view.images.set_recorded(now.origin if is_recorded else None)
         self._view.focus.set_recorded(is_recorded)

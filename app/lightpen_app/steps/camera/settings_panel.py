@@ -27,7 +27,7 @@ LARGEST = 100_000  # px or bytes, of a field before the range of the camera is k
 class SettingsPanel(Translated, QGroupBox):
     """The settings of a camera, with the ranges that it offers."""
 
-    # CameraSettings: what is requested; all else is None
+    # CameraSettings: the requested ones; others are None
     settings_changed = Signal(object)
 
     def __init__(self) -> None:

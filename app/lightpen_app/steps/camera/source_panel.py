@@ -279,7 +279,7 @@ class SourcePanel(Translated, QGroupBox):
                 name = self.tr("{0} - not installed").format(name)
             self._kind.setItemText(index, name)
         self._kind.setAccessibleName(title)
-        # On Linux the name of a list that drops down is what is chosen in it.
+        # On Linux the accessible name of a drop-down list is its current choice.
         self._kind.setAccessibleDescription(title)
         edit = self._place.edit
         edit.setAccessibleName(self.tr("Folder, record or video"))

@@ -74,7 +74,7 @@ class HistoryContent(Translated, QWidget):
         self._whole = ArchiveControl(workbench, self._archive, self._filter)
         for panel in self._panels():
             tab = PageScroll()
-            is_squeezed = panel is self._trend_panel  # the others have words that wrap
+            is_squeezed = panel is self._trend_panel  # the others have wrapping text
             tab.setWidget(ShrinkingScrollContent(panel) if is_squeezed else panel)
             self._tabs.addTab(tab, "")
         self._tabs.setMinimumHeight(LEAST_TABS)
@@ -163,7 +163,7 @@ class HistoryContent(Translated, QWidget):
         n_lines = opening.n_lines
         words = self.tr("1 entry") if n_lines == 1 else self.tr("{0} entries")
         self._notices.show_status(words.format(n_lines))
-        # Later than what is seen at once.
+        # Deferred until the visible parts are shown.
         self._reader.read_due(self._due.rule(), self._tips.library)
 
     def _on_selection_changed(self) -> None:

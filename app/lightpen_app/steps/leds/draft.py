@@ -138,7 +138,7 @@ class LedDraft(QObject):
 
     def open(self, draft: PenDraft, invalid_file: Path | None) -> None:
         """Show the draft of a newly opened or saved file."""
-        if draft != self._state.draft:  # else it is what was saved now
+        if draft != self._state.draft:  # else it was just saved
             self.edits.clear()
         self._state = replace(self._state, opened=draft, invalid_file=invalid_file)
         self.show(draft)

@@ -234,7 +234,7 @@ class MatchPanel(Translated, QGroupBox):
             return State(word, text[:1].upper() + text[1:], Sign.WARNING, Tone.WARN)
         n_leds = len(detection.pixels)
         sigma = float(np.median(self._sigmas))
-        n_seen = max(self._counts)  # two that meet in one image are no matter
+        n_seen = max(self._counts)  # LEDs that merge in one image do not matter
         word = self.tr("{0} of {1} LEDs").format(n_seen, n_leds)
         detail = self.tr("RMS residual {0} px").format(_pixels(sigma))
         good = n_seen == n_leds and sigma <= USUAL_SIGMA

@@ -100,7 +100,7 @@ class DetailTabs(QTabWidget):
         panel.failed.connect(self.failed)
 
 
-# What draws plots takes a fifth of the time to the first window, which has none.
+# Imported here: plots take a fifth of the start time, and the first window has none.
 
 
 def _make_images_panel() -> "ImagesPanel":

@@ -118,7 +118,7 @@ class ReviewPage(Page):
         if status.result is not None:
             if not self._next_tip():
                 self.step_requested.emit("start")
-            # which leads to the next swing
+            # this leads to the next swing
             self._runner.ask(lambda workflow: workflow.abandon())
             return
         if why_not_now(status):
@@ -178,7 +178,7 @@ class ReviewPage(Page):
     def _on_run_changed(self) -> None:
         before, now = self._shown, self._run.status
         if not differs(before, now):
-            return  # a swing that is captured changes twenty times a second
+            return  # during capture, the status changes twenty times a second
         self._shown = now
         if now.result is not before.result:
             self._next.follow(now.result)
@@ -188,7 +188,7 @@ class ReviewPage(Page):
         self._view.set_solving(now.is_solving)
         self._press.follow(now)
         if now.assessment is not before.assessment:
-            self._show_result(now)  # seen or not, so that all is known when it is
+            self._show_result(now)  # also while hidden, to be up to date when shown
         if self.isVisible():
             self._refresh()
         self.changed.emit()

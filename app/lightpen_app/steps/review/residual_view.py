@@ -58,7 +58,7 @@ class ResidualView(ImageView):
         zoom = max(min(across, down) / ROOM, 1.0)
         if zoom > 1:
             middle = QPointF(self.rect().center())
-            # The place that stays where it is while the box comes to the middle.
+            # The fixed point of the zoom, chosen to centre the box.
             self.set_zoom(zoom, (middle - box.center() * zoom) / (1 - zoom))
 
     @override

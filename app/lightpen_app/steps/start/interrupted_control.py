@@ -282,7 +282,7 @@ class InterruptedControl(QObject):
             is_drift_checked = DRIFT.kind in kinds
             kinds = chosen.with_task(DRIFT, is_chosen=is_drift_checked).kinds
         again = replace(under_way.choices, kinds=kinds, limits=chosen.limits)
-        selection.set_choices(again.with_moves(()))  # which the session has
+        selection.set_choices(again.with_moves(()))  # as in the session
         missing_inputs = selection.preparation.missing_inputs()
         if missing_inputs:
             self._notices.notify(NOTICE, missing_input_text(missing_inputs[0]))

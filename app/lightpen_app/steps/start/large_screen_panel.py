@@ -66,7 +66,8 @@ class LargeScreenPanel(QWidget):
 
 
 def _make_trend() -> "TrendPanel":
-    # What draws plots takes a fifth of the time to the first window, which has none.
+    # Imported here: plots take a fifth of the start time, and the first window has
+    # none.
     from lightpen_app.widgets.trend_panel import TrendPanel
 
     return TrendPanel()

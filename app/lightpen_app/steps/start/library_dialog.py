@@ -80,9 +80,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._item: AnyItem | None = None  # that is being added or changed
         self._before: AnyItem | None = None  # as first shown
         self._is_new = False
-        self._asked: RequestedChange | None = (
-            None  # of which it is not known if it is kept
-        )
+        self._asked: RequestedChange | None = None  # pending: not known to be stored
 
         # Widgets
         self._lead = text_label(TextSize.BODY)
@@ -349,7 +347,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         elif is_typed and not self.form.has_day():
             missing_inputs = self.tr(
                 "Enter a date such as 2026-08-14, or leave it empty."
-            ).replace("2026", str(local_now().year + 1))  # what is due is to come
+            ).replace("2026", str(local_now().year + 1))  # due dates lie in the future
         if not missing_inputs and self._is_guarded and not self._supervisor.is_filled():
             missing_inputs = self.tr("Changes need a supervisor's signature.")
         is_asked = self.tr("Saving") if self._asked is not None else ""

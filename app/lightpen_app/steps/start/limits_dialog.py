@@ -32,7 +32,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         super().__init__(parent)
         self._value = StationLimits()
         self._is_guarded = False
-        self._is_signed = False  # and waits for what comes of it
+        self._is_signed = False  # and waits for the outcome
 
         # Widgets
         self._lead = text_label(TextSize.BODY)

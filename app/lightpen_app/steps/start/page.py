@@ -235,7 +235,7 @@ class StartPage(ResponsiveLayout, Page):
 
     def _begin_trial(self) -> None:
         if not self._camera.live.is_open:
-            self.show_setup()  # until there is an image, which the day page would miss
+            self.show_setup()  # until there is an image; the day page shows none
             self._camera.open()
         elif is_trial_ready(self._selection.preparation) and self.isVisible():
             self.step_requested.emit("swing")

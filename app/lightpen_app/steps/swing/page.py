@@ -142,7 +142,7 @@ class SwingPage(Page):
 
     @override
     def unsaved(self) -> str:
-        return unsaved_swing_text(self._runner.status)  # which the window may not have
+        return unsaved_swing_text(self._runner.status)  # newer than the window
 
     @override
     def shut_down(self) -> None:
@@ -172,7 +172,7 @@ class SwingPage(Page):
         self._view.set_state(now)
         is_other = now.side is not before.side and {now.side, before.side} != PAUSES
         if is_other and self._view.side.hasFocus():
-            self._view.dial.setFocus()  # Enter would do what the button did not say
+            self._view.dial.setFocus()  # Enter would run an action that was not shown
         if not self._verification.status.is_here:
             self.operator_value_changed.emit(now.operator_value)
         self._view.dial.set_interactive(self._live.operator is not None)

@@ -214,7 +214,8 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
 
 def _make_plots() -> "SwingPlots":
-    # What draws plots takes a fifth of the time to the first window, which has none.
+    # Imported here: plots take a fifth of the start time, and the first window has
+    # none.
     from lightpen_app.steps.swing.plots_panel import SwingPlots
 
     return SwingPlots()

@@ -38,7 +38,7 @@ from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
 
-LATEST = 8  # swings, which the table has room for
+LATEST = 8  # swings; the table has room for as many
 PROGRESS_STEPS = 1000
 PLOT_HEIGHT = 20 * GRID
 DOT = 6  # px
@@ -142,7 +142,7 @@ class PenPanel(Translated, QWidget):
         is_other, self._read_of = self._chosen() != self._read_of, self._chosen()
         self._unread = ""
         if is_other:
-            self.shut_down()  # what comes of it would be of the pen before
+            self.shut_down()  # its result would be of the previous pen
             self._shown, self._new, self._fault = None, None, ""
         self._reading.cancel()
         if now.pen_file is None:

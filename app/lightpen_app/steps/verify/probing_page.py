@@ -66,7 +66,7 @@ class ProbingPage(ResponsiveLayout, Page):
 
         # Widgets
         self._progress = ProgressPanel(workbench, run)
-        self._panels = {  # made as they are seen, which halves the page's start
+        self._panels = {  # made when first shown: halves the start of the page
             task: LazyWidget(partial(self._make_panel, task))
             for task in presenter.tasks
         }

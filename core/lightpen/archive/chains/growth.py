@@ -201,7 +201,7 @@ def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
     wanted = select(RECORDS.c.sha256).where(RECORDS.c.sha256.in_(list(records)))
     known = set(connection.execute(wanted).scalars())
     new = [{"sha256": n, "text": t} for n, t in records.items() if n not in known]
-    if new:  # of a server another role may have one that this one does not see
+    if new:  # on a server, another role may have stored one invisible to this one
         put = postgresql.insert(RECORDS).on_conflict_do_nothing()
         connection.execute(put if _is_server(connection) else insert(RECORDS), new)
 

@@ -90,7 +90,7 @@ def _images(data: Path, journal: FileHash) -> Iterator[FileHash]:
     try:
         content = journal_bytes(path.parent)[: journal.n_bytes]
         if sha256(content).hexdigest() != journal.sha256:
-            return  # which is a separate finding
+            return  # that is a separate finding
         lines = parse_lines(content.splitlines(), path.parent)
     except FileError:
         return

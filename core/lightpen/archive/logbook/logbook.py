@@ -77,7 +77,7 @@ from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.solving import Solution
 
 ARCHIVE = "archive.sqlite"
-LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
+LONGEST_FAREWELL_S = 1.0  # maximum delay of the program's end by a server
 
 _logger = logging.getLogger(__name__)
 

@@ -24,8 +24,8 @@ _CALLING: Mapping[str, Any] = {
     "tcp_user_timeout": 10_000,  # ms
 }
 
-# So does the server, or it would wait for hours for a station whose line was cut, and
-# let nobody else do what that one had begun.
+# The server does the same, or it would wait for hours for a station whose line was
+# cut, and hold its locks.
 _SERVER_NOTICES = """\
 SET tcp_keepalives_idle = 5;
 SET tcp_keepalives_interval = 2;

@@ -108,7 +108,7 @@ class Database:
                 ):
                     yield connection
             finally:
-                if self._uses.are_over:  # who is late takes its connection along
+                if self._uses.are_over:  # a late user closes its own connection
                     self.engine.pool.dispose()
 
 
@@ -118,7 +118,7 @@ def open_file(path: Path) -> Database:
     with _looking_at(path):
         is_there = path.exists()
     if is_there:
-        with closing(_read_only(path)) as database:  # which changes nothing
+        with closing(_read_only(path)) as database:  # changes nothing
             known_version(database)
     try:
         make_folder(path.parent)
@@ -286,7 +286,7 @@ def _make_or_migrate(connection: Connection) -> None:
 
 
 def _migrate(connection: Connection, found: str) -> None:
-    # Half a second, which only the first start of a later version takes.
+    # Imported here: it takes 0.5 s, only at the first start of a later version.
     from alembic.migration import MigrationContext
     from alembic.operations import Operations
     from alembic.script import ScriptDirectory
@@ -322,7 +322,7 @@ def _converting_errors(name: str) -> Iterator[None]:
                 "archive.busy", name=name, seconds=LONGEST_WAIT_S
             ) from error
         raise _unusable(name, _reason(error)) from error
-    except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
+    except UnicodeDecodeError as error:  # even SQLite's message is unreadable
         raise _unusable(name, MALFORMED) from error
 
 

@@ -59,7 +59,7 @@ def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation
     """
     if pen.n_leds < MIN_LEDS:
         raise ValueError(f"`pen` must have at least {MIN_LEDS} LEDs, got {pen.n_leds}.")
-    # By what they hold: a file that is read again is the same pen.
+    # By their content: a file that is read again is the same pen.
     leds, normals = (each.astype(float).tobytes() for each in (pen.leds, pen.normals))
     return _constellation(leds, normals, pen.diameter, min(certain, pen.n_leds))
 

@@ -22,7 +22,7 @@ from lightpen.model.information import inverse, known_by
 LIMIT = 3.0  # standard deviations
 ROUNDING = 1e-6  # of a variance
 RELEASED_WIDTH = 100.0  # times stated deviation or fitted change: no information
-TRIED_TOGETHER = 3  # numbers; more that are wrong are found one by one
+TRIED_TOGETHER = 3  # numbers; further wrong ones are found one by one
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ LEAST = 1e-6  # px, of noise and motion; exact lamps would divide by zero
 RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variances of a step and of a lamp
 HALF = 0.5  # of the lamp shift, by which the pen shifts at least if the camera moved
 WITH_LAMPS = 1.5  # times the lamp shift, largest shift of a pen beside them
-FAR = 3.0  # times the usual distance; what lies farther has slipped
+FAR = 3.0  # times the usual distance; beyond, the tip has slipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ def _turns(camera: Camera, path: CameraPath) -> FloatArray:
     """
     plane = camera.unproject_with_jacobian(path.lamps.mean(axis=0))
     x, y = plane.points
-    # A small turn w moves what is seen there by this matrix times (w_x, w_y).
+    # A small rotation w moves the image there by this matrix times (w_x, w_y).
     by_turn = np.array([[-x * y, 1 + x * x], [-1 - y * y, x * y]])
     about = np.linalg.solve(by_turn, plane.jacobian @ path.shifts.T).T
     return rotation_from_vector(np.column_stack([about, np.zeros(len(about))]))

@@ -99,7 +99,7 @@ class Verdict:
         return next(filter(None, causes), _NEXT_STEPS[Code(self.reason.code)])
 
 
-# What makes U large, with what to do about it.
+# Causes of a large U, each with the remedy.
 _CAUSES = {
     ContributionName.CENTERS: (message("share.centers"), NextStep.SEE_TO_CAUSE),
     ContributionName.LEDS: (message("share.leds"), NextStep.CHECK_LEDS),
@@ -114,7 +114,7 @@ _CAUSES = {
     ContributionName.COMPLIANCE: (message("share.compliance"), NextStep.SEE_TO_CAUSE),
     ContributionName.TIMING: (message("share.timing"), NextStep.CHECK_FILES),
 }
-# By what a reason names, which its code alone does not show.
+# By the value that a reason names, as its code alone is ambiguous.
 _BY_CAUSE = {
     **{advice.code: step for advice, step in _CAUSES.values()},
     "warning.camera-file-contradicted": NextStep.CHECK_CAMERA,
@@ -289,7 +289,7 @@ def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message
         yield message(Code.FILE_CONTRADICTED, why=worst_one.message)
     if calibration.moved > FAR_MOVED * limit:
         yield message(Code.CAMERA_MOVED, distance=calibration.moved)
-    sigma = calibration.bundle.sigma  # a moving seat apart, which has a finding
+    sigma = calibration.bundle.sigma  # without a moving seat, which has its own finding
     if sigma > USUAL_SIGMA:
         yield message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA)
     if calibration.leds.displaced:

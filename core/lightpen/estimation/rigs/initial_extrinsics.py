@@ -58,7 +58,7 @@ def find_initial_extrinsics(
         lags[c] = measure_lag(seen, found)
         apart[found.apart, c] = True
         rotations[c] = found.rotation
-        # By the cone, which all images of a camera determine, not by single poses.
+        # From the cone, as all images of a camera determine it, not from single poses.
         translations[c] = parts[c].pivot.pivot_cam - found.rotation @ cone
         seen = seen.completed(turns[c], found.rotation)
     placed = replace(

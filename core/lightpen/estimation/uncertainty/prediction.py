@@ -94,7 +94,7 @@ class UncertaintyPrediction:
         n_images = int(joint.used.any(axis=1).sum())
         noise = bundle.independent_noise
         now = contributions_of(bundle, priors, n_images, noise, shift, self.effects)
-        share = min(n_images / POSTURES, 1.0)  # of what does not average out
+        share = min(n_images / POSTURES, 1.0)  # of the errors that do not average out
         centers = [
             replace(each, covariance=share * each.covariance)
             for each in now

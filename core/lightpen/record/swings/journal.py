@@ -111,7 +111,7 @@ def read_lines(folder: Path) -> list[bytes]:
     *lines, rest = data.split(b"\n")
     if lines and (ZEROS in lines[-1] or lines[-1].startswith(b"\0")):
         lines.pop()
-    elif _is_whole(rest[:-1]):  # and what is behind it was the end of the line
+    elif _is_whole(rest[:-1]):  # its last byte was the line end
         lines.append(rest)
     return lines
 

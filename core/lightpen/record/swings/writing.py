@@ -224,7 +224,7 @@ class RecordWriter:
         line = line_bytes(entries)
         length = len(line)
         try:
-            # What a crash or a write that failed left of a line.
+            # Rest of a line after a crash or a failed write.
             self._journal.truncate(self._length)
             while line:
                 line = line[self._journal.write(line) :]

@@ -39,7 +39,7 @@ MIN_BLOCKS, MAX_BLOCKS = 3, 10  # before, during and after; larger ones are less
 class LampImages:
     """Lamps in images of touches, in order of time."""
 
-    lights: tuple[FloatArray, ...] = ()  # (S, 2), what shines and is no LED, px
+    lights: tuple[FloatArray, ...] = ()  # (S, 2), spots that are no LEDs, px
     distances: tuple[float, ...] = ()  # of the pen along the view, mm
 
     def then(self, other: "LampImages") -> "LampImages":

@@ -36,7 +36,7 @@ SETTLING = 3  # images, after which the hand is at rest
 RESTING = 0.01  # mm, by which a tip at rest may move
 STILL_TURN = np.radians(1.0)
 MAX_LOST = 5  # images in a row without the pen; more end a touch
-WORTH_TELLING = 0.5  # of its images, that were held before a point was broken off
+WORTH_TELLING = 0.5  # of its images: fraction held when a point was broken off
 MAX_PATH = 20  # images
 FAR_ENOUGH = (
     2.0  # mm, that show the direction of approach, or that the pen was taken up

@@ -149,7 +149,7 @@ class PointImages:
 
     def forget_but(self, kinds: Collection[str]) -> None:
         """Discard the current run, and the runs of all but some tasks."""
-        with suppress(FileError):  # it stays as one that was interrupted
+        with suppress(FileError):  # it stays interrupted
             self._close(DISCARDED)
         self._open = None
         self._runs = tuple(run for run in self._runs if run.task in kinds)

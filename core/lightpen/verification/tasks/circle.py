@@ -81,7 +81,7 @@ from lightpen.verification.tasks.tip_evidence import (
 
 MIN_TOUCHES = 6
 MIN_ANGLE = 270.0  # degrees
-MAX_FORM = 0.05  # of the radius: what is further off is no circle
+MAX_FORM = 0.05  # of the radius; beyond, it is no circle
 ANOTHER = 0.1  # of the certified radius: then it is another circle
 ENOUGH_POINTS = 10  # for a session
 NEW_PLACE = 3.0  # mm
@@ -230,7 +230,7 @@ def _measure_run(
             "circle.too-few", run=name, n_touches=len(touches), needed=MIN_TOUCHES
         )
     points = np.array([touch.point_cam for touch in touches])
-    fit_circle(points)  # refuses what can be none
+    fit_circle(points)  # raises if they determine none
     on_ring = on_ring_of(points)
     fit = fit_circle(points[on_ring])
     off = max(fit.roundness, fit.flatness)

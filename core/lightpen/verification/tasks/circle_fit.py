@@ -21,7 +21,7 @@ from lightpen.verification.tasks.surface_points import lie_near
 
 LEAST_POINTS = 3  # that determine a circle
 EDGE_ON = 0.9  # of the normal along u
-SMALLEST = 0.5  # mm, of what can be a circle at all
+SMALLEST = 0.5  # mm, least radius of a circle
 THIN = 0.02  # of the points' extent: less across is a line
 N_SAMPLES = 500  # of three points each
 

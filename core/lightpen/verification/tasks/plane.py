@@ -76,11 +76,11 @@ from lightpen.verification.tasks.tip_evidence import (
 )
 
 MIN_POINTS, USUAL_POINTS, MAX_POINTS = 9, 12, 50
-LEAST_POINTS = 4  # that can lie off a plane at all
+LEAST_POINTS = 4  # the least number with residuals
 SMALLEST = 5.0  # mm, root mean square distance of the points from their middle
 THIN = 0.2  # of the extent along: less across is a line
 NEW_PLACE = 5.0  # mm
-MAX_FORM = 0.1  # of the extent: what is rougher is no plate
+MAX_FORM = 0.1  # of the extent; beyond, it is no plate
 N_SAMPLES = 500  # of three points each
 
 # The plate of the simulated operator, from the bottom of its cone, mm
@@ -140,7 +140,7 @@ def measure_plane(
     places = np.array([point.point_cam for point in points]).reshape(-1, 3)
     if len(points) < MIN_POINTS:
         raise CalibrationError("plane.too-few", n_points=len(points), needed=MIN_POINTS)
-    fit_plane(places)  # refuses what can be none
+    fit_plane(places)  # raises if they determine none
     near = _on_plane(places)
     fit = fit_plane(places[near])
     is_rough = fit.flatness > MAX_FORM * fit.extent

@@ -26,7 +26,7 @@ _BY_KIND = {task.kind: task for task in ALL_TASKS}
 if TYPE_CHECKING:
     TaskKind: TypeAlias = str
     AnyOptions: TypeAlias = TaskOptions
-else:  # by which msgspec takes the registered ones and no others
+else:  # makes msgspec accept exactly the registered ones
     TaskKind = Literal[tuple(_BY_KIND)]
     AnyOptions = reduce(or_, (task.options for task in ALL_TASKS))
 

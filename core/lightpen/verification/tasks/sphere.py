@@ -82,9 +82,9 @@ from lightpen.verification.tasks.tip_evidence import (
 )
 
 MIN_POINTS, USUAL_POINTS, MAX_POINTS = 9, 25, 50
-LEAST_POINTS = 5  # that can lie off a sphere at all
+LEAST_POINTS = 5  # the least number with residuals
 SPREAD = 0.15  # smallest extent of the points over their radius, or none is determined
-MAX_FORM = 0.05  # of the radius: what is further off is no sphere
+MAX_FORM = 0.05  # of the radius; beyond, it is no sphere
 ANOTHER = 0.1  # of the certified radius: then it is another sphere
 NEW_PLACE = 3.0  # mm
 

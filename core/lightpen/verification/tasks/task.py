@@ -225,7 +225,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     purpose: Message  # instruction shown beside the check box of the task
     first: Message  # what to do, in few words
     another: Message  # likewise, for another point than the first
-    known: Message  # said of a point that was touched before
+    known: Message  # message on a point that was probed before
     limits: tuple[str, ...]  # in `VerificationLimits`
     # Raises `CalibrationError` where the points do not suffice.
     measure: Callable[[Runs, Conditions, OptionsT], FoundT]

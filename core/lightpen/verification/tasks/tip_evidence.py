@@ -47,7 +47,7 @@ from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covarian
 BY_CHANCE = 0.015  # probability that a correct tip looks wrong
 MISSED = 0.05  # probability that an error of the stated size is missed
 TIP_SIGMA = 3.0  # mm, by which another tip may differ
-LARGEST = 1.0  # mm; points that show no smaller error show none
+LARGEST = 1.0  # mm; least detectable error above which there is no evidence
 
 
 @dataclass(frozen=True, eq=False)

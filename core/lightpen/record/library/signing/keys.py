@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 KEYS = "LIGHTPEN_KEYS"  # names the variable with the folder of the private keys
 WHAT = message("file.station-key")
 SALT_LENGTH = 16  # bytes
-PRIVATE = 0o600  # mode of files with keys or with what passwords can be guessed from
+PRIVATE = 0o600  # mode of files with keys or with data to guess passwords by
 _SEED_LENGTH = 32  # bytes
 _MEMORY_KIB, _TIME_COST, _LANES = 65_536, 3, 4
 _CHAIN_LENGTH = 32  # hexadecimal digits
