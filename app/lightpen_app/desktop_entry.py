@@ -22,9 +22,9 @@ ENTRY = """\
 Type=Application
 Version=1.4
 Name=Lightpen
-Name[zh_CN]=Lightpen 光笔校准
+Name[zh_CN]=Lightpen 光笔标定
 Comment=Calibrate the probe tip of a light pen
-Comment[zh_CN]=校准光笔的测头
+Comment[zh_CN]=标定光笔的测头
 Exec={program} open %f
 TryExec={tried}
 Icon=lightpen
@@ -36,7 +36,7 @@ Actions=new;
 
 [Desktop Action new]
 Name=New calibration
-Name[zh_CN]=新的校准
+Name[zh_CN]=新的标定
 Exec={program}
 """
 TYPES = f"""\

@@ -14,7 +14,7 @@ ${Words} DESKTOP_ICON "Icon on the desktop" "桌面图标"
 ${Words} DESKTOP_ABOUT "An icon on the desktop that starts ${NAME}." "在桌面上放置启动 ${NAME} 的图标。"
 ${Words} CONSOLE "${NAME} command line" "${NAME} 命令行"
 ${Words} SWING_FILE "${NAME} swing" "${NAME} 摆动记录"
-${Words} RESULT_FILE "${NAME} result" "${NAME} 校准结果"
+${Words} RESULT_FILE "${NAME} result" "${NAME} 标定结果"
 ${Words} OLD_WINDOWS \
   "${NAME} needs Windows 10 (version 1809) or later." \
   "${NAME} 需要 Windows 10（版本 1809）或更高版本。"
