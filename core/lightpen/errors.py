@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lightpen.messages import Message, Value, shown
+from lightpen.messages import Message, Value, message_values
 
 
 class LightpenError(Exception):
@@ -13,7 +13,9 @@ class LightpenError(Exception):
 
     def __init__(self, content: Message | str, /, **values: Value | Path) -> None:
         self.message = (
-            Message(content, shown(values)) if isinstance(content, str) else content
+            Message(content, message_values(values))
+            if isinstance(content, str)
+            else content
         )
         super().__init__(self.message)
 

@@ -118,10 +118,10 @@ def message(code: str, /, **values: Value | Path) -> Message:
 
     Unprintable characters of paths are escaped.
     """
-    return Message(code, shown(values))
+    return Message(code, message_values(values))
 
 
-def shown(values: Mapping[str, Value | Path]) -> dict[str, Value]:
+def message_values(values: Mapping[str, Value | Path]) -> dict[str, Value]:
     """Return the values of a message, with paths as text."""
     return {
         name: printable(str(value)) if isinstance(value, Path) else value
