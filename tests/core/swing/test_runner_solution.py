@@ -233,6 +233,7 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
 def test_holding_the_pen_upright_and_still_after_the_verdict_is_reported_once(
     solved: "Station",
 ) -> None:
+    solved.see(3)  # until the hand has done what it was guided to last
     solved.operator.lean(0.4, 0.0, 0.0)
     solved.see(35)
     assert SwingEventKind.CONFIRMED not in solved.witness.event_kinds

@@ -580,7 +580,7 @@ def test_finishing_early_says_what_is_missing() -> None:
 
 @pytest.mark.slow
 def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
-    limits = SwingLimits(max_uncertainty=4e-3, min_images=30, max_images=40)
+    limits = SwingLimits(max_uncertainty=0.01, min_images=30, max_images=40)
     station = Station(limits=limits, pen=EXACT_PEN)
     station.operator.seat()
     station.run(120.0, until=Phase.SOLVING)
