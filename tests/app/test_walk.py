@@ -62,6 +62,7 @@ SAME_EVERYWHERE = {
 BEST_FIT = "tip_in_leds_csv_frame_bestfit"
 
 
+@pytest.mark.slow
 def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     _check_round(walker)
     for name, text in {**NAMES, **FEW}.items():

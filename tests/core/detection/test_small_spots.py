@@ -102,11 +102,11 @@ def test_small_leds_of_which_a_part_is_hidden_are_flagged(
         (replace(EASY, width=4.0), 0.027),
         (EASY, 0.0165),
         (replace(EASY, width=10.0), 0.012),
-        (replace(EASY, width=12.0, reflections=(0.1, 0.4)), 0.0105),
-        (replace(HARD, width=8.0), 0.026),
         *(
             pytest.param(panel, limit, marks=pytest.mark.slow)
             for panel, limit in (
+                (replace(EASY, width=12.0, reflections=(0.1, 0.4)), 0.0105),
+                (replace(HARD, width=8.0), 0.026),
                 (replace(HARD, width=8.0, darkening=0.75), 0.031),
                 (replace(HARD, width=14.0), 0.018),
                 (replace(EASY, width=10.0, gains=(2.0, 6.0), bloom=0.15), 0.018),
@@ -119,7 +119,7 @@ def test_centers_are_better_than_by_a_gaussian_fit(panel: Panel, limit: float) -
     assert found_on(panel).rms < limit
 
 
-@pytest.mark.parametrize("width", [5.0, 7.0])
+@pytest.mark.parametrize("width", [5.0, pytest.param(7.0, marks=pytest.mark.slow)])
 def test_clipped_leds_that_bloom_have_centers(width: float) -> None:
     found = found_on(replace(EASY, gains=(2.0, 6.0), width=width))
     assert np.mean((found.flaws & SpotFlaw.SATURATED) > 0) > 0.9

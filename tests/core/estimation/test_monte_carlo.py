@@ -131,6 +131,7 @@ def test_mechanics_move_the_tip_in_a_trial(calibration: Calibration) -> None:
     assert np.std(differences, axis=0)[1] > 0.001
 
 
+@pytest.mark.slow
 def test_domes_that_all_stand_out_alike_move_the_tip_along_the_normals(
     calibration: Calibration,
 ) -> None:

@@ -368,7 +368,10 @@ def test_a_correct_set_before_a_lens_with_a_large_field_is_accepted(seed: int) -
     assert calibrated(views).change is None
 
 
-@pytest.mark.parametrize(("seed", "length"), [(1, (0.15, 0.5)), (3, (0.5, 0.5))])
+@pytest.mark.parametrize(
+    ("seed", "length"),
+    [pytest.param(1, (0.15, 0.5), marks=pytest.mark.slow), (3, (0.5, 0.5))],
+)
 def test_a_lens_field_alone_is_no_reason_to_search_for_alternatives(
     monkeypatch: pytest.MonkeyPatch, seed: int, length: tuple[float, float]
 ) -> None:

@@ -500,6 +500,7 @@ def test_computing_can_be_stopped_and_begun_again(
     until_verdict(qtbot, desk)
 
 
+@pytest.mark.slow
 def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
     qtbot: QtBot, at_verdict: Desk
 ) -> None:
@@ -754,6 +755,7 @@ def test_enter_presses_the_main_button_unless_another_was_chosen(
     capturing.click("Continue swinging")
 
 
+@pytest.mark.slow
 def test_space_pauses_even_after_a_click_on_the_simulated_hand(
     qtbot: QtBot, capturing: Desk
 ) -> None:

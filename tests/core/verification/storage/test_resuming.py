@@ -200,6 +200,7 @@ def test_killed_it_is_offered_and_keeps_every_touch(
     assert len(touched(state)) in (n_touches, n_touches + 1)  # one may not be reported
 
 
+@pytest.mark.slow
 def test_a_part_goes_on_after_a_kill_and_gives_the_same_figures(
     in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -243,6 +244,7 @@ def test_a_part_goes_on_after_a_kill_and_gives_the_same_figures(
             assert again[name] == record[name]
 
 
+@pytest.mark.slow
 def test_a_moved_part_goes_on_after_a_kill_in_its_new_position(
     in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
