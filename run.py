@@ -259,7 +259,7 @@ def main(arguments: Sequence[str]) -> int:
             environment.set_up("development")
             return lock(environment)
         case ["bench", *options]:
-            environment.set_up("program")
+            environment.set_up("development")  # with the programs it compares to
             os.chdir(ROOT)
             become([environment.program("python"), "benchmarks/run.py", *options])
         case ["test", *options]:
