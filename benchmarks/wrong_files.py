@@ -53,9 +53,9 @@ FEW = 60  # images
 SIGMA = 0.03  # px
 STREAM = 5  # of the seeds
 NORMAL_95 = 1.959964
-# Per cent, of camera files, and of all else; 300 intervals of 95 % give 92 to 98.
+# Per cent, of intrinsics files, and of all else; 300 intervals of 95 % give 92 to 98.
 COVERED_FILES, COVERED = (93.0, 99.0), (90.0, 99.0)
-# Standard uncertainties that a camera file states.
+# Standard uncertainties that a intrinsics file states.
 FOCAL, ASPECT, CENTRE, K1, K2, TANGENTIAL = 0.003, 0.0003, 3.0, 0.02, 0.1, 3e-4
 
 
@@ -69,7 +69,7 @@ class Flaws:
     Attributes
     ----------
     camera_is_poor : bool
-        Whether the camera file states, and is off by, several times what views of a
+        Whether the intrinsics file states, and is off by, several times what views of a
         board leave open.
     led_sigma, scale_sigma : float
         Errors of the LED file, stated in it, mm and relative.
@@ -89,8 +89,8 @@ class Flaws:
 
 
 TRIALS = {
-    "camera file drawn from its covariance, 60 images": Flaws(camera_is_poor=True),
-    "camera file drawn from its covariance, 300 images": Flaws(
+    "intrinsics file drawn from its covariance, 60 images": Flaws(camera_is_poor=True),
+    "intrinsics file drawn from its covariance, 300 images": Flaws(
         n_images=300, camera_is_poor=True
     ),
     "LED file in error by 10 \u00b5m, its scale by 1e-4": Flaws(
@@ -112,12 +112,12 @@ TRIALS = {
 BASELINE = 1000.0  # mm, between two cameras
 FOCAL_OFF = 0.001  # of the focal length of one
 RIG_LIMIT = 0.005  # mm
-# By what a camera file that states nothing is off: factor of the focal length, cy, px,
+# By what a intrinsics file that states nothing is off: factor of the focal length, cy, px,
 # and whether the distortion is there at all.
 UNSTATED = ((1.003, 0.0, 1), (1.009, 0.0, 1), (1.0, 3.0, 1), (1.0, 10.0, 1), (1, 0, 0))
 N_UNSTATED = 30  # calibrations with each
 UNSTATED_IMAGES = 300
-MEDIAN_LIMITS = {60: 0.007, 300: 0.004}  # mm, of camera files drawn
+MEDIAN_LIMITS = {60: 0.007, 300: 0.004}  # mm, of intrinsics files drawn
 
 
 def wrong_file_rows(workers: Workers) -> list[Row]:

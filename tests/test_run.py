@@ -184,12 +184,12 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Started]:
     return start
 
 
-def test_the_benchmark_gets_its_options_in_the_environment_of_the_program(
+def test_the_benchmark_gets_its_options_in_the_environment_for_development(
     started: Callable[..., Started],
 ) -> None:
     bench = started("bench", "speed")
 
-    assert bench.group == "program"
+    assert bench.group == "development"
     assert bench.python == run.Environment(run.ROOT).program("python")
     script, *options = bench.options
     assert Path(script).is_file()
