@@ -55,7 +55,7 @@ STREAM = 5  # of the seeds
 NORMAL_95 = 1.959964
 # Per cent, of intrinsics files, and of all else; 300 intervals of 95 % give 92 to 98.
 COVERED_FILES, COVERED = (93.0, 99.0), (90.0, 99.0)
-# Standard uncertainties that a intrinsics file states.
+# Standard uncertainties that an intrinsics file states.
 FOCAL, ASPECT, CENTRE, K1, K2, TANGENTIAL = 0.003, 0.0003, 3.0, 0.02, 0.1, 3e-4
 
 
@@ -112,8 +112,8 @@ TRIALS = {
 BASELINE = 1000.0  # mm, between two cameras
 FOCAL_OFF = 0.001  # of the focal length of one
 RIG_LIMIT = 0.005  # mm
-# By what a intrinsics file that states nothing is off: factor of the focal length, cy, px,
-# and whether the distortion is there at all.
+# Errors of an intrinsics file that states no uncertainty: factor of the focal length,
+# cy, px, and whether the distortion is there at all.
 UNSTATED = ((1.003, 0.0, 1), (1.009, 0.0, 1), (1.0, 3.0, 1), (1.0, 10.0, 1), (1, 0, 0))
 N_UNSTATED = 30  # calibrations with each
 UNSTATED_IMAGES = 300
