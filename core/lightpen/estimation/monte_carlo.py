@@ -40,6 +40,7 @@ from lightpen.messages import Message, message
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.information import symmetric_root
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
 
@@ -241,7 +242,7 @@ def _drawn_moves(trials: Trials, rng: np.random.Generator) -> FloatArray:
     """Return the offset of the tip in the cone in each image, (N, 3), mm."""
     by_form = _drawn(trials.move_covariance, rng).reshape(-1, N_CONE)
     draws = rng.standard_normal((len(trials.forms), N_CONE))
-    shaken = draws @ _symmetric_root(trials.jitter)
+    shaken = draws @ symmetric_root(trials.jitter)
     return np.asarray(trials.forms @ by_form + shaken)
 
 
@@ -302,10 +303,4 @@ def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
 
 def _drawn(covariance: FloatArray, rng: np.random.Generator) -> FloatArray:
     draws = rng.standard_normal(len(covariance))
-    return np.asarray(_symmetric_root(covariance) @ draws)
-
-
-def _symmetric_root(covariance: FloatArray) -> FloatArray:
-    """Return the symmetric square root: the same draws with every library."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
+    return np.asarray(symmetric_root(covariance) @ draws)

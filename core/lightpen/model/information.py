@@ -26,3 +26,12 @@ def inverse(matrix: FloatArray) -> FloatArray:
     # As scipy.linalg.cho_solve, whose import takes 0.03 s.
     root = np.linalg.inv(np.linalg.cholesky(matrix * np.outer(scale, scale))) * scale
     return np.asarray(root.T @ root)
+
+
+def symmetric_root(covariance: FloatArray) -> FloatArray:
+    """Return the symmetric square root (k, k) of a covariance, also a singular one.
+
+    Unlike other roots it is unique, so draws by it are the same with every library.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

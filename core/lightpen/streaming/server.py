@@ -34,8 +34,8 @@ LAST_PORT = 65535
 MOST_CLIENTS = 16
 ON_THE_WAY = 16_384  # bytes; a slow client misses poses rather than get old ones
 ROOM = 4096  # bytes; what clients send is ignored
-RECENT = 40  # poses offered to a client, by which it is judged slow
-SLOW = 4  # or more
+RECENT = 40  # number of poses, the latest offered to a client
+SLOW = 4  # of these missed, or more, by a client that counts as slow
 IDLE_S = 20.0  # a client that takes no data for so long is dropped
 # TCP keep-alive of the system, to detect clients with a cut connection.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}

@@ -25,10 +25,8 @@ from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.undo_buttons import UndoButtons
 from lightpen_app.work.workbench import Workbench
 
-SHARES, VERY_LARGE_SHARES = (
-    (40, 29, 31),
-    (26, 32, 42),
-)  # of table, pen in space and image
+# Of table, pen in space and image
+SHARES, VERY_LARGE_SHARES = (40, 29, 31), (26, 32, 42)
 
 
 class LedsPage(ResponsiveLayout, Page):

@@ -27,6 +27,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
 from lightpen.model.decision_rules import Decision
 from lightpen.model.expanded_uncertainty import COVERAGE
+from lightpen.model.information import symmetric_root
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
     CALIBRATE_AGAIN,
@@ -233,8 +234,7 @@ def _flatness_by_noise(
     blocks = joint_covariance(points, conditions.instrument).reshape(n, 3, n, 3)
     along = np.einsum("i,minj,j->mn", fit.normal_cam, blocks, fit.normal_cam)
     along += float(fit.normal_cam**2 @ conditions.drift**2) * np.eye(n)
-    values, vectors = np.linalg.eigh(fit.weights @ along @ fit.weights)
-    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    root = symmetric_root(fit.weights @ along @ fit.weights)
     usual, largest = np.quantile(
         simulated_ranges(root), [COVERAGE, 1 - UNUSUAL]
     ).tolist()
