@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Callable
 from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import TypeAlias
@@ -19,7 +20,10 @@ from lightpen.archive.store.database import look_into
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
+from lightpen.model.limits import StationLimits, VerificationLimits
 from lightpen.record.folder.verifications import read_verification
+from lightpen.record.library.supervision import Signature
+from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import PAPER_TIP, simulate_centers, swing_poses
 from lightpen.swing.preparation import Preparation
@@ -192,3 +196,31 @@ def test_repeatability_is_entered_with_the_tips_it_is_of(
     assert [each["file"] for each in content["inputs"]["files"]] == [
         *(result.name, other.name)
     ]
+
+
+def test_options_never_widen_the_limits_of_a_guarded_station(
+    verify: Verify, tmp_path: Path
+) -> None:
+    data, eve = tmp_path / "data", Signature("Eve", "a long password")
+    now = datetime(2031, 5, 1, tzinfo=UTC)
+    own = StationLimits(verification=VerificationLimits(tip=0.02, risk=4.0))
+    save_limits(data, "Hall 2", own, eve, "", now)
+
+    for wider in (
+        ("--limit-tip", "9"),
+        ("--limit-tip", "0.021"),
+        ("--limit-across", "1"),
+        ("--decision-rule", "risk"),
+        ("--max-risk", "50"),
+    ):
+        outcome = verify(*wider, moved=0.03)
+        assert outcome.returncode == 2, wider
+        assert "for this station" in outcome.stderr
+    assert not list(data.rglob("verifications/*.json"))
+
+    verify("--limit-tip", "0.01", "--decision-rule", "guard-band")
+    verify(moved=0.03)
+    narrow, usual = (e for e in entered(data) if e.kind == "verification")
+    assert narrow.settings["max_tip_mm"] == 0.01
+    assert usual.settings["max_tip_mm"] == 0.02
+    assert usual.outcome == "refused"

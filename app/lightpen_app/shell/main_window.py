@@ -574,6 +574,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     def _confirmed(self, question: str) -> bool:
         box = QMessageBox(self)
         box.setIcon(QMessageBox.Icon.Question)
+        box.setTextFormat(Qt.TextFormat.PlainText)
         box.setText(question)
         stay = box.addButton(self.tr("Keep open"), QMessageBox.ButtonRole.RejectRole)
         box.addButton(self.tr("Close anyway"), QMessageBox.ButtonRole.AcceptRole)

@@ -15,6 +15,7 @@ from lightpen.swing.status import SwingStatus
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.shell.step_list import Step, StepList
 from lightpen_app.widgets.origin_mark import origin_message
@@ -194,5 +195,5 @@ class Sidebar(Translated, QFrame):
         ):
             with_key = f"{text}  \u00b7  {key}"
             button.setText(text if self._room.is_narrow else with_key)
-            button.setToolTip(with_key if self._room.is_narrow else "")
+            set_tooltip(button, with_key if self._room.is_narrow else "")
             button.setAccessibleName(text)

@@ -9,6 +9,7 @@ from typing_extensions import override
 from lightpen.streaming.server import LAST_PORT, LOOPBACK, StreamPlace, StreamStatus
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
@@ -132,11 +133,12 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         )
         self._address_label.setText(self.tr("Address"))
         self._address.setAccessibleName(self.tr("Address"))
-        self._address.setToolTip(
+        set_tooltip(
+            self._address,
             self.tr(
                 "{0} for this computer only, {1} for all networks, or an address of "
                 "this computer."
-            ).format(LOOPBACK, EVERYWHERE)
+            ).format(LOOPBACK, EVERYWHERE),
         )
         self._port_label.setText(self.tr("Port"))
         self._port.setAccessibleName(self.tr("Port"))

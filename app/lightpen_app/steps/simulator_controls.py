@@ -5,6 +5,7 @@ from collections.abc import Callable
 from PySide6.QtWidgets import QAbstractButton, QFrame, QWidget
 
 from lightpen.simulator.hand import Operator
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import LiveView
 
@@ -33,5 +34,5 @@ class SimulatorControls(Translated, QFrame):
 def set_words(button: QAbstractButton, text: str, tooltip: str) -> None:
     """Set the text of a button and its tool tip."""
     button.setText(text)
-    button.setToolTip(tooltip)
+    set_tooltip(button, tooltip)
     button.setAccessibleDescription(tooltip)

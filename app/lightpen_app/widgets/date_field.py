@@ -5,6 +5,7 @@ from datetime import date
 from PySide6.QtCore import Signal
 
 from lightpen_app.look.theme import Tone, set_tone
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.translated import Translated
 
@@ -50,6 +51,7 @@ class DateField(Translated, EnterEdit):
             self.value_changed.emit()
 
     def _retranslate(self) -> None:
-        self.setToolTip(
-            self.tr("Date, for example {0}; empty for any date").format(self._example)
+        set_tooltip(
+            self,
+            self.tr("Date, for example {0}; empty for any date").format(self._example),
         )

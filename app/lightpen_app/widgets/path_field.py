@@ -18,6 +18,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import Tone, set_tone
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.keys import ENTER_KEYS
 
 QUOTES = "\"'"
@@ -86,7 +87,7 @@ class PathField(QWidget):
         """Show another path."""
         self._value, self._last = value, value or self._last
         self.edit.setText(value)
-        self.edit.setToolTip(value)
+        set_tooltip(self.edit, value)
 
     def set_faulty(self, faulty: bool) -> None:
         """Mark the path as not existing."""

@@ -15,6 +15,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture, rotations_of
 from lightpen_app.look.signs import draw_arrow
 from lightpen_app.look.theme import Colors, colors_of
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 
 RAISED = math.radians(24)  # of the eye above the plane of the cone
@@ -93,8 +94,8 @@ class PenInSpace(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self.setAccessibleName(self.tr("The pen in space"))
-        self.setToolTip(
-            self.tr("Current tilt of the pen and outline of the target posture")
+        set_tooltip(
+            self, self.tr("Current tilt of the pen and outline of the target posture")
         )
 
 

@@ -21,6 +21,7 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import MAX_COORDINATE, Pen
 from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, font
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 
 START_YAW, START_PITCH = math.radians(-20), math.radians(16)
@@ -363,7 +364,9 @@ class PenView(Translated, QWidget):
         pen = self._value.pen
         n_leds = 0 if pen is None else pen.n_leds
         self.setAccessibleDescription(self.tr("{0} LEDs").format(n_leds))
-        self.setToolTip(self.tr("Drag or press the arrow keys to rotate, 0 to reset."))
+        set_tooltip(
+            self, self.tr("Drag or press the arrow keys to rotate, 0 to reset.")
+        )
 
 
 def _turn_matrix(yaw: float, pitch: float) -> FloatArray:

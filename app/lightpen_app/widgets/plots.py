@@ -188,7 +188,7 @@ class Plot(QWidget):
         self._title_px = self._fitted_title_px()
         size = f"{self._title_px}px"
         title = {"color": colors.text, "size": size, "justify": "left"}
-        self._item.setTitle(self._axes.title, **title)
+        self._item.setTitle(escape(self._axes.title), **title)
         if names := self._named_curves():  # beside the title they hide nothing
             words = title_with_names(self._axes.title, names, colors)
             self._item.titleLabel.setText(words)
@@ -199,7 +199,7 @@ class Plot(QWidget):
             axis.setTickFont(font(TextSize.SMALL))
             label = {"color": colors.muted, "font-size": f"{scaled(TextSize.SMALL)}px"}
             if words:
-                axis.setLabel(words, **label)
+                axis.setLabel(escape(words), **label)
             else:
                 axis.showLabel(False)
 

@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QPushButton
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 
 LEAST_WIDTH = 8 * GRID + 34  # px; with the padding and the border
 
@@ -27,7 +28,7 @@ class PushButton(QPushButton):
     def set_why_not(self, why_not: str, tooltip: str = "") -> None:
         """Disable the button with a reason, or enable it with a tool tip."""
         self.setEnabled(not why_not)
-        self.setToolTip(why_not or tooltip)
+        set_tooltip(self, why_not or tooltip)
         self.setAccessibleDescription(why_not or tooltip)
 
     @override

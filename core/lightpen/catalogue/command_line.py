@@ -52,6 +52,7 @@ MESSAGES = {
     "library.only-references": "Only a reference has a certified value; {id} is none.",
     "library.no-point": "--{option} takes three numbers, X Y Z, or none.",
     "cli.discover-length-words": "'{words}' is not a length. Give two LEDs and a length in mm, as in 'longest 180.02' or '1 4 180.02', and IMAGES before it.",
+    "cli.wider-limit": "The limit '{limit}' is set to {station} for this station, and {given} is wider. Give a narrower one, or none.",
     "cli.discover-output-twice": "{file} would replace an input file or another result. Give each result a different name.",
     "cli.discover-suffix": "{file} does not end in {suffix}. Choose a name that does.",
     "cli.discover-images-or-centers": "Give either IMAGES or --centers FILE.csv.",

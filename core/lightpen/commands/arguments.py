@@ -166,40 +166,40 @@ def add_conditions(
 
 def add_limits(parser: argparse.ArgumentParser, *names: str) -> None:
     """Add options for fields of `VerificationLimits`; `chosen_limits` reads them."""
+    parser.set_defaults(limits=names)
     for limit in LIMITS:
         if limit.part == "verification" and limit.name in names:
             parser.add_argument(
                 f"--limit-{limit.name.replace('_', '-')}",
                 type=above_zero if limit.range[0] else not_negative,
-                default=limit.default,
                 metavar=limit.unit.upper(),
                 help=f"{limit.label} ({limit.default:g})",
             )
 
 
 def chosen_limits(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the limits that were added to the options, by their names."""
-    prefix = "limit_"
-    return {
-        name.removeprefix(prefix): value
-        for name, value in vars(options).items()
-        if name.startswith(prefix)
+    """Return the limits and the decision rule that are given, by their names."""
+    given = {
+        name: getattr(options, f"limit_{name}", None)
+        for name in getattr(options, "limits", ())
     }
+    rule = getattr(options, "decision_rule", None)
+    given["rule"] = None if rule is None else RULE_WORDS[rule]
+    given["risk"] = getattr(options, "max_risk", None)
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def add_verdict(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the verdict and its output; `limits_by` reads the rule."""
+    """Add the options of the verdict and its output; see `chosen_limits`."""
     parser.add_argument(
         "--decision-rule",
         choices=tuple(RULE_WORDS),
-        default="simple",
         help="how a value with U is compared with its limit: simple acceptance, guard "
         "band (ISO 14253-1), or risk (JCGM 106)",
     )
     parser.add_argument(
         "--max-risk",
         type=number_from(0.1, 50.0, "risk", "%"),
-        default=VerificationLimits().risk,
         metavar="PERCENT",
         help="risk of a wrong decision by --decision-rule risk (5)",
     )
@@ -214,13 +214,6 @@ def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
         help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
         "if it is CHECK (not proven)",
     )
-
-
-def limits_by(options: argparse.Namespace) -> VerificationLimits:
-    """Return the limits that were added to the options, with the decision rule."""
-    rule = RULE_WORDS[options.decision_rule]
-    chosen = VerificationLimits(rule=rule, risk=options.max_risk)
-    return replace(chosen, **chosen_limits(options))
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

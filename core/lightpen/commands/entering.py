@@ -3,17 +3,20 @@
 import argparse
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from lightpen.commands.arguments import add_conditions
+from lightpen.commands.arguments import add_conditions, chosen_limits
 from lightpen.commands.console import shown, write_record
+from lightpen.errors import UsageError
 from lightpen.local_time import local_now
-from lightpen.model.limits import StationLimits
+from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.limits import StationLimits, VerificationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
 from lightpen.record.folder.verifications import attributed
+from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
@@ -45,6 +48,42 @@ def add_entering(parser: argparse.ArgumentParser) -> None:
     add_conditions(parser)
 
 
+def limits_in_force(
+    options: argparse.Namespace, tip: CalibrationFile | None
+) -> VerificationLimits:
+    """Return the limits of a verification that is entered in a data folder.
+
+    Those of a station with a supervisor can be tightened by options, not widened
+    (`UsageError`).
+    """
+    chosen, data = chosen_limits(options), _data_of_entry(options, tip)
+    supervision = None if data is None else read_supervision(data)
+    if supervision is None or not supervision.is_guarded:
+        return replace(VerificationLimits(), **chosen)
+    station = (NOBODY if tip is None else tip.names).station
+    own = supervision.limits_at(station, StationLimits()).verification
+    limits = replace(own, **chosen)
+    wider = [
+        each.name
+        for each in fields(own)
+        if each.name != "rule" and getattr(limits, each.name) > getattr(own, each.name)
+    ]
+    rules = limits.rule, own.rule
+    if rules[0] is not rules[1] and rules != (
+        DecisionRule.GUARD_BAND,
+        DecisionRule.SIMPLE,
+    ):
+        wider.append("rule")
+    for name in wider:
+        raise UsageError(
+            "cli.wider-limit",
+            limit=name.replace("_", " "),
+            given=f"{getattr(limits, name)}",
+            station=f"{getattr(own, name)}",
+        )
+    return limits
+
+
 def keep_record(
     options: argparse.Namespace,
     record: Mapping[str, Any],
@@ -69,11 +108,12 @@ def keep_record(
     }
     if options.json is not None:
         write_record(options.json, record)
-    data = options.data or (None if tip is None else data_folder_of(tip.path))
-    if options.no_entry or data is None:
+    data = _data_of_entry(options, tip)
+    if data is None:
         print("This result is not entered in an archive.")
-        if data is not None and not is_simulated:
-            _print_overdue(data, names)
+        folder = None if tip is None else data_folder_of(tip.path)
+        if folder is not None and not is_simulated:
+            _print_overdue(folder, names)
         return
     # Imported here: it takes 0.2 s.
     from lightpen.archive.logbook.lazy_logbook import server_address
@@ -86,6 +126,15 @@ def keep_record(
     if not is_simulated:
         _print_overdue(data, names)
     print(shown(f"Entered in the archive: {kept}"))
+
+
+def _data_of_entry(
+    options: argparse.Namespace, tip: CalibrationFile | None
+) -> Path | None:
+    """Return the data folder in which a result is entered; None of one that is not."""
+    if getattr(options, "no_entry", True):
+        return None
+    return options.data or (None if tip is None else data_folder_of(tip.path))
 
 
 def _print_overdue(data: Path, names: Names) -> None:

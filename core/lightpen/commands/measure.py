@@ -28,7 +28,7 @@ from lightpen.verification.tasks.task import BALL_OPTION
 
 def add_measure(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen measure``."""
-    parser.set_defaults(run=_measure, decision_rule="simple", max_risk=5.0)
+    parser.set_defaults(run=_measure)
     parser.add_argument("plan", type=Path, metavar="PLAN.yaml", help="measuring plan")
     parser.add_argument(
         "touches",

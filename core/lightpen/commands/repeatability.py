@@ -1,7 +1,6 @@
 """``lightpen repeatability``: one tip calibrated several times."""
 
 import argparse
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from lightpen.commands.arguments import (
     add_pen_options,
     add_verdict,
     finite,
-    limits_by,
 )
 from lightpen.commands.console import (
     printing,
@@ -23,7 +21,7 @@ from lightpen.commands.console import (
     shown,
     verdict_status,
 )
-from lightpen.commands.entering import add_entering, keep_record
+from lightpen.commands.entering import add_entering, keep_record, limits_in_force
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
@@ -88,10 +86,11 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         help="reference tip from a more accurate instrument, mm, for Cgk",
     )
     usual = VerificationLimits().repeatability
+    parser.set_defaults(limits=("repeatability",))
     parser.add_argument(
         "--limit",
+        dest="limit_repeatability",
         type=above_zero,
-        default=usual,
         metavar="MM",
         help=f"limit of the standard deviation of a coordinate ({usual:g})",
     )
@@ -112,7 +111,7 @@ def _repeatability(options: argparse.Namespace) -> int:
     for one, other in combinations(tips, 2):
         if np.array_equal(one.tip_pen, other.tip_pen):
             raise UsageError("repeatability.twice", one=one.name, other=other.name)
-    limits = replace(limits_by(options), repeatability=options.limit)
+    limits = limits_in_force(options, first)
     rule = rule_in_words(limits)
     found = measure_repeatability(
         tips,

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.commands.arguments import add_cameras_and_pen, chosen_limits, limits_by
+from lightpen.commands.arguments import add_cameras_and_pen
 from lightpen.commands.console import lacking, progress, require_other_file
+from lightpen.commands.entering import limits_in_force
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
@@ -138,7 +139,10 @@ class MeasuredRuns:
                 "witness": lamp_drift_entries(self.lamp_drift),
             },
             assessment,
-            chosen_limits(options),
+            {
+                name: getattr(self.conditions.limits, name)
+                for name in getattr(options, "limits", ())
+            },
             self._input_entries(options),
             rule,
         )
@@ -184,7 +188,7 @@ def measure_runs(
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
-    limits = limits_by(options)
+    limits = limits_in_force(options, calibration)
     lamp_drift = lamp_drift_of(runs, instrument, limits)
     moved = NO_DRIFT if drift is None else read_drift(drift)
     return MeasuredRuns(

@@ -115,7 +115,7 @@ def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
 
 
 def _add_touches(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=_touches, decision_rule="simple", max_risk=5.0)
+    parser.set_defaults(run=_touches)
     _add_runs(parser, "points that were probed")
     parser.add_argument(
         "--ball-diameter",

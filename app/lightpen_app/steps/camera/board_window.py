@@ -17,6 +17,7 @@ from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen.intrinsics.view_progress import ViewProgress, view_progress
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.camera.board_calibration import (
     BoardCalibration,
     facts_text,
@@ -250,12 +251,13 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         )
         self._measured.setAccessibleName(self.tr("Scale check (optional)"))
         self._measured.setPlaceholderText(self.tr("200 200.12 0.04 (mm)"))
-        self._measured.setToolTip(
+        set_tooltip(
+            self._measured,
             self.tr(
                 "Measured with a caliper: stated length, measured length and its U "
                 "(k = 2) in mm. Screen: pixel pitch and its U in mm; the board is then "
                 "in pixels. The scale does not affect the intrinsics of one camera."
-            )
+            ),
         )
         self._folder.setText(self.tr("From a folder..."))
         self._compute.setText(self.tr("Calibrate"))
@@ -263,11 +265,12 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._worst.setAccessibleName(self.tr("Views (worst first)"))
         self._shows_residuals.setText(self.tr("Residuals"))
         self._shows_uncertainty.setText(self.tr("Uncertainty"))
-        self._shows_uncertainty.setToolTip(
+        set_tooltip(
+            self._shows_uncertainty,
             self.tr(
                 "Standard uncertainty of the projection of a point due to the "
                 "intrinsics, over the image / px"
-            )
+            ),
         )
         self._remove.setText(self.tr("Exclude view and recalibrate"))
         self._save.setText(self.tr("Save and use..."))

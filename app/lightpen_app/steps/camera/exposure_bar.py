@@ -9,6 +9,7 @@ from lightpen.detection.inspection import DARK_PEAK, Exposure
 from lightpen.detection.spots import SATURATED_LEVEL
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 
 BAR_HEIGHT = 2 * GRID
@@ -113,7 +114,7 @@ class ExposureBar(Translated, QWidget):
         self.update()
         self.setAccessibleName(self.tr("LED exposure"))
         self.setAccessibleDescription(self.verdict())
-        self.setToolTip(self.levels())
+        set_tooltip(self, self.levels())
 
     def _draw_scale(self, painter: QPainter, bar: QRectF, color: QColor) -> None:
         painter.setPen(color)

@@ -11,6 +11,7 @@ from lightpen.detection.exposure_advice import Advice, advise
 from lightpen.detection.inspection import Exposure, Inspection
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.steps.camera.focus_meter import N_TRACED, FocusMeter
 from lightpen_app.steps.camera.setting_field import SettingField
@@ -122,10 +123,11 @@ class ExposurePanel(Translated, QFrame):
         self._gain_name.setText(self.tr("&Gain"))
         self._gain.setAccessibleName(self.tr("Gain"))
         for field in (self._exposure, self._gain):
-            field.setToolTip(
+            set_tooltip(
+                field,
                 self.tr(
                     "Up and Down keys change the value; Enter applies a typed number."
-                )
+                ),
             )
         self._refresh()
 
@@ -133,11 +135,12 @@ class ExposurePanel(Translated, QFrame):
         self._adjust.setText(
             self.tr("Stop") if self._is_adjusting else self.tr("Auto exposure (LEDs)")
         )
-        self._adjust.setToolTip(
+        set_tooltip(
+            self._adjust,
             self.tr(
                 "Sets exposure and gain so that the brightest LED reaches 80 % of "
                 "full scale."
-            )
+            ),
         )
         if self._capabilities is None:
             self._why_fixed.setText(self.tr("No images are received."))
@@ -272,6 +275,7 @@ class FocusPanel(Translated, QFrame):
 
     def _retranslate(self) -> None:
         self._refresh()
-        self._meter.setToolTip(
-            self.tr("Edge width of the LEDs from dark to bright. Hold the pen still.")
+        set_tooltip(
+            self._meter,
+            self.tr("Edge width of the LEDs from dark to bright. Hold the pen still."),
         )

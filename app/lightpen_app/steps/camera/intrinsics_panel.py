@@ -14,6 +14,7 @@ from lightpen_app.look.quantities import MAX_DECIMALS, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
@@ -129,8 +130,9 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._open.setText(self.tr("Open..."))
         self._calibrate.setText(self.tr("Calibrate camera..."))
         self._discover.setText(self.tr("I have no such file..."))
-        self._discover.setToolTip(
-            self.tr("Find pen, camera and tip by one swing and one length.")
+        set_tooltip(
+            self._discover,
+            self.tr("Find pen, camera and tip by one swing and one length."),
         )
         for label, name in zip(
             self._names,

@@ -19,6 +19,7 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.image_view import ImageView, Marker
@@ -142,13 +143,14 @@ class LivePanel(Translated, QWidget):
         while len(parts) > 1 and metrics.horizontalAdvance(PARTED.join(parts)) > room:
             parts = parts[:-1]
         self._figures.setText(PARTED.join(parts))
-        self._figures.setToolTip(PARTED.join(self._parts))
+        set_tooltip(self._figures, PARTED.join(self._parts))
 
     def _retranslate(self) -> None:
-        self.view.setToolTip(
+        set_tooltip(
+            self.view,
             self.tr(
                 "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
-            )
+            ),
         )
         self._refresh()
 

@@ -14,6 +14,7 @@ from lightpen.cameras.protocol import (
 )
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, on_one_line
 from lightpen_app.steps.camera.setting_field import SettingField
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -232,19 +233,21 @@ class SettingsPanel(Translated, QGroupBox):
         self._height.setAccessibleName(self.tr("Region height"))
         self._y.setAccessibleName(self.tr("Region from top"))
         self._whole.setText(self.tr("Whole sensor"))
-        self._counts.setToolTip(
+        set_tooltip(
+            self._counts,
             self.tr(
                 "Images of this camera: received; incomplete and discarded; lost; "
                 "not processed because the computer was too slow."
-            )
+            ),
         )
         self._rate.setSuffix(" " + self.tr("fps"))
         self._retranslate_counts()
-        self._packet.setToolTip(
+        set_tooltip(
+            self._packet,
             self.tr(
                 "Larger packets reduce the computer load. Network card and switches "
                 "must support them (jumbo frames)."
-            )
+            ),
         )
         self._retranslate_triggers()
         self._hint.set_value(self._format_hint())

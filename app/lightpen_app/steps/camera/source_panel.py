@@ -17,6 +17,7 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
@@ -294,8 +295,9 @@ class SourcePanel(Translated, QGroupBox):
         self._device.set_name(self.tr("Serial number or address"))
         self._search.setText(self.tr("Search"))
         self._samples.setText(self.tr("Use its files"))
-        self._samples.setToolTip(
-            self.tr("Use the intrinsics file and the LED file of the simulated pen.")
+        set_tooltip(
+            self._samples,
+            self.tr("Use the intrinsics file and the LED file of the simulated pen."),
         )
         self._retry.setText(self.tr("Try again"))
         self._refresh()

@@ -10,6 +10,7 @@ from lightpen.live.pipeline import LiveImage
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -148,11 +149,12 @@ class StrayLightPanel(Translated, QGroupBox):
         self._start.setText(self.tr("Search"))
         self._clear.setText(self.tr("Clear mask"))
         self._draw.setText(self.tr("Draw mask on the image"))
-        self._draw.setToolTip(
+        set_tooltip(
+            self._draw,
             self.tr(
                 "Click a spot to mask it, drag to draw a circle, or click a circle "
                 "to remove it."
-            )
+            ),
         )
         self._refresh()
 
@@ -162,7 +164,7 @@ class StrayLightPanel(Translated, QGroupBox):
         self._cover.setText(
             self.tr("Uncover the LEDs") if covers else self.tr("Cover the LEDs")
         )
-        self._cover.setToolTip(self.tr("Done by the simulated operator"))
+        set_tooltip(self._cover, self.tr("Done by the simulated operator"))
         self._mask.setText(
             self.tr("Mask the spots: {0}").format(n_found)
             if n_found

@@ -10,6 +10,7 @@ from lightpen.archive.history.due import DueTip
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, day_text, shortened
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
@@ -94,8 +95,8 @@ class DuePanel(Translated, QWidget):
     def _refresh(self) -> None:
         laid_down = self.tr("Set by a supervisor at Start: All limits...")
         swings = self.tr("Each swing, with any tip, wears the common tip seat.")
-        self._days.setToolTip(laid_down if self._is_guarded else "")
-        self._swings.setToolTip(laid_down if self._is_guarded else swings)
+        set_tooltip(self._days, laid_down if self._is_guarded else "")
+        set_tooltip(self._swings, laid_down if self._is_guarded else swings)
         now = self._now()
         n_due = sum(tip.is_due(now) for tip in self._tips)
         self._head.setText(

@@ -15,6 +15,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, set_size
+from lightpen_app.look.tooltips import plain_tooltip
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.reader import BLOCK
 from lightpen_app.steps.history.texts import (
@@ -111,7 +112,9 @@ class HistoryModel(TitledModel):
             return RIGHT
         if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
             line = self.line(index.row())
-            return UNREAD if line is None else _text(line, column)
+            text = UNREAD if line is None else _text(line, column)
+            is_tip = role == Qt.ItemDataRole.ToolTipRole
+            return plain_tooltip(text) if is_tip else text
         if role == Qt.ItemDataRole.ForegroundRole and column in (WHAT, VERDICT):
             line = self.line(index.row())
             tone = Tone.PLAIN if line is None else line_tone(line, column == VERDICT)

@@ -23,6 +23,7 @@ from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -132,8 +133,9 @@ class SelectionPanel(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._adjust.setText(self.tr("Adjust together"))
-        self._adjust.setToolTip(
-            self.tr("LED file and intrinsics file by all selected swings of a pen")
+        set_tooltip(
+            self._adjust,
+            self.tr("LED file and intrinsics file by all selected swings of a pen"),
         )
         too_few = self.tr(
             "To adjust together, select {0} or more calibrations."

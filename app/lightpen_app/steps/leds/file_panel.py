@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
 from lightpen.formats.pen_content import UNITS
 from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.focus import give_focus
@@ -218,8 +219,9 @@ class LedFilePanel(Translated, QWidget):
         self._save.setText(self.tr("Save as..."))
         self._samples.setText(self.tr("Use file of the simulated pen"))
         self._discover.setText(self.tr("I have no such file..."))
-        self._discover.setToolTip(
-            self.tr("Find pen, camera and tip by one swing and one length.")
+        set_tooltip(
+            self._discover,
+            self.tr("Find pen, camera and tip by one swing and one length."),
         )
         self.set_exchange(self._pair)
         self._refresh_save_words()

@@ -10,6 +10,7 @@ from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.pen_view import PenPicture, PenView
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -69,11 +70,12 @@ class FramePanel(Translated, QGroupBox):
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Pen and pen frame"))
         self._move.setText(self.tr("Transform to pen frame"))
-        self._move.setToolTip(
+        set_tooltip(
+            self._move,
             self.tr(
                 "The coordinates are in another frame, for example of a measuring "
                 "machine."
-            )
+            ),
         )
         self._refresh()
 
@@ -90,7 +92,7 @@ class FramePanel(Translated, QGroupBox):
                 "as is."
             )
             note = StatusMessage(words, Sign.WARNING, Tone.QUIET)
-            self._layout_note.setToolTip(worded(value.remark))
+            set_tooltip(self._layout_note, worded(value.remark))
         self._layout_note.set_value(note)
 
     def _show(self, rule: Rule, check: RuleCheck | None) -> None:
@@ -106,7 +108,7 @@ class FramePanel(Translated, QGroupBox):
         met = check.outcome is RuleStatus.MET
         outcome = self.tr("fulfilled") if met else self.tr("not fulfilled")
         label.setAccessibleDescription(outcome)
-        label.setToolTip(outcome)
+        set_tooltip(label, outcome)
 
     def _words(self, rule: Rule) -> str:
         match rule:

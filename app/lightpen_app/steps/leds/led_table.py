@@ -19,6 +19,7 @@ from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, Tone, colors_of
+from lightpen_app.look.tooltips import plain_tooltip
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.row_table import Index, TitledModel
 from lightpen_app.widgets.translated import Translated
@@ -226,7 +227,7 @@ class _DraftModel(TitledModel):
                 side = Qt.AlignmentFlag.AlignHCenter if middle else _RIGHT
                 return side | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.ToolTipRole:
-                return self._remark(row, column)
+                return plain_tooltip(self._remark(row, column))
             case Qt.ItemDataRole.AccessibleTextRole:
                 return ": ".join(
                     filter(None, (self._text(row, column), self._remark(row, column)))

@@ -21,6 +21,7 @@ from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.push_button import PushButton
@@ -191,10 +192,11 @@ class MatchPanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Live match"))
-        self.view.setToolTip(
+        set_tooltip(
+            self.view,
             self.tr(
                 "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
-            )
+            ),
         )
         self.view.set_message(self.tr("No image yet"))
         self._refresh()

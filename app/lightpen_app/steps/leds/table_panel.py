@@ -13,6 +13,7 @@ from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.quantities import AXES
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.leds.led_table import LedTable
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
@@ -158,7 +159,7 @@ class LedTablePanel(Translated, QGroupBox):
         )
         n_leds, chosen = self._value.n_leds, self._table.chosen()
         self._add.setEnabled(n_leds < MAX_LEDS)
-        self._add.setToolTip(self.tr("Add an LED at the end"))
+        set_tooltip(self._add, self.tr("Add an LED at the end"))
         if not chosen:
             why_not = self.tr("Select an LED in the table.")
         elif n_leds <= MIN_LEDS:
@@ -192,9 +193,9 @@ class LedTablePanel(Translated, QGroupBox):
         for axis, edit in zip(AXES, self._tip, strict=True):
             name = self.tr("Nominal tip centre, {0}, mm").format(axis)
             edit.setAccessibleName(name)
-            edit.setToolTip(name)
+            set_tooltip(edit, name)
             edit.setPlaceholderText(axis)
-        self._diameter.setToolTip(self._diameter.accessibleName())
+        set_tooltip(self._diameter, self._diameter.accessibleName())
         self._refresh()
 
 

@@ -11,6 +11,7 @@ from lightpen.record.swings.image_list import ImageRow
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import plain_tooltip
 from lightpen_app.widgets.row_table import RIGHT, Index, RowTable, TitledModel
 from lightpen_app.widgets.translated import Translated
 
@@ -49,7 +50,7 @@ class ImageModel(TitledModel):
         if role == Qt.ItemDataRole.DisplayRole:
             return self._text(self._rows[index.row()], index.column())
         if role == Qt.ItemDataRole.ToolTipRole:
-            return self._text(self._rows[index.row()], STATE)
+            return plain_tooltip(self._text(self._rows[index.row()], STATE))
         if role == Qt.ItemDataRole.TextAlignmentRole and index.column() != STATE:
             return RIGHT
         return None

@@ -14,6 +14,7 @@ from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -119,12 +120,13 @@ class MonteCarloRow(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self._start.setText(self.tr("Monte Carlo check"))
-        self._start.setToolTip(
+        set_tooltip(
+            self._start,
             self.tr(
                 "Propagates the distributions of files, seating and noise by the "
                 "Monte Carlo method (JCGM 101). Uses all processor cores but one "
                 "for seconds to minutes."
-            )
+            ),
         )
         self._cancel.setText(self.tr("Cancel"))
         self._label.setText(self.tr("Trials"))

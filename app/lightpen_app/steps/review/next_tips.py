@@ -12,6 +12,7 @@ from lightpen.record.results.next_tips import NextTip, next_tips
 from lightpen.record.results.results import Result
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import StatusMessage
@@ -81,8 +82,8 @@ class NextTipsRow(Translated, QWidget):
             tooltip = self.tr(
                 "Calibrate tip {0} next with its ball diameter and nominal centre"
             )
-            button.setToolTip(
-                PARTED.join(filter(None, (tooltip.format(tip), mark.text)))
+            set_tooltip(
+                button, PARTED.join(filter(None, (tooltip.format(tip), mark.text)))
             )
 
     def _mark_of(self, each: NextTip) -> StatusMessage:

@@ -12,6 +12,7 @@ from typing_extensions import override
 from lightpen.formats.files import write_whole
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.plots import Plot
 from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.translated import Translated
@@ -127,7 +128,7 @@ class PlotCard(Translated, QFrame):
         self._enlarge.setText(self.tr("Enlarge"))
         self._save_png.setText(self.tr("Save picture (PNG)"))
         self._save_csv.setText(self.tr("Save numbers (CSV)"))
-        self._button.setToolTip(self.tr("Enlarge or save this plot"))
+        set_tooltip(self._button, self.tr("Enlarge or save this plot"))
         words = f"{self.plot.accessibleName()}: {self._button.toolTip()}"
         self._button.setAccessibleName(words)
 

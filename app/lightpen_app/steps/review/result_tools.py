@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from lightpen.record.exports.formats import FORMATS, ExportFormat
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import worded
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
@@ -75,7 +76,7 @@ class ResultTools(Translated, QWidget):
         """Disable the report with a reason, or enable it."""
         self._report.setEnabled(not why_not)
         tooltip = self.tr("Preview, save as PDF, or print")
-        self._report.setToolTip(why_not or tooltip)
+        set_tooltip(self._report, why_not or tooltip)
 
     def set_press_why_not(self, why_not: str) -> None:
         """Disable the press test with a reason, or enable it."""
@@ -88,12 +89,13 @@ class ResultTools(Translated, QWidget):
         self._press.setText(self.tr("Press test"))
         self._report.setText(self.tr("Calibration report..."))
         self._folder.setText(self.tr("Open folder"))
-        self._folder.setToolTip(self.tr("Open the folder of the swing"))
+        set_tooltip(self._folder, self.tr("Open the folder of the swing"))
         self._copy.setText(self.tr("Copy tip"))
         self._save.setText(self.tr("Save..."))
         for export, action in self._actions:
             action.setText(self._name(export) + "...")
-            action.setToolTip(", ".join(worded(f.description) for f in export.formats))
+            described = (worded(each.description) for each in export.formats)
+            set_tooltip(action, ", ".join(described))
 
     def _name(self, export: Export) -> str:
         if export == ALL:

@@ -10,6 +10,7 @@ from typing_extensions import override
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 
 BLANK = ("", "", "")
@@ -121,7 +122,7 @@ class TipReadout(Translated, QWidget):
         )
         for head, text in zip(self._heads, words, strict=True):
             head.setText(text)
-        self._heads[2].setToolTip("" if self._value is None else self._value.since)
+        set_tooltip(self._heads[2], "" if self._value is None else self._value.since)
 
 
 def _number_label(size: TextSize, tone: Tone = Tone.PLAIN) -> QLabel:

@@ -11,6 +11,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.review.detail_tabs import DetailTabs
 from lightpen_app.steps.review.message_list import StatusMessageList
 from lightpen_app.steps.review.next_tips import NextTipsRow
@@ -145,17 +146,19 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.tabs.setAccessibleName(self.tr("Details"))
         self._progress.setAccessibleName(self.tr("Progress of the computation"))
         self.cancel.setText(self.tr("Cancel"))
-        self.cancel.setToolTip(self.tr("Keep last solution"))
+        set_tooltip(self.cancel, self.tr("Keep last solution"))
         self.capture_more.setText(self.tr("Capture more"))
         self.repeat.setText(self.tr("Repeat swing"))
         self.accept.setText(self.tr("Accept..."))
         self.verify.setText(self.tr("Verify tip"))
-        self.verify.setToolTip(
-            self.tr("Verify the tip on reference artefacts within minutes.")
+        set_tooltip(
+            self.verify,
+            self.tr("Verify the tip on reference artefacts within minutes."),
         )
         self.take_back.setText(self.tr("Revoke acceptance..."))
-        self.take_back.setToolTip(
-            self.tr("Reinstate the previous result. Both results stay in the archive.")
+        set_tooltip(
+            self.take_back,
+            self.tr("Reinstate the previous result. Both results stay in the archive."),
         )
         self.reason.set_words(
             self.tr("This result needs checking. Enter the reason for accepting it."),

@@ -20,6 +20,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.page_scroll import DialogScroll
@@ -178,7 +179,7 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             usual = getattr(USUAL, kind.name)
             if usual is not None:
                 default = f"{kind.times * usual:g} {kind.unit}"
-                field.setToolTip(self.tr("Default: {0}.").format(default))
+                set_tooltip(field, self.tr("Default: {0}.").format(default))
 
 
 class AssumptionsPanel(Translated, QGroupBox):
@@ -227,9 +228,10 @@ class AssumptionsPanel(Translated, QGroupBox):
         )
         self._change.setText(self.tr("Change"))
         self._change.setAccessibleName(self.tr("Change the default uncertainties"))
-        self._change.setToolTip(
+        set_tooltip(
+            self._change,
             self.tr(
                 "Focal length, scale, temperature, form of ball and cone: "
                 "uncertainty where no file states it."
-            )
+            ),
         )

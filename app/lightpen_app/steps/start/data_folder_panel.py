@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QGroupBox
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import breakable
 from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.widgets.push_button import PushButton
@@ -64,11 +65,12 @@ class DataFolderPanel(Translated, QGroupBox):
         self.setTitle(self.tr("Data folder"))
         self._open.setText(self.tr("Open folder"))
         self._open.setAccessibleName(self.tr("Open the data folder"))
-        self._open.setToolTip(self.tr("Location of swings and results"))
+        set_tooltip(self._open, self.tr("Location of swings and results"))
         self._change.setText(self.tr("Change..."))
         self._change.setAccessibleName(self.tr("Choose another data folder"))
-        self._change.setToolTip(
-            self.tr("Save swings and results in another folder from the next start.")
+        set_tooltip(
+            self._change,
+            self.tr("Save swings and results in another folder from the next start."),
         )
         self._change.setProperty("inviting", bool(self._fault))
         self._change.style().polish(self._change)

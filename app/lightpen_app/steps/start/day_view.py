@@ -15,6 +15,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.day_state import ReadinessItem, TipRow
 from lightpen_app.steps.start.readiness_line import ReadinessLine
 from lightpen_app.widgets.choice_field import ChoiceField
@@ -205,7 +206,7 @@ class DayView(Translated, QWidget):
             cells[column].setForeground(QColor(colors.tone(tone)))
         cells[3].setTextAlignment(RIGHT)
         for cell in cells:
-            cell.setToolTip(cell.text())
+            set_tooltip(cell, cell.text())
         return cells
 
     def _on_step_requested(self, step: str) -> None:

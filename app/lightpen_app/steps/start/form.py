@@ -28,6 +28,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.fields import (
     LONGEST_NAME,
     ItemButton,
@@ -194,8 +195,9 @@ class NamesForm(Translated, QWidget):
         }
         for kind, name in lists.items():
             self._lists[kind].setAccessibleName(name)
-            self._lists[kind].setToolTip(
-                self.tr("Choose from the tip library, or open it (arrow down)")
+            set_tooltip(
+                self._lists[kind],
+                self.tr("Choose from the tip library, or open it (arrow down)"),
             )
         self._place.setTitle(self.tr("Station and operator"))
         self._probe.setTitle(self.tr("Item under calibration"))
@@ -210,8 +212,9 @@ class NamesForm(Translated, QWidget):
         ):
             self._labels[field].setText(text)
             field.setAccessibleName(text)
-        self._station.setToolTip(
-            self.tr("Choose a station to restore its settings, or enter a new name.")
+        set_tooltip(
+            self._station,
+            self.tr("Choose a station to restore its settings, or enter a new name."),
         )
         self._ball.setSpecialValueText(self.tr("Not specified"))
 
@@ -294,10 +297,11 @@ class LimitsForm(Translated, QGroupBox):
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Acceptance limits"))
         self._all.setText(self.tr("All limits..."))
-        self._all.setToolTip(
+        set_tooltip(
+            self._all,
             self.tr(
                 "Acceptance limits of swings and verifications; set by a supervisor."
-            )
+            ),
         )
         texts = (
             self.tr("Max. expanded uncertainty U (k = 2)"),
@@ -323,7 +327,7 @@ class LimitsForm(Translated, QGroupBox):
         ):
             label.setText(text)
             field.setAccessibleName(text)
-            field.setToolTip(tip)
+            set_tooltip(field, tip)
 
 
 class _ListedEdit(QLineEdit):

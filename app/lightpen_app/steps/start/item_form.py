@@ -30,6 +30,7 @@ from lightpen.record.library.tip_library import (
 )
 from lightpen_app.look.layouts import GridPlace, fill, grid_layout, horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.fields import AXES, PointField
 from lightpen_app.steps.start.tip_picture import ReadPicture, TipPicture
 from lightpen_app.widgets.date_field import DateField
@@ -290,19 +291,21 @@ class ItemForm(Translated, QWidget):
             self._labels[field].setText(text)
             named = self._picture.edit if field is self._picture else field
             named.setAccessibleName(text)
-        self._due.setToolTip(
+        set_tooltip(
+            self._due,
             self.tr("Last day of use, for example {0}; empty for none").format(
                 date(local_now().year + 1, 8, 14)
-            )
+            ),
         )
         for field in (self._ball, self._value):
             field.setSpecialValueText(nothing)
         self._change.setSpecialValueText(self.tr("No limit"))
-        self._change.setToolTip(
+        set_tooltip(
+            self._change,
             self.tr(
                 "Max. distance of the tip from its previous calibration. Beyond it, "
                 "the result needs checking."
-            )
+            ),
         )
         for field in (self._days, self._swings):
             field.setSpecialValueText(usual)
@@ -312,11 +315,12 @@ class ItemForm(Translated, QWidget):
         for name, field in zip(AXES, self._axis, strict=True):
             field.setAccessibleName(self.tr("Axis of the stylus, {0}").format(name))
         self._name_spin()
-        self._spin.setToolTip(
+        set_tooltip(
+            self._spin,
             self.tr(
                 "Determine the axis: turn the pen about its stylus in view of the "
                 "camera, with the tip in the cone."
-            )
+            ),
         )
         self._browse.setText(self.tr("Browse..."))
         kept = self._item.picture if isinstance(self._item, ListedTip) else None

@@ -10,6 +10,7 @@ from lightpen.record.library.supervision_changes import save_limits
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import phrases_whole
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
@@ -152,7 +153,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
                 if is_absent:
                     field.setSpecialValueText(no_limit)
                 usually = no_limit if is_absent else f"{limit.default:g}"
-            field.setToolTip(self.tr("Default: {0}.").format(usually))
+            set_tooltip(field, self.tr("Default: {0}.").format(usually))
 
 
 class _RuleField(ChoiceField):

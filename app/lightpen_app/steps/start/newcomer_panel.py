@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGroupBox, QWidget
 
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.page_scroll import PageScroll
@@ -115,6 +116,7 @@ class NewcomerPanel(Translated, QGroupBox):
         self._try.setText(self.tr("Try it with a simulated pen"))
         self._explain.setText(self.tr("What is this?"))
         self._play.setText(self.tr("Play the demo"))
-        self._play.setToolTip(
-            self.tr("Opens another window that runs through all steps automatically.")
+        set_tooltip(
+            self._play,
+            self.tr("Opens another window that runs through all steps automatically."),
         )

@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, set_tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.day_state import ReadinessItem
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -72,7 +73,7 @@ class ReadinessLine(QFrame):
             button.setText(text)
             button.setIcon(message_icon(item.message, self))
             button.setAccessibleDescription(item.message.text)
-            button.setToolTip(item.message.text if item.is_amber else "")
+            set_tooltip(button, item.message.text if item.is_amber else "")
             set_tone(button, item.message.tone)
             reason.set_value(item.message if item.is_amber else StatusMessage())
 

@@ -22,6 +22,7 @@ from lightpen_app.look.layouts import (
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.origin_mark import origin_message
 from lightpen_app.widgets.push_button import PushButton
@@ -171,8 +172,9 @@ class LastResultPanel(Translated, QGroupBox):
         self._status.set_value(status_message(self._marked))
         self._verify.setText(self.tr("Verify tip"))
         self._take_back.setText(self.tr("Revoke acceptance..."))
-        self._take_back.setToolTip(
-            self.tr("Reinstate the previous result. Both results stay in the archive.")
+        set_tooltip(
+            self._take_back,
+            self.tr("Reinstate the previous result. Both results stay in the archive."),
         )
         for button in (self._verify, self._take_back):
             button.setVisible(value.result is not None)

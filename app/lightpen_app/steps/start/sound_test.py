@@ -7,6 +7,7 @@ from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import MutedSounds, Sound, Sounds
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -105,6 +106,6 @@ class SoundTest(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._button.setText(self.tr("Test the sounds"))
-        self._button.setToolTip(
-            self.tr("Plays the sounds of a swing one after the other")
+        set_tooltip(
+            self._button, self.tr("Plays the sounds of a swing one after the other")
         )

@@ -18,6 +18,7 @@ from typing_extensions import override
 
 from lightpen.model.posture import Posture
 from lightpen_app.look.theme import colors_of
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.posture_dial import (
     MAX_TURN,
     PostureDial,
@@ -123,13 +124,14 @@ class LeaningDial(PostureDial):
     @override
     def _retranslate(self) -> None:
         super()._retranslate()
-        self.setToolTip(
+        set_tooltip(
+            self,
             self.tr(
                 "Drag or use the arrow keys to tilt the simulated pen. Wheel or "
                 "keys , and . turn it about its own axis."
             )
             if self._is_interactive
-            else ""
+            else "",
         )
 
     def _held(self) -> Posture:

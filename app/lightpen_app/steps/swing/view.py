@@ -9,6 +9,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
 from lightpen_app.steps.swing.page_state import SwingPageState, side_text
 from lightpen_app.widgets.fitted_text import FittedText
@@ -148,12 +149,13 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._image.set_message(self.tr("No image yet"))
         self._progress.setAccessibleName(self.tr("Progress"))
         self.swapped.setText(self.tr("Left and right are swapped"))
-        self.swapped.setToolTip(self.tr("Learn again on which side you stand."))
+        set_tooltip(self.swapped, self.tr("Learn again on which side you stand."))
         self.start_over.setText(self.tr("Start over"))
-        self.start_over.setToolTip(
+        set_tooltip(
+            self.start_over,
             self.tr(
                 "Abandon this swing and start again. Its images remain on the disk."
-            )
+            ),
         )
 
     @property

@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QProgressBar, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -66,17 +67,19 @@ class ImagesRow(Translated, QWidget):
         self._place.edit.setAccessibleName(name)
         self._place.edit.setPlaceholderText(name)
         self._is_still.setText(self.tr("Held still"))
-        self._is_still.setToolTip(
+        set_tooltip(
+            self._is_still,
             self.tr(
                 "On: a point is several images with the pen held still. Off: "
                 "each image is a point."
-            )
+            ),
         )
         self._read.setText(self.tr("Read"))
-        self._read.setToolTip(
+        set_tooltip(
+            self._read,
             self.tr(
                 "Do this task with recorded images: a folder, or a folder of folders."
-            )
+            ),
         )
         self._cancel.setText(self.tr("Cancel"))
         self._progress.setAccessibleName(self.tr("Progress of reading"))

@@ -16,6 +16,7 @@ from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import course, feature_so_far, fit_of
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.theme import GRID, colors_of
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 
 MARGIN = 0.1  # of the sides
@@ -173,8 +174,9 @@ class PartView(Translated, QWidget):
         self.setAccessibleName(
             words.format(len(self._value.points), len(self._value.outlines))
         )
-        self.setToolTip(
+        set_tooltip(
+            self,
             self.tr(
                 "Deviations are drawn {0} times as large. Drag to turn the part."
-            ).format(round(MAGNIFIED))
+            ).format(round(MAGNIFIED)),
         )

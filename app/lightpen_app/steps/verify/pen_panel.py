@@ -28,6 +28,7 @@ from lightpen_app.look.quantities import MICROMETRES, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import moment_text, shortened
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -111,11 +112,12 @@ class PenPanel(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self._improve.setText(self.tr("Improve the LED file"))
-        self._improve.setToolTip(
+        set_tooltip(
+            self._improve,
             self.tr(
                 "Pools the newest swings; the last one is held out for "
                 "confirmation. The old file is retained."
-            )
+            ),
         )
         self._cancel.setText(self.tr("Cancel"))
         self._use.setText(self.tr("Use the new file"))

@@ -27,6 +27,7 @@ from lightpen.verification.tasks.part_course import PartOptions, base_name, plan
 from lightpen_app.look.layouts import horizontal_layout, set_stacked
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
@@ -134,13 +135,14 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self._open.setText(self.tr("Open plan..."))
-        self._open.setToolTip(self.tr("Measure by a plan in a YAML file."))
+        set_tooltip(self._open, self.tr("Measure by a plan in a YAML file."))
         self._free.setText(self.tr("Without a plan"))
-        self._free.setToolTip(
+        set_tooltip(
+            self._free,
             self.tr(
                 "Features are recognised while they are probed; end with the main "
                 "button."
-            )
+            ),
         )
         self._plate.setText(self.tr("Use simulated plate"))
         self._kind_label.setText(self.tr("Feature"))
@@ -149,19 +151,21 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         for index, kind in enumerate(FeatureKind, start=1):
             self._kind.setItemText(index, worded(NAMES[kind]))
         self._scan.setText(self.tr("Scan"))
-        self._scan.setToolTip(
-            self.tr("Hold still on the feature, then slide along it.")
+        set_tooltip(
+            self._scan, self.tr("Hold still on the feature, then slide along it.")
         )
         self._moved.setText(self.tr("Part moved"))
-        self._moved.setToolTip(
+        set_tooltip(
+            self._moved,
             self.tr(
                 "Part or camera was moved: probe three datum points again, which "
                 "connect the new position with the old."
-            )
+            ),
         )
         self._save_plan.setText(self.tr("Save plan..."))
-        self._save_plan.setToolTip(
-            self.tr("Save a plan with the measured features as nominals.")
+        set_tooltip(
+            self._save_plan,
+            self.tr("Save a plan with the measured features as nominals."),
         )
         self._export.setText(self.tr("Export..."))
 

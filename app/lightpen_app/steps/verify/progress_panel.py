@@ -16,6 +16,7 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.fitted_text import FittedText
@@ -156,13 +157,14 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
             usual_reasons(),
         )
         self._accept.setText(self.tr("Accept..."))
-        self._accept.setToolTip(self.tr("Use the tip with a reason"))
+        set_tooltip(self._accept, self.tr("Use the tip with a reason"))
         self._report.setText(self.tr("Report..."))
         self._undo.setText(self.tr("Undo point"))
-        self._undo.setToolTip(self.tr("Discard the last point of the current task."))
+        set_tooltip(self._undo, self.tr("Discard the last point of the current task."))
         self._start_over.setText(self.tr("Start over"))
-        self._start_over.setToolTip(
-            self.tr("Discard all points, and start with the current tip.")
+        set_tooltip(
+            self._start_over,
+            self.tr("Discard all points, and start with the current tip."),
         )
         self._progress.setAccessibleName(self.tr("Progress"))
 

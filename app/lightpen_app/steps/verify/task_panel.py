@@ -12,6 +12,7 @@ from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.verify.findings import TaskFinding
 from lightpen_app.steps.verify.images_row import ImagesRow
 from lightpen_app.steps.verify.task_form import TaskForm
@@ -79,10 +80,11 @@ class TaskPanel(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self._recorded.setText(self.tr("Recorded images..."))
-        self._recorded.setToolTip(self.tr("Do this task with recorded images."))
+        set_tooltip(self._recorded, self.tr("Do this task with recorded images."))
         self._anew.setText(self.tr("Probe again"))
-        self._anew.setToolTip(
-            self.tr("Repeat this task; the result so far is kept in the archive.")
+        set_tooltip(
+            self._anew,
+            self.tr("Repeat this task; the result so far is kept in the archive."),
         )
 
     def _on_form_changed(self) -> None:
