@@ -283,5 +283,5 @@ class DeviceCamera:
             exposure_us=self._settings.exposure_us if is_settled else None,
             gain_db=self._settings.gain_db if is_settled else None,
             pixel_format=pixel_format.name,
-            bits=pixel_format.bits,
+            full_scale=pixel_format.full_scale,
         )

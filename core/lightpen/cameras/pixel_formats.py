@@ -32,12 +32,17 @@ class PixelFormat:
     """A pixel format that can be decoded."""
 
     name: str
-    bits: int = 8  # bits per value; full scale is ``2**bits - 1``
+    bits: int = 8  # per value
     layout: Layout = Layout.WHOLE
     n_channels: int = 1  # values of a pixel
     # Conversion of OpenCV; None where values hold grey or the luminance.
     to_grey: int | None = None
     luminance: int = 0  # its index among the values of a pixel
+
+    @property
+    def full_scale(self) -> int:
+        """Brightest value a pixel can have."""
+        return int(2**self.bits - 1)
 
     @property
     def is_mono(self) -> bool:

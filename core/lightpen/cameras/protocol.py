@@ -74,13 +74,13 @@ class Frame:
     exposure_us: float | None = None
     gain_db: float | None = None
     pixel_format: str = "Mono8"  # by the GenICam Pixel Format Naming Convention
-    bits: int = 8  # full scale is ``2**bits - 1``
+    full_scale: int = 255  # brightest value a pixel can have
     others: tuple["Frame", ...] = ()  # simultaneous, of the other cameras of a rig
 
     @property
-    def full_scale(self) -> int:
-        """Brightest value a pixel can have."""
-        return int(2**self.bits - 1)
+    def bits(self) -> int:
+        """Bit depth of the values."""
+        return self.full_scale.bit_length()
 
     def __post_init__(self) -> None:
         if self.image.flags.writeable:

@@ -26,7 +26,7 @@ from lightpen.cameras.protocol import (
 )
 from lightpen.cameras.source import Source, SourceNeeds, SourcePlace
 from lightpen.errors import FileError
-from lightpen.formats.decoding import bits_of
+from lightpen.formats.decoding import full_scale_of
 from lightpen.formats.images import ImageSource, find_images
 from lightpen.messages import Message, message, printable
 
@@ -213,9 +213,14 @@ class ReplayCamera:
             image=sealed(image),
             seq=seq,
             host_ts_ns=self._clock.now_ns(),
-            pixel_format=_pixel_format(image),
-            bits=bits_of(image),
+            pixel_format=_pixel_format(image, self._stated),
+            full_scale=self._stated or full_scale_of(image),
         )
+
+    @property
+    def _stated(self) -> int | None:
+        """Full scale that the images state."""
+        return None if self._source is None else self._source.full_scale
 
     def _name(self, seq: int) -> str:
         """Return the file of an image; after the last one comes the first."""
@@ -231,8 +236,9 @@ class ReplayCamera:
         return not is_there or self._n_unread >= len(self._source.names)
 
 
-def _pixel_format(image: Image) -> str:
-    return f"Mono{8 * image.itemsize}"
+def _pixel_format(image: Image, full_scale: int | None) -> str:
+    bits = 8 * image.itemsize
+    return f"Mono{bits if full_scale is None else max(full_scale.bit_length(), 8)}"
 
 
 def _usual_kind(source: ImageSource, where: str) -> tuple[tuple[int, ...], str]:
@@ -250,7 +256,7 @@ def _usual_kind(source: ImageSource, where: str) -> tuple[tuple[int, ...], str]:
             continue
         if image.shape in formats:
             return image.shape, formats[image.shape]
-        formats[image.shape] = _pixel_format(image)
+        formats[image.shape] = _pixel_format(image, source.full_scale)
     if formats:
         return next(iter(formats.items()))
     raise unread or FileError("replay.no-images", place=where)

@@ -85,6 +85,18 @@ def add_file(
     parser.add_argument(name, type=Path, metavar=metavar, help=meaning)
 
 
+def add_bits(parser: argparse.ArgumentParser) -> None:
+    """Add ``--bits``; see `ImageSource.of_bits`."""
+    parser.add_argument(
+        "--bits",
+        type=int,
+        choices=range(8, 17),
+        metavar="BITS",
+        help="bits of a pixel, 8 to 16, which tell clipped light (default: stated by "
+        "the image file, or the highest level where pixels pile up)",
+    )
+
+
 def add_data(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     """Add ``--data``, a data folder; `data_of` reads it."""
     add_file(parser, "--data", "FOLDER", "data folder (default: that of the program)")

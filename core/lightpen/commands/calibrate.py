@@ -136,7 +136,7 @@ def _require_none_given(options: argparse.Namespace, record: Path) -> None:
     own = (
         "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
         "temperature temperature-sigma humidity form-error center-bias second-cone "
-        "distance distance-sigma fps"
+        "distance distance-sigma fps bits"
     )
     values = vars(options)
     given = [
@@ -222,7 +222,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
             _require_one_each(options.images, 1, RIG_NEEDED)
         given = options.images
     observe = partial(
-        _observe, options.json, camera, pen, is_centers=options.centers is not None
+        _observe, options, camera, pen, is_centers=options.centers is not None
     )
     observations, files = observe(given)
     observations = _timed(observations, options)
@@ -289,7 +289,7 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
     else:
         _require_one_each(options.images, rig.n_cameras, in_order)
         _require_other_names(options.images, rig.names)
-        sources = [find_images(place) for place in options.images]
+        sources = [find_images(p).of_bits(options.bits) for p in options.images]
         files = tuple(file for source in sources for file in source.files)
         require_other_file(options.json, *files, *rig_file.camera_files)
         pairing = pair_images([source.names for source in sources], rig.names)
@@ -349,7 +349,7 @@ def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
 
 
 def _observe(
-    record: Path | None,
+    options: argparse.Namespace,
     camera: Camera,
     pen: Pen,
     given: Sequence[str],
@@ -359,10 +359,10 @@ def _observe(
     """Return the observations of images or of a file of centres, and their files."""
     if is_centers:
         path = Path(given[0])
-        require_other_file(record, path)
+        require_other_file(options.json, path)
         centers = read_centers(path, pen.n_leds)
         return observe_centers(centers, camera, pen), (path,)
-    source = find_images(*given)
-    require_other_file(record, *source.files)
+    source = find_images(*given).of_bits(options.bits)
+    require_other_file(options.json, *source.files)
     with progress("Finding LEDs") as report:
         return observe_images(source, camera, pen, report), source.files

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lightpen.commands.arguments import (
+    add_bits,
     add_cameras_and_pen,
     add_conditions,
     add_json,
@@ -45,6 +46,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     add_cameras_and_pen(
         parser, "give IMAGES (or FILE.csv) once per camera, in the order of this file"
     )
+    add_bits(parser)
     parser.add_argument(
         "--fps",
         type=number_from(0.01, 10_000.0, "image rate", "images a second"),

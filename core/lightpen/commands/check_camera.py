@@ -4,7 +4,12 @@ import argparse
 
 import numpy as np
 
-from lightpen.commands.arguments import add_camera_and_pen, add_json, number_from
+from lightpen.commands.arguments import (
+    add_bits,
+    add_camera_and_pen,
+    add_json,
+    number_from,
+)
 from lightpen.commands.console import (
     printing,
     progress,
@@ -32,6 +37,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
         "images", nargs="+", metavar="IMAGES", help="images of one swing of the pen"
     )
     add_camera_and_pen(parser)
+    add_bits(parser)
     parser.add_argument(
         "--temperature",
         type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
@@ -43,7 +49,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
 
 @printing
 def _check_camera(options: argparse.Namespace) -> None:
-    source = find_images(*options.images)
+    source = find_images(*options.images).of_bits(options.bits)
     require_other_file(options.json, options.camera, options.pen, *source.files)
     camera = read_camera(options.camera)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from lightpen.commands.arguments import above_zero, add_file, add_json, finite
+from lightpen.commands.arguments import above_zero, add_bits, add_file, add_json, finite
 from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import are_same, printing, progress, shown, write_record
 from lightpen.commands.touched import touches_at
@@ -68,6 +68,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--image-size", type=_size, metavar="WxH", help="size of the images, 2448x2048"
     )
+    add_bits(parser)
     parser.add_argument(
         "--length",
         nargs="+",
@@ -270,7 +271,7 @@ def _sightings(
 ) -> Sightings:
     """Read a swing, which must be of the images of the camera file."""
     if not options.centers:
-        sightings = find_spots(find_images(*places), report)
+        sightings = find_spots(find_images(*places).of_bits(options.bits), report)
     else:
         size = options.image_size or (None if camera is None else camera.image_size)
         if size is None:

@@ -22,7 +22,7 @@ from lightpen.detection.reasons import UNFORESEEN, Reason, exception_detail
 from lightpen.detection.small_spots import MIN_WIDTH
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
-from lightpen.formats.decoding import bits_of
+from lightpen.formats.decoding import full_scale_of
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import Message, message
@@ -114,7 +114,9 @@ def observe_images(
     searched: list[_Searched] = []
     labelled: list[tuple[_Searched, PenDetection]] = []
     n_images = len(source.names)
-    search = partial(_search, camera=camera, mask=mask)
+    search = partial(
+        _search, camera=camera, mask=mask, stated_full_scale=source.full_scale
+    )
     for image in look_at_all(source, search, SEARCH_MEMORY_A_PIXEL, n_threads):
         searched.append(image)
         n_done = len(labelled) + len(searched)
@@ -207,7 +209,10 @@ def without_copies(seen: Observations) -> Observations:
 
 
 def _search(
-    load: Callable[[], Image], camera: Camera, mask: FloatArray | None
+    load: Callable[[], Image],
+    camera: Camera,
+    mask: FloatArray | None,
+    stated_full_scale: int | None,
 ) -> _Searched:
     try:
         image = load()
@@ -218,7 +223,7 @@ def _search(
         size = message("image.size", width=width, height=height)
         return _Searched(reason=Reason.WRONG_SIZE, detail=size)
     try:
-        full_scale = 2 ** bits_of(image) - 1
+        full_scale = stated_full_scale or full_scale_of(image)
         return _Searched(
             detect_spots(image, mask, full_scale=full_scale),
             masked_lights(image, mask, full_scale),

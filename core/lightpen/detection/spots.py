@@ -26,7 +26,7 @@ from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS
 from lightpen.detection.region_moments import GAUSSIAN_RISE, HIGH, LOW
 from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, widths_of_tiny
-from lightpen.formats.decoding import bits_of
+from lightpen.formats.decoding import full_scale_of
 
 NumberArray = TypeVar("NumberArray", FloatArray, IntArray)
 
@@ -178,8 +178,8 @@ def detect_spots(
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
     full_scale : int, optional
-        Brightest value a pixel can have. Taken as 255, 4095 or 65535 if not given; see
-        `lightpen.formats.decoding.bits_of`.
+        Brightest value a pixel can have; if not given, as the levels show, see
+        `lightpen.formats.decoding.full_scale_of`.
     window : PixelBox, optional
         All of the image that is read; what reaches out of it is cut.
     before : Spots, optional
@@ -193,7 +193,7 @@ def detect_spots(
     if min(image.shape) < MIN_SIZE:
         return Spots.none()
     if full_scale is None:
-        full_scale = 2 ** bits_of(image) - 1
+        full_scale = full_scale_of(image)
     stride = 4 if min(image.shape) >= 1024 else 2 if min(image.shape) >= 512 else 1
     corner = np.zeros(2)
     if window is not None:

@@ -9,7 +9,6 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.detection.reasons import UNFORESEEN
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.errors import FileError
-from lightpen.formats.decoding import bits_of
 from lightpen.formats.images import ImageSource, look_at_all
 
 SEARCH_MEMORY_A_PIXEL = 5  # bytes, as of `lightpen.detection.observations`
@@ -74,7 +73,7 @@ def find_spots(
             return Spots.none(), error
         size = (image.shape[1], image.shape[0])
         try:
-            return detect_spots(image, full_scale=2 ** bits_of(image) - 1), size
+            return detect_spots(image, full_scale=source.full_scale), size
         except UNFORESEEN:
             return Spots.none(), size
 

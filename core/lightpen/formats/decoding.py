@@ -41,6 +41,10 @@ MAX_SCANS = 64  # of a JPEG; each takes as long as the image, 10 are usual
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
 MAX_KEPT_MEMORY = 64 * 2**20
+SENSOR_BITS = (10, 12, 14, 16)
+BELOW_TOP = 32  # levels below the highest, which noise fills where nothing is clipped
+PILE = 8.0  # times the pixels of each of these, at a level where light is clipped
+FEWEST_CLIPPED = 5  # pixels
 MAX_ARENAS = 1  # of threads; free memory in one is unusable for another
 
 
@@ -95,11 +99,22 @@ def decode_image(data: bytes, name: str) -> Image:
         return _decoded(data, name)
 
 
-def bits_of(image: Image) -> int:
-    """Return the bit depth of an image; 16-bit files do not state it."""
+def full_scale_of(image: Image) -> int:
+    """Return the brightest value that a pixel of an image can have, by its levels.
+
+    A sensor clips light: of 16-bit images, whose files seldom state their depth, the
+    highest level is the full scale where pixels pile up at it. Elsewhere nothing is
+    clipped, and it is that of the least depth that holds all levels.
+    """
     if image.itemsize == 1:
-        return 8
-    return 12 if int(image.max(initial=0)) < 2**12 else 16
+        return 255
+    top = int(image.max(initial=0))
+    near = image[image >= top - BELOW_TOP]
+    n_top = int(np.count_nonzero(near == top))
+    usual = (near.size - n_top) / BELOW_TOP
+    if top > 255 and n_top > max(FEWEST_CLIPPED, PILE * usual):
+        return top
+    return next(2**bits - 1 for bits in SENSOR_BITS if top < 2**bits)
 
 
 def encode_png(image: Image) -> bytes:

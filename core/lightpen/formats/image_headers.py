@@ -37,12 +37,16 @@ _TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackB
 
 @dataclass(frozen=True)
 class ImageHeader:
-    """Size of an image, px; memory of the decoded image, and for decoding, bytes."""
+    """Size of an image, px; memory of the decoded image, and for decoding, bytes.
+
+    `full_scale` is the brightest value of a pixel, if the file states it.
+    """
 
     width: int
     height: int
     decoded: int
     working: int = 0
+    full_scale: int | None = None
 
 
 _Name: TypeAlias = str | Message
@@ -261,4 +265,5 @@ def _pnm(stream: BinaryIO, name: _Name) -> ImageHeader:
     brightest = 1 if kind in (1, 4) else int(head[4])
     channels = 3 if kind in (3, 6) else 1
     bytes_a_value = 2 if brightest > 255 else 1
-    return ImageHeader(width, height, width * height * channels * bytes_a_value)
+    decoded = width * height * channels * bytes_a_value
+    return ImageHeader(width, height, decoded, full_scale=brightest)

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Condition
@@ -15,8 +15,14 @@ from typing import TypeVar
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.decoding import keep_freed_memory, read_image
-from lightpen.formats.files import unreadable
+from lightpen.formats.decoding import (
+    IMAGE_FILE,
+    MAX_FILE_SIZE,
+    keep_freed_memory,
+    read_image,
+)
+from lightpen.formats.files import opened, unreadable
+from lightpen.formats.image_headers import read_image_header
 from lightpen.formats.video_process import count_frames, frame_loaders
 from lightpen.messages import message, printable
 
@@ -75,6 +81,13 @@ class ImageSource:
     names: tuple[str, ...]  # file names, or ``frame 17`` of a video
     files: tuple[Path, ...]  # files to be hashed as the input: the images, or the video
     open: Callable[[], Iterator[Callable[[], Image]]]  # one loader an image
+    # Brightest value that a pixel can have, if stated; else levels of each image show
+    # it, see `lightpen.formats.decoding.full_scale_of`.
+    full_scale: int | None = None
+
+    def of_bits(self, bits: int | None) -> "ImageSource":
+        """Return these images of a stated bit depth, if it is stated."""
+        return self if bits is None else replace(self, full_scale=2**bits - 1)
 
 
 def look_at_all(
@@ -136,7 +149,19 @@ def image_files(files: list[Path]) -> ImageSource:
         for file in files:
             yield partial(read_image, file)
 
-    return ImageSource(tuple(file.name for file in files), tuple(files), loaders)
+    names = tuple(file.name for file in files)
+    return ImageSource(names, tuple(files), loaders, _stated_full_scale(files))
+
+
+def _stated_full_scale(files: list[Path]) -> int | None:
+    """Return the full scale that the first file states, if it is readable."""
+    if not files or files[0].suffix.lower() != ".pgm":
+        return None
+    try:
+        with opened(files[0], IMAGE_FILE, MAX_FILE_SIZE) as stream:
+            return read_image_header(stream, files[0].name).full_scale
+    except FileError:
+        return None
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:

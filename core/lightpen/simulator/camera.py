@@ -278,7 +278,7 @@ class SimulatedCamera:
             exposure_us=settings.exposure_us,
             gain_db=settings.gain_db,
             pixel_format=pixel_format,
-            bits=BITS[pixel_format],
+            full_scale=2 ** BITS[pixel_format] - 1,
         )
 
     def _board_pose(self, now: float) -> int:

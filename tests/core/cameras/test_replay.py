@@ -160,7 +160,7 @@ def test_images_may_come_from_any_source() -> None:
 
     assert [int(frame.image[0, 0]) for frame in frames] == [0, 1, 2]
     assert {frame.pixel_format for frame in frames} == {"Mono16"}
-    assert {frame.bits for frame in frames} == {12}  # as far as is known
+    assert {frame.full_scale for frame in frames} == {1023}  # the least of 16 bits
 
 
 def test_a_folder_that_is_not_there_is_not_found(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import Image
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.detection.exposure_advice import Advice, advise
 from lightpen.detection.inspection import (
     SEARCHED_IMAGES,
     Exposure,
@@ -20,14 +22,16 @@ from lightpen.detection.labelling.labels import label_spots
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
+from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.simulator.view import Optics
 
 NOTHING = detect_spots(np.zeros((512, 512), dtype=np.uint8))
 
 
-def image(exposure: float = 1.0) -> Image:
-    scene = Scene(n_images=1, optics=Optics(exposure=exposure))
+def image(exposure: float = 1.0, sensor: Sensor | None = None) -> Image:
+    optics = Optics(exposure=exposure)
+    scene = Scene(n_images=1, optics=optics, sensor=sensor or Sensor())
     return render_plan(scene, plan_scene(scene).image_plans[0])
 
 
@@ -175,3 +179,11 @@ def test_what_moves_is_no_stray_light_but_not_dark_either() -> None:
 def test_a_search_that_has_not_begun_finds_nothing() -> None:
     assert not StraySearch().shows_pen
     assert len(StraySearch().circles()) == 0
+
+
+def test_clipped_leds_of_ten_bits_ask_for_less_light_and_not_for_more() -> None:
+    of_ten_bits = image(exposure=8.0, sensor=Sensor(bits=12)) >> 2
+    spots = detect_spots(of_ten_bits)
+    exposure = inspect(spots).exposure
+    assert exposure.n_saturated == len(spots) > 0
+    assert advise(exposure, CameraSettings(), None) is Advice.CLOSE_APERTURE

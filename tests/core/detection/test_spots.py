@@ -222,7 +222,8 @@ def test_a_disc_that_is_brighter_on_one_side_keeps_its_center_before_grey() -> N
 
 
 @pytest.mark.parametrize(
-    ("full_scale", "level"), [(4095, 3000.0), (4095, 400.0), (65535, 50_000.0)]
+    ("full_scale", "level"),
+    [(1023, 700.0), (4095, 3000.0), (16383, 15_000.0), (65535, 50_000.0)],
 )
 def test_deep_images_are_read_like_8_bit_ones(full_scale: int, level: float) -> None:
     lamps = grid_of_lamps(level=level)
@@ -238,12 +239,17 @@ def test_full_scale_can_be_given() -> None:
     np.testing.assert_allclose(spots.contrasts, 900.0 / 1023, rtol=0.03)
 
 
-def test_an_led_at_the_limit_of_ten_bits_is_saturated_only_if_ten_bits_are_known() -> (
-    None
-):
+@pytest.mark.parametrize("full_scale", [1000, 1023, 4095, 16383, 65472])
+def test_leds_at_the_limit_of_any_depth_are_saturated(full_scale: int) -> None:
+    image = expose(render(grid_of_lamps(level=2.0 * full_scale)), full_scale)
+    spots = detect_spots(image)
+    assert (spots.flaws & SpotFlaw.SATURATED).all()
+    np.testing.assert_allclose(spots.contrasts, 1, rtol=0.03)
+
+
+def test_leds_below_the_limit_of_a_stated_depth_are_not_saturated() -> None:
     image = expose(render(grid_of_lamps(level=2000.0)), 1023)
-    assert not (detect_spots(image).flaws & SpotFlaw.SATURATED).any()
-    assert (detect_spots(image, full_scale=1023).flaws & SpotFlaw.SATURATED).all()
+    assert not (detect_spots(image, full_scale=4095).flaws & SpotFlaw.SATURATED).any()
 
 
 def test_discs_of_six_pixels_are_found_in_a_large_image() -> None:

@@ -14,7 +14,12 @@ import pytest
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.decoding import decode_image, encode_png, read_image
+from lightpen.formats.decoding import (
+    decode_image,
+    encode_png,
+    full_scale_of,
+    read_image,
+)
 from lightpen.formats.images import find_images
 from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
 
@@ -369,3 +374,26 @@ def test_an_empty_file_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(FileError, match="empty"):
         read_image(path)
+
+
+@pytest.mark.parametrize("brightest", [200, 1000, 4095])
+def test_a_pgm_states_the_full_scale_of_its_images(
+    tmp_path: Path, brightest: int
+) -> None:
+    kind = ">u2" if brightest > 255 else "u1"
+    pixels = np.full(GREY.shape, brightest // 2, kind).tobytes()
+    head = f"P5\n{GREY.shape[1]} {GREY.shape[0]}\n{brightest}\n".encode()
+    (tmp_path / "a.pgm").write_bytes(head + pixels)
+    source = find_images(str(tmp_path))
+    assert source.full_scale == brightest
+    assert source.of_bits(12).full_scale == 4095
+
+
+def test_images_that_state_no_full_scale_have_that_of_their_levels() -> None:
+    rng = np.random.default_rng(0)
+    ramp = np.linspace(0, 1500, 10_000) + rng.normal(0, 8, 10_000)
+    deep = np.clip(ramp, 0, None).astype(np.uint16).reshape(100, 100)
+    assert full_scale_of(deep) == 4095
+    assert full_scale_of(np.minimum(deep, 1023)) == 1023
+    assert full_scale_of(np.minimum(deep, 1000)) == 1000  # pixels pile up there
+    assert full_scale_of(np.minimum(deep, 255).astype(np.uint8)) == 255

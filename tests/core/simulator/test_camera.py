@@ -73,7 +73,7 @@ def observe(scene: Scene, frames: list[Frame]) -> Observations:
 
 def led_level(frame: Frame) -> float:
     """Return the level of the brighter LEDs, fraction of full scale."""
-    levels = frame.image / (2**frame.bits - 1)
+    levels = frame.image / frame.full_scale
     return float(np.quantile(levels[levels > 0.1], 0.8))
 
 

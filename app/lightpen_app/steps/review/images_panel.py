@@ -10,6 +10,7 @@ from PySide6.QtGui import QKeySequence, QShortcut, QUndoStack
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from lightpen.arrays import Image
+from lightpen.formats.decoding import full_scale_of
 from lightpen.record.swings.image_list import ImageRow, count_left_out, worst_first
 from lightpen.record.swings.recorded_source import RecordSource
 from lightpen.record.swings.solving import Solution, load_image
@@ -359,8 +360,9 @@ def _decoded(solution: Solution, number: int, camera: int, report: Report) -> _D
     report(0.0)
     image = load_image(solution, number, camera)
     height, width = image.shape
-    bits = 8 * image.dtype.itemsize
-    half = pooled(image, bits)
+    source = (solution.source.images, *solution.source.other_images)[camera]
+    full_scale = source.full_scale or full_scale_of(image)
+    half = pooled(image, full_scale.bit_length())
     return _Decoded(solution.source, number, camera, half, QSize(width, height))
 
 

@@ -7,6 +7,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from lightpen.arrays import FloatArray, Image
+from lightpen.cameras.pixel_formats import pixel_format_named
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import IMAGE_FILE, MAX_FILE_SIZE, decode_image
@@ -98,7 +99,20 @@ def _images_of(record: Record, c: int) -> ImageSource:
         for file, digest in zip(files, hashes, strict=True):
             yield partial(_load, file, digest)
 
-    return ImageSource(tuple(file.name for file in files), files, loaders)
+    names = tuple(file.name for file in files)
+    return ImageSource(names, files, loaders, _full_scale(record, c))
+
+
+def _full_scale(record: Record, c: int) -> int | None:
+    """Return the full scale of the c-th camera's pixel format; None: not known."""
+    prefix = "" if c == 0 else "second_"
+    settings = record.header.settings
+    name = str(settings.get(f"{prefix}pixel_format", ""))
+    is_container = settings.get(f"{prefix}source") == Origin.RECORDED
+    pixel_format = pixel_format_named(name)
+    if pixel_format is None or (is_container and pixel_format.bits == 16):
+        return None
+    return pixel_format.full_scale
 
 
 def _load(file: Path, digest: str) -> Image:

@@ -22,6 +22,7 @@ from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.formats.upgrades import SWING, UPGRADES, newest_format
+from lightpen.model.origin import Origin
 from lightpen.record.swings.header import FileCopy, Header, header_copies
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import open_record, record_files
@@ -102,6 +103,28 @@ def test_all_that_was_recorded_is_read_back_to_the_last_digit(
     assert record.header == structs.replace(header, camera_file=camera, pen_file=pen)
     for name, copy in header_copies(header).items():
         assert (record.folder / name).read_bytes() == copy.data != b""
+
+
+@pytest.mark.parametrize(
+    ("pixel_format", "origin", "full_scale"),
+    [
+        ("Mono10", Origin.LIVE, 1023),
+        ("Mono16", Origin.LIVE, 65535),
+        ("Mono12", Origin.RECORDED, 4095),  # stated by the files
+        ("Mono16", Origin.RECORDED, None),  # the container of 16 bits
+    ],
+)
+def test_images_of_a_record_have_the_full_scale_of_their_pixel_format(
+    tmp_path: Path,
+    header: Header,
+    pixel_format: str,
+    origin: Origin,
+    full_scale: int | None,
+) -> None:
+    settings = {"pixel_format": pixel_format, "source": str(origin)}
+    header = structs.replace(header, settings=settings)
+    record = open_record(recorded(tmp_path / "swing", header, 1))
+    assert source(record).images.full_scale == full_scale
 
 
 def test_the_record_brings_its_own_camera_and_pen(
