@@ -333,14 +333,11 @@ class Calls:
         chosen: list[str] = []
         spent = 0.0
         for tests in (set(callers), others - set(callers)):
-            for test in sorted(tests, key=self._order):
+            for test in sorted(tests, key=self.seconds.__getitem__):
                 if spent + self.seconds[test] <= seconds or not chosen:
                     spent += self.seconds[test]
                     chosen.append(test)
         return chosen
-
-    def _order(self, test: str) -> tuple[bool, float]:
-        return "test_reference" not in test, self.seconds[test]
 
 
 def _file_of(test: str) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec import structs
-from tests.reference import assert_as_before, text_figures
 from tests.simulated_sessions import recorded
 
 from lightpen.detection.observations import observe_centers
@@ -34,8 +33,6 @@ from lightpen.simulator.swings import (
 )
 from lightpen.verification.history.led_file import _is_better, improve_pen
 from lightpen.verification.history.pen_health import examine_pen
-from lightpen.verification.reports.records import pen_health_entries
-from lightpen.verification.reports.summaries import improved_pen_text, pen_health_text
 from lightpen.verification.tasks.length import Scale
 
 N_IMAGES, SIGMA = 40, 0.02
@@ -304,54 +301,3 @@ def test_too_few_swings_are_refused(swing: Swing) -> None:
 
     with pytest.raises(CalibrationError, match="Swings given: 3"):
         improve_pen(swings, paper_camera(), PEN_FILE)
-
-
-def test_the_figures_of_a_pen_over_its_swings_are_as_before(swing: Swing) -> None:
-    pen = true_pen()
-    knocked = with_moved_led(pen)
-    twice = replace(knocked, leds=knocked.leds + 0.06 * (np.arange(10) == 2)[:, None])
-    first, second, third = swing(pen, 1), swing(pen, 2), swing(knocked, 3)
-    warm = swing(pen, 5, growth=WARMTH)
-    inputs = structs.replace(warm.calibration.inputs, camera=FileRecord("c", "2" * 64))
-    record = structs.replace(warm.calibration, inputs=inputs)
-    other_camera = replace(warm, calibration=record)
-    found = [
-        examine_pen(swings, paper_camera(), PEN_FILE.leds)
-        for swings in (
-            [first, second, third],
-            [first, second, swing(twice, 4), third],
-            [first, second, warm],
-            [first, warm, swing(pen, 6, growth=2 * WARMTH)],
-            [first, other_camera],
-        )
-    ]
-
-    assert_as_before(
-        "pen-health",
-        [
-            {
-                **pen_health_entries(each),
-                "said": [each.assessment.reason, each.assessment.next_step],
-                "text": text_figures(pen_health_text(each)),
-            }
-            for each in found
-        ],
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("scale", [None, Scale(1.0001, 2e-5, 1e-4)])
-def test_the_figures_of_an_improved_pen_are_as_before(
-    swing: Swing, scale: Scale | None
-) -> None:
-    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
-    found = improve_pen(swings, paper_camera(), PEN_FILE, scale)
-
-    assert_as_before(
-        f"improved-pen-{'by-length' if scale else 'by-swings'}",
-        {
-            **vars(found),
-            "pen": vars(found.pen),
-            "text": text_figures(improved_pen_text(found)),
-        },
-    )

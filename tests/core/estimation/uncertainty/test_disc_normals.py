@@ -2,7 +2,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tests.reference import assert_as_before
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
@@ -73,4 +72,7 @@ def test_the_effect_of_a_turn_is_found_beside_that_of_a_stylus_that_gives_way() 
     assert bundle.unknowns.effects
     effect = effect_of_normals(bundle)
     assert effect.gain.shape == (bundle.unknowns.number, 2)
-    assert_as_before("turn-of-normals", effect._asdict())
+    alone = effect_of_normals(calibrated(np.zeros(2)).bundle)
+    across = alone.gain[[0, 2]]  # the other effect is along the pen
+    largest = np.abs(across).max()
+    np.testing.assert_allclose(effect.gain[[0, 2]], across, atol=0.1 * largest)

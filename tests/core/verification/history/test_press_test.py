@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks.station import GOOD, _drawn_pen, drawn_rig
-from tests.reference import assert_as_before
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
@@ -113,15 +112,3 @@ def test_instruments_that_disagree_count_by_half_their_difference() -> None:
     np.testing.assert_allclose(
         by_both.uncertainty[:3], np.hypot(by_one.uncertainty[:3], 2 * half)
     )
-
-
-def test_figures_and_sentences_are_as_before() -> None:
-    usual = swung(0, 1)
-    others = (
-        *(swung(0, 2, GIVES_WAY), swung(0, 3), swung(0, 4, cone=0.05)),
-        swung(0, 5, seat=0.03),
-    )
-    found = [press_test(usual, firm) for firm in others]
-    found.append(press_test(swung(0, 3), swung(0, 4, cone=0.05)))
-
-    assert_as_before("press-test", [[each.entries, each.words] for each in found])

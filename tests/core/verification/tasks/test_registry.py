@@ -8,10 +8,14 @@ from msgspec import json, structs
 from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.tasks.circle import CircleOptions
+from lightpen.verification.tasks.fixed_point import FixedPointOptions
+from lightpen.verification.tasks.length import LengthOptions
 from lightpen.verification.tasks.registry import TASKS, AnyOptions, AnyTask, task_of
 from lightpen.verification.tasks.task import (
     NumberOption,
     Surface,
+    TaskOptions,
     TaskProgress,
     certificate_option,
     count_option,
@@ -86,3 +90,36 @@ def test_a_task_at_its_start_says_what_to_do(task: AnyTask) -> None:
     assert str(task.counted(options, progress))
     assert str(task.headline(progress, is_next=False)) == str(task.first)
     assert task.done(options, progress) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "ball", "code"),
+    [
+        (CircleOptions(), 10.0, "verification.no-radius"),
+        (CircleOptions(20.0), None, "verification.no-certificate-u"),
+        (CircleOptions(20.0, 0.001), None, None),
+        (
+            CircleOptions(20.0, 0.001, surface=Surface.BORE),
+            None,
+            "verification.no-ball",
+        ),
+        (CircleOptions(20.0, 0.001, surface=Surface.BOSS), 10.0, None),
+        (LengthOptions(), 10.0, "verification.no-length"),
+        (LengthOptions(100.0), None, "verification.no-certificate-u"),
+        (LengthOptions(100.0, 0.001), None, None),
+        (
+            LengthOptions(100.0, 0.001, surface=Surface.BOSS),
+            None,
+            "verification.no-ball",
+        ),
+        (LengthOptions(100.0, 0.001, surface=Surface.BORE), 10.0, None),
+        (FixedPointOptions(), None, None),
+    ],
+)
+def test_what_has_to_be_entered_before_is_named(
+    options: TaskOptions, ball: float | None, code: str | None
+) -> None:
+    kind = str(type(options).__struct_config__.tag)
+    missing = task_of(kind).missing(options, ball)
+
+    assert (None if missing is None else missing.code) == code

@@ -17,6 +17,7 @@ from lightpen.verification.reports.charts import write_chart
 from lightpen.verification.reports.records import repeatability_entries
 from lightpen.verification.reports.summaries import repeatability_text
 from lightpen.verification.tasks.repeatability import (
+    STUDY,
     RepeatedPoint,
     TipEstimate,
     measure_repeatability,
@@ -312,6 +313,16 @@ def test_fewer_than_five_calibrations_give_no_verdict_and_nine_no_control_limits
     assert repeatability_entries(nine)["control"] is None
     write_chart(nine, tmp_path / "chart.svg")
     assert "dasharray" not in (tmp_path / "chart.svg").read_text()
+
+
+@pytest.mark.parametrize("n_tips", [STUDY - 1, STUDY])
+def test_fewer_calibrations_than_a_study_takes_are_said_to_be_few(n_tips: int) -> None:
+    found = measure_repeatability(
+        estimates(np.resize(TABLE_1, (n_tips, 3))), LIMITS, tolerance=0.05
+    )
+
+    is_said = f"a study takes {STUDY}" in repeatability_text(found)
+    assert is_said == (n_tips < STUDY)
 
 
 def test_a_tip_beyond_its_control_limits_is_named() -> None:
