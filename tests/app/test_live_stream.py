@@ -10,6 +10,7 @@ from pyigtl import OpenIGTLinkClient
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
+from tests.app.typed_numbers import type_number
 
 from lightpen.streaming.server import LOOPBACK, StreamPlace
 from lightpen_app.shell.stream_dialog import StreamDialog
@@ -43,7 +44,7 @@ def test_who_listens_follows_the_pen_and_every_page_says_so(
     (dialog,) = walker.window.findChildren(StreamDialog)
     walker.until(dialog.isVisible)
     (port,) = dialog.findChildren(NumberField)
-    port.setValue(chosen)
+    type_number(port, chosen)
     walker.click_on(walker.control("Stream pose and tip", dialog))
 
     walker.until_tells(f"Live stream at {LOOPBACK}:{chosen}, clients: 0")

@@ -12,7 +12,6 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
-    QAbstractSpinBox,
     QComboBox,
     QLineEdit,
     QTabBar,
@@ -40,15 +39,8 @@ if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 Key = Qt.Key
-HANDLES = (
-    QAbstractButton,
-    QAbstractItemView,
-    QAbstractSpinBox,
-    QComboBox,
-    QLineEdit,
-    QTabBar,
-)
-WHOLE = (QAbstractItemView, QAbstractSpinBox, QComboBox)  # the Tab key passes parts by
+HANDLES = (QAbstractButton, QAbstractItemView, QComboBox, QLineEdit, QTabBar)
+WHOLE = (QAbstractItemView, QComboBox)  # the Tab key passes parts by
 PATH = re.compile(r"\S*/\S*")
 TOO_SLOW = "Processing cannot keep up"  # an error of the core, for the clock is hasty
 WORD = re.compile(r"[A-Za-z]{2,}")

@@ -26,7 +26,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.board_view import BoardOverlay, BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.live_markers import live_markers
-from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.pen_view import PenPicture, PenView
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
@@ -71,8 +71,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._compute = PushButton()
         self._facts = text_label(TextSize.BODY)
         self._save = PushButton()
-        self._u.setValue(USUAL_U)
-        self._disc.setValue(DISC_DIAMETER)
+        self._u.set_value(USUAL_U)
+        self._disc.set_value(DISC_DIAMETER)
 
         # Layout
         panel = QWidget()
@@ -108,7 +108,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._save.clicked.connect(self._run.save)
         self._pen.led_chosen.connect(self._on_led_chosen)
         for edit in fields:
-            edit.valueChanged.connect(self._refresh)
+            edit.textEdited.connect(self._refresh)
+            edit.value_changed.connect(self._refresh)
 
         self._retranslate()
 
@@ -145,6 +146,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         if self._run.state.progress is not None:
             self._run.cancel()
             return
+        if is_refusing(self):
+            return
         sigma = self._u.value() / 2
         length = MeasuredLength(None, self._length.value(), sigma)
         self._run.solve(Request((length,), self._disc.value()))
@@ -157,7 +160,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self.setWindowTitle(self.tr("Find pen and camera"))
         self._image.set_message(self.tr("No image"))
         self._save.setText(self.tr("Save both files and calibrate the tip"))
-        self._length.setSpecialValueText(self.tr("Not specified"))
+        self._length.set_empty_text(self.tr("Not specified"))
         for label, name in zip(
             self._names,
             (
@@ -268,8 +271,8 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             return
         leds = self._workbench.around.scene.pen.leds
         apart = np.linalg.norm(leds[:, None] - leds, axis=2)
-        self._length.setValue(float(apart.max()))
-        self._u.setValue(SIMULATED_U)
+        self._length.set_value(float(apart.max()))
+        self._u.set_value(SIMULATED_U)
 
     def _found_text(self, found: Discovery | None) -> str:
         if found is None:

@@ -40,6 +40,7 @@ from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
 from lightpen_app.steps.page import MainAction, Page, step_titles
 from lightpen_app.widgets.fitted_window import FRAME, fit_screen
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
+from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.prompt_bar import AskingBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
@@ -488,7 +489,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         menu.popup(corner - QPoint(0, menu.sizeHint().height()))
 
     def _on_main_pressed(self) -> None:
-        self.page().run_main_action()
+        if not is_refusing(self.page()):
+            self.page().run_main_action()
 
     def _on_advance_pressed(self) -> None:
         """Obey a presenter's remote, unless someone must be at the screen."""

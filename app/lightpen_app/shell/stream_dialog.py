@@ -68,6 +68,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         # Connections
         self._on.clicked.connect(self._on_toggled)
         self._address.currentTextChanged.connect(self._refresh)
+        self._port.textEdited.connect(self._refresh)
         self._buttons.rejected.connect(self.reject)
 
         self._retranslate()
@@ -82,7 +83,7 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         """Show the settings."""
         self._on.setChecked(is_on)
         self._address.setCurrentText(place.address)
-        self._port.setValue(place.port)
+        self._port.set_value(place.port)
         self._refresh()
 
     def set_state(self, state: StreamState) -> None:
@@ -94,7 +95,10 @@ class StreamDialog(FittedWindow, Translated, QDialog):
         is_on = self._on.isChecked()
         for each in (self._address, self._port):
             each.setEnabled(not is_on)
-        self._on.setEnabled(bool(self._address.currentText().strip()))
+        is_complete = (
+            bool(self._address.currentText().strip()) and not self._port.reason()
+        )
+        self._on.setEnabled(is_on or is_complete)
         reach = StatusMessage()
         if not self.place().is_local:
             text = self.tr(

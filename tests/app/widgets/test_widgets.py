@@ -1,7 +1,7 @@
 """What the smaller widgets say, by word and sign as well as by colour."""
 
 import pytest
-from PySide6.QtCore import QLocale, QPoint, QPointF, QRectF, Qt
+from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
@@ -15,7 +15,6 @@ from lightpen_app.shell.page_area import NoticeBar
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_text import FittedText
-from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.operator_view import (
     DISTANCES_M,
     LEAST_SHARE,
@@ -128,57 +127,6 @@ def test_a_notice_hides_once_it_is_read(qtbot: QtBot) -> None:
 
     assert notice.text() == ""
     assert not notice.isVisible()
-
-
-def test_a_number_has_a_decimal_point_in_every_country(qtbot: QtBot) -> None:
-    QLocale.setDefault(QLocale(QLocale.Language.German))
-    field = NumberField("mm", (0, 50), 3)
-    qtbot.addWidget(field)
-
-    field.setValue(2.5)
-
-    assert field.text() == "2.500 mm"
-
-
-@pytest.mark.parametrize(
-    ("typed", "value"),
-    [("400", 50), ("0.5", 1), ("3,5", 3.5), ("12.3456", 12.345), ("x", 2)],
-)
-def test_a_number_beyond_its_limits_becomes_the_nearest_and_no_digit_is_lost(
-    qtbot: QtBot, typed: str, value: float
-) -> None:
-    field = NumberField("mm", (1, 50), 3)
-    qtbot.addWidget(field)
-    field.setValue(2)
-    field.selectAll()
-
-    QTest.keyClicks(field, typed)
-    QTest.keyClick(field, Qt.Key.Key_Return)
-
-    assert field.value() == pytest.approx(value)
-
-
-def test_a_number_that_is_being_typed_stays_until_another_one_is_shown(
-    qtbot: QtBot,
-) -> None:
-    field = NumberField("mm", (1, 50), 3)
-    qtbot.addWidget(field)
-    field.setKeyboardTracking(False)
-    field.setValue(2)
-    field.show()
-    field.activateWindow()
-    field.setFocus()
-    qtbot.waitUntil(field.hasFocus)
-    field.selectAll()
-    QTest.keyClicks(field, "1")
-
-    field.setValue(2)
-    field.setSuffix(" mm")
-    QTest.keyClicks(field, "7")
-    assert field.text() == "17 mm"
-    field.setValue(3)
-
-    assert field.text() == "3.000 mm"
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_PageUp, Qt.Key.Key_PageDown])

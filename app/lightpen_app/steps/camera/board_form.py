@@ -156,10 +156,9 @@ class BoardForm(Translated, QWidget):
         # Connections
         self._kind.activated.connect(self._on_kind_chosen)
         self._dictionary.activated.connect(self._on_changed)
-        for count in (self._columns, self._rows):
-            count.valueChanged.connect(self._on_changed)
-        for length in (self._pitch, self._detail):
-            length.valueChanged.connect(self._on_changed)
+        for number in (self._columns, self._rows, self._pitch, self._detail):
+            number.textEdited.connect(self._on_changed)
+            number.value_changed.connect(self._on_changed)
 
         self.set_board(USUAL[BoardKind.CHESSBOARD])
         self._retranslate()
@@ -183,10 +182,10 @@ class BoardForm(Translated, QWidget):
         for field in fields:
             field.blockSignals(True)
         self._kind.setCurrentIndex(self._kind.findData(board.kind))
-        self._columns.setValue(board.columns)
-        self._rows.setValue(board.rows)
-        self._pitch.setValue(board.pitch)
-        self._detail.setValue(board.detail)
+        self._columns.set_value(board.columns)
+        self._rows.set_value(board.rows)
+        self._pitch.set_value(board.pitch)
+        self._detail.set_value(board.detail)
         for field in fields:
             field.blockSignals(False)
         if board.dictionary:

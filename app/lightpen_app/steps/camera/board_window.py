@@ -33,6 +33,7 @@ from lightpen_app.steps.camera.board_form import BoardForm
 from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.widgets.board_view import BoardOverlay, BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
@@ -157,7 +158,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         if self._capture.state.sought is not None:
             self._capture.stop()
             self._hold_simulated(None)
-        else:
+        elif not is_refusing(self):
             self._calibration.conclude()
             board = self._named_board()
             self._capture.start(board)

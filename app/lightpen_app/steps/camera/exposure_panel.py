@@ -66,8 +66,8 @@ class ExposurePanel(Translated, QFrame):
         horizontal_layout(layout, (self._advice, 1), self._adjust)
 
         # Connections
-        self._exposure.valueChanged.connect(self._on_exposure_edited)
-        self._gain.valueChanged.connect(self.gain_changed)
+        self._exposure.value_changed.connect(self._on_exposure_edited)
+        self._gain.value_changed.connect(self.gain_changed)
         self._adjust.clicked.connect(self._on_adjust_clicked)
 
         self._retranslate()
@@ -92,7 +92,7 @@ class ExposurePanel(Translated, QFrame):
         if gains is not None and gain_db is not None:
             self._gain.set_offered(gains, gain_db)
         if caps is not None:
-            self._gain.setSuffix(" dB" if caps.gain_in_db else "")
+            self._gain.set_unit("dB" if caps.gain_in_db else "")
         self._adjust.setVisible(exposures is not None)
         for widget in (self._exposure_name, self._exposure):
             widget.setVisible(exposures is not None)

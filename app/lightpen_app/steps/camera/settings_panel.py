@@ -78,12 +78,12 @@ class SettingsPanel(Translated, QGroupBox):
         fill(layout, self._hint, self._counts)
 
         # Connections
-        self._rate.valueChanged.connect(self._on_rate_edited)
-        self._packet.valueChanged.connect(self._on_packet_edited)
+        self._rate.value_changed.connect(self._on_rate_edited)
+        self._packet.value_changed.connect(self._on_packet_edited)
         self._format.activated.connect(self._on_format_chosen)
         self._trigger.activated.connect(self._on_trigger_chosen)
         for field in (self._width, self._height, self._x, self._y):
-            field.valueChanged.connect(self._on_region_edited)
+            field.value_changed.connect(self._on_region_edited)
         self._whole.clicked.connect(self._on_whole_clicked)
 
         self._retranslate()
@@ -240,7 +240,7 @@ class SettingsPanel(Translated, QGroupBox):
                 "not processed because the computer was too slow."
             ),
         )
-        self._rate.setSuffix(" " + self.tr("fps"))
+        self._rate.set_unit(self.tr("fps"))
         self._retranslate_counts()
         set_tooltip(
             self._packet,

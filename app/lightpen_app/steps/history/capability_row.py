@@ -43,8 +43,7 @@ class CapabilityRow(Translated, QWidget):
         # Connections
         self._has_reference.toggled.connect(self._on_changed)
         for field in (self._tolerance, *self._reference):
-            field.setKeyboardTracking(False)
-            field.valueChanged.connect(self._on_changed)
+            field.value_changed.connect(self._on_changed)
 
         self._retranslate()
 
@@ -71,7 +70,7 @@ class CapabilityRow(Translated, QWidget):
     def _retranslate(self) -> None:
         self._label.setText(self.tr("Capability: tolerance"))
         self._tolerance.setAccessibleName(self.tr("Tolerance of a coordinate"))
-        self._tolerance.setSpecialValueText(self.tr("No study"))
+        self._tolerance.set_empty_text(self.tr("No study"))
         self._has_reference.setText(
             self.tr("Reference tip (from a more accurate instrument)")
         )

@@ -46,7 +46,6 @@ class DuePanel(Translated, QWidget):
         layout = vertical_layout(self, margins=(0, GRID, 0, 0))
         fields = horizontal_layout(layout, spacing=2 * GRID)
         for label, field in zip(self._labels, self._fields, strict=True):
-            field.setKeyboardTracking(False)
             field.setFixedWidth(FIELD_WIDTH)
             add_labelled(fields, label, field)
         fill(fields, 1)
@@ -54,7 +53,7 @@ class DuePanel(Translated, QWidget):
 
         # Connections
         for field in self._fields:
-            field.valueChanged.connect(self._on_edited)
+            field.value_changed.connect(self._on_edited)
 
         self._retranslate()
 
@@ -68,7 +67,7 @@ class DuePanel(Translated, QWidget):
             self._fields, (rule.max_days, rule.max_swings), strict=True
         ):
             with QSignalBlocker(field):
-                field.setValue(number)
+                field.set_value(number)
             field.setEnabled(not is_guarded)
         self._is_guarded = is_guarded
         self._refresh()
@@ -89,7 +88,7 @@ class DuePanel(Translated, QWidget):
         for label, field, text in zip(self._labels, self._fields, words, strict=True):
             label.setText(text)
             field.setAccessibleName(text)
-        self._swings.setSpecialValueText(self.tr("No limit"))
+        self._swings.set_empty_text(self.tr("No limit"))
         self._refresh()
 
     def _refresh(self) -> None:

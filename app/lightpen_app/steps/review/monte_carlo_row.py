@@ -16,7 +16,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.focus import give_focus
-from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -41,7 +41,7 @@ class MonteCarloRow(Translated, QWidget):
         self._start = PushButton()
         self._label = text_label(TextSize.BODY)
         self._trials = NumberField("", (MIN_TRIALS, MOST_TRIALS), 0)
-        self._trials.setValue(USUAL_TRIALS)
+        self._trials.set_value(USUAL_TRIALS)
         self._label.setBuddy(self._trials)
         self._cancel = PushButton()
         self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
@@ -81,7 +81,7 @@ class MonteCarloRow(Translated, QWidget):
 
     def _on_start_clicked(self) -> None:
         solution = self._solution
-        if solution is None:
+        if solution is None or is_refusing(self):
             return
         calibration, n_trials = solution.calibration, round(self._trials.value())
 

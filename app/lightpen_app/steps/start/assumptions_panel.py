@@ -93,8 +93,7 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
 
         # Connections
         for field in self._fields.values():
-            field.setKeyboardTracking(False)
-            field.valueChanged.connect(self._on_field_changed)
+            field.value_changed.connect(self._on_field_changed)
         self._buttons.rejected.connect(self.reject)
         restore = QDialogButtonBox.StandardButton.RestoreDefaults
         self._buttons.button(restore).clicked.connect(self._on_restore_clicked)
@@ -113,7 +112,7 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             value = getattr(assumptions, kind.name)
             field = self._fields[kind.name]
             blocked = field.blockSignals(True)
-            field.setValue(
+            field.set_value(
                 UNMEASURED[kind.name] if value is None else kind.times * value
             )
             field.blockSignals(blocked)
@@ -157,7 +156,7 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
             )
         )
         for name in UNMEASURED:
-            self._fields[name].setSpecialValueText(self.tr("not measured"))
+            self._fields[name].set_empty_text(self.tr("not measured"))
         texts = {
             "focal_length": self.tr("Focal length (other intrinsics scaled with it)"),
             "scale": self.tr("Scale of the LED coordinates"),

@@ -56,7 +56,7 @@ class TemperatureField(NumberField):
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in ENTER_KEYS:
-            self.interpretText()
+            self.settle()
             self.entered.emit()
             return
         super().keyPressEvent(event)
@@ -142,7 +142,7 @@ class DayView(Translated, QWidget):
         """Ask for the pen's temperature; the last one is offered, or none."""
         if is_asked and self._asking.isHidden():
             last = COLDEST if temperature_c is None else temperature_c
-            self._temperature.setValue(last)
+            self._temperature.set_value(last)
         self._asking.setVisible(is_asked)
 
     def rows(self) -> tuple[TipRow, ...]:
@@ -236,7 +236,7 @@ class DayView(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self._question.setText(self.tr("Pen temperature today"))
-        self._temperature.setSpecialValueText(self.tr("not measured"))
+        self._temperature.set_empty_text(self.tr("not measured"))
         self._temperature.setAccessibleName(self._question.text())
         self._answer.setText(self.tr("Confirm"))
         self._search.setPlaceholderText(self.tr("Scan or type a tip"))

@@ -181,7 +181,6 @@ class PointField(Translated, QWidget):
         vertical_layout(self, self._from_file, self._coordinates, spacing=GRID // 2)
         row = horizontal_layout(self._coordinates)
         for label, field in zip(labels, self._fields, strict=True):
-            field.setKeyboardTracking(False)
             field.setMinimumWidth(16 * GRID)
             label.setBuddy(field)
             fill(row, label, (field, 1))
@@ -189,7 +188,7 @@ class PointField(Translated, QWidget):
         # Connections
         self._from_file.toggled.connect(self._on_toggled)
         for field in self._fields:
-            field.valueChanged.connect(self.value_changed)
+            field.value_changed.connect(self.value_changed)
 
         self._coordinates.hide()
         self._retranslate()
@@ -216,11 +215,11 @@ class PointField(Translated, QWidget):
     def settle(self) -> None:
         """Apply pending input."""
         for field in self._fields:
-            field.interpretText()
+            field.settle()
 
     def _show(self, point: FloatArray) -> None:
         for field, coordinate in zip(self._fields, point.tolist(), strict=True):
-            field.setValue(coordinate)
+            field.set_value(coordinate)
 
     def _on_toggled(self, from_file: bool) -> None:
         self._coordinates.setVisible(not from_file)

@@ -68,7 +68,6 @@ class NamesForm(Translated, QWidget):
         self._pen = _ListedEdit()
         self._tip = _ListedEdit()
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
-        self._ball.setKeyboardTracking(False)
         self._cone = _ListedEdit()
         self._nominal_tip = PointField()
         self._lists = {kind: ItemButton() for kind in SWUNG}
@@ -110,7 +109,7 @@ class NamesForm(Translated, QWidget):
             button.chosen.connect(partial(self.item_chosen.emit, kind))
             listed[kind].list_requested.connect(button.showMenu)
             button.library_requested.connect(partial(self.library_requested.emit, kind))
-        self._ball.valueChanged.connect(self.value_changed)
+        self._ball.value_changed.connect(self.value_changed)
         self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
 
         self._retranslate()
@@ -136,7 +135,7 @@ class NamesForm(Translated, QWidget):
             if text != edit.text().strip():
                 edit.setText(text)
                 edit.setCursorPosition(0)
-        self._ball.setValue(names.ball_diameter or 0.0)
+        self._ball.set_value(names.ball_diameter or 0.0)
         self.blockSignals(blocked)
 
     def set_stations(self, names: Sequence[str]) -> None:
@@ -176,7 +175,7 @@ class NamesForm(Translated, QWidget):
 
     def settle(self) -> None:
         """Take over the numbers that are being typed."""
-        self._ball.interpretText()
+        self._ball.settle()
         self._nominal_tip.settle()
 
     def _add(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> None:
@@ -216,7 +215,7 @@ class NamesForm(Translated, QWidget):
             self._station,
             self.tr("Choose a station to restore its settings, or enter a new name."),
         )
-        self._ball.setSpecialValueText(self.tr("Not specified"))
+        self._ball.set_empty_text(self.tr("Not specified"))
 
 
 class LimitsForm(Translated, QGroupBox):
@@ -231,7 +230,6 @@ class LimitsForm(Translated, QGroupBox):
 
         # Widgets
         self._uncertainty = NumberField("mm", (0.0001, 1.0), 4)
-        self._uncertainty.setSingleStep(0.001)
         self._least = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
         self._most = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
         self._all = PushButton()
@@ -246,11 +244,9 @@ class LimitsForm(Translated, QGroupBox):
         layout.addWidget(self._all, 0, 3, Qt.AlignmentFlag.AlignBottom)
 
         # Connections
-        for field in self._fields:
-            field.setKeyboardTracking(False)
-        self._uncertainty.valueChanged.connect(self.value_changed)
-        self._least.valueChanged.connect(self._on_least_changed)
-        self._most.valueChanged.connect(self._on_most_changed)
+        self._uncertainty.value_changed.connect(self.value_changed)
+        self._least.value_changed.connect(self._on_least_changed)
+        self._most.value_changed.connect(self._on_most_changed)
         self._all.clicked.connect(self.all_requested)
 
         self.set_value(self._value)
@@ -269,11 +265,11 @@ class LimitsForm(Translated, QGroupBox):
         """Show other limits."""
         self._value = limits
         blocked = self.blockSignals(True)
-        self._uncertainty.setValue(limits.max_uncertainty)
-        self._least.setRange(LEAST_IMAGES, limits.max_images)
-        self._most.setRange(limits.min_images, MOST_IMAGES)
-        self._most.setValue(limits.max_images)
-        self._least.setValue(limits.min_images)
+        self._uncertainty.set_value(limits.max_uncertainty)
+        self._least.set_limits(LEAST_IMAGES, limits.max_images)
+        self._most.set_limits(limits.min_images, MOST_IMAGES)
+        self._most.set_value(limits.max_images)
+        self._least.set_value(limits.min_images)
         self.blockSignals(blocked)
 
     def set_guarded(self, guarded: bool) -> None:
@@ -284,14 +280,14 @@ class LimitsForm(Translated, QGroupBox):
     def settle(self) -> None:
         """Take over the numbers that are being typed."""
         for field in self._fields:
-            field.interpretText()
+            field.settle()
 
     def _on_least_changed(self, least: float) -> None:
-        self._most.setMinimum(least)
+        self._most.set_limits(least, MOST_IMAGES)
         self.value_changed.emit()
 
     def _on_most_changed(self, most: float) -> None:
-        self._least.setMaximum(most)
+        self._least.set_limits(LEAST_IMAGES, most)
         self.value_changed.emit()
 
     def _retranslate(self) -> None:

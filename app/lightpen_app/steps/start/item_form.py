@@ -66,7 +66,6 @@ class ItemForm(Translated, QWidget):
         self._value = NumberField("mm", (0.0, LARGEST_REFERENCE), 4)
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
         self._change = NumberField("mm", (0.0, LARGEST_CHANGE), 4)
-        self._change.setSingleStep(0.01)
         self._days = NumberField("", (0, MOST_DAYS), 0)
         self._swings = NumberField("", (0, MOST_SWINGS), 0)
         self._nominal = PointField()
@@ -134,7 +133,7 @@ class ItemForm(Translated, QWidget):
     def value(self) -> AnyItem:
         """Return the item in the form, with the earlier picture."""
         for field in (self._ball, self._change, self._days, self._swings, *self._axis):
-            field.interpretText()
+            field.settle()
         self._nominal.settle()
         item = structs.replace(
             self._item,
@@ -145,7 +144,7 @@ class ItemForm(Translated, QWidget):
             note=self._note.text().strip(),
         )
         if isinstance(item, ListedReference):
-            self._value.interpretText()
+            self._value.settle()
             return structs.replace(item, certified_mm=self._value.value() or None)
         if not isinstance(item, ListedTip):
             return item
@@ -175,7 +174,7 @@ class ItemForm(Translated, QWidget):
         """Show the axis that a spin has found."""
         self._spun = axis
         for field, part in zip(self._axis, axis, strict=True):
-            field.setValue(part)
+            field.set_value(part)
 
     def stop_spin(self) -> None:
         """Stop a spin in progress."""
@@ -197,24 +196,24 @@ class ItemForm(Translated, QWidget):
         self._certified.set_value(item.certified)
         self._reference_only.setVisible(isinstance(item, ListedReference))
         if isinstance(item, ListedReference):
-            self._value.setValue(item.certified_mm or 0.0)
+            self._value.set_value(item.certified_mm or 0.0)
         self._note.setText(item.note)
         self._picture.set_value("")
         self._show_picture()
         is_tip = isinstance(item, ListedTip)
         self._tip_only.setVisible(is_tip)
         if isinstance(item, ListedTip):
-            self._ball.setValue(item.ball_diameter_mm or 0.0)
-            self._change.setValue(item.max_change_mm or 0.0)
-            self._days.setValue(item.max_days or 0)
-            self._swings.setValue(item.max_swings or 0)
+            self._ball.set_value(item.ball_diameter_mm or 0.0)
+            self._change.set_value(item.max_change_mm or 0.0)
+            self._days.set_value(item.max_days or 0)
+            self._swings.set_value(item.max_swings or 0)
             self._nominal.set_value(item.nominal_tip)
             self._has_axis.setChecked(item.stylus_axis is not None)
             self._axis_row.setVisible(item.stylus_axis is not None)
             for field, part in zip(
                 self._axis, item.stylus_axis or (0.0, 1.0, 0.0), strict=True
             ):
-                field.setValue(part)
+                field.set_value(part)
         self._retranslate()
 
     def focus_first(self) -> None:
@@ -298,8 +297,8 @@ class ItemForm(Translated, QWidget):
             ),
         )
         for field in (self._ball, self._value):
-            field.setSpecialValueText(nothing)
-        self._change.setSpecialValueText(self.tr("No limit"))
+            field.set_empty_text(nothing)
+        self._change.set_empty_text(self.tr("No limit"))
         set_tooltip(
             self._change,
             self.tr(
@@ -308,7 +307,7 @@ class ItemForm(Translated, QWidget):
             ),
         )
         for field in (self._days, self._swings):
-            field.setSpecialValueText(usual)
+            field.set_empty_text(usual)
         self._has_axis.setText(
             self.tr("Axis of the stylus, from the ball into the pen")
         )

@@ -32,6 +32,7 @@ from lightpen_app.look.words import PARTED
 from lightpen_app.steps.start.item_form import ItemForm, kept_picture
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import RIGHT, ROW_HEIGHT, RowTable
@@ -307,6 +308,8 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         if self._item is None or not self._save.isEnabled():
             return
         is_typed = not self.form.isHidden()
+        if is_typed and is_refusing(self.form):
+            return
         self.form.stop_spin()
         item = self.form.value() if is_typed else self._item
         signature = self._supervisor.value() if self._is_guarded else None

@@ -14,7 +14,7 @@ from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import phrases_whole
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
-from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.page_scroll import DialogScroll
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
@@ -83,15 +83,13 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
     def value(self) -> StationLimits:
         """Return the limits as they are typed."""
         typed = {key: field.value() for key, field in self._fields.items()}
-        counts = sorted((typed["min_images"], typed["max_images"]))
-        typed["min_images"], typed["max_images"] = counts
         return self._value.with_values(typed)
 
     def set_value(self, limits: StationLimits, *, is_guarded: bool) -> None:
         """Show limits, and whether there is a password already."""
         self._value, self._is_guarded = limits, is_guarded
         for limit in LIMITS:
-            self._fields[limit.key].setValue(limits.value(limit))
+            self._fields[limit.key].set_value(limits.value(limit))
         self._supervisor.clear()
         self._new_password.clear()
         self._new_password.setVisible(is_guarded)
@@ -114,10 +112,18 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
             self._on_save_clicked()
 
     def _on_save_clicked(self) -> None:
+        if is_refusing(self):
+            return
+        limits = self.value()
+        if limits.swing.min_images > limits.swing.max_images:
+            self.show_fault(
+                self.tr("The minimum number of images exceeds the maximum number.")
+            )
+            return
         self._is_signed = True
         self._refresh()
         new = self._new_password.text()
-        self.signed.emit(self.value(), self._supervisor.value(), new)
+        self.signed.emit(limits, self._supervisor.value(), new)
 
     @override
     def _retranslate(self) -> None:
@@ -151,7 +157,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
             else:
                 is_absent = not limit.range[0] and not limit.unit
                 if is_absent:
-                    field.setSpecialValueText(no_limit)
+                    field.set_empty_text(no_limit)
                 usually = no_limit if is_absent else f"{limit.default:g}"
             set_tooltip(field, self.tr("Default: {0}.").format(usually))
 
@@ -168,7 +174,7 @@ class _RuleField(ChoiceField):
         """Return the index of the choice."""
         return float(self.currentIndex())
 
-    def setValue(self, value: float) -> None:  # noqa: N802, as of a number field
+    def set_value(self, value: float) -> None:
         """Show the choice of an index."""
         self.setCurrentIndex(round(value))
 

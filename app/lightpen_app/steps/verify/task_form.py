@@ -29,7 +29,6 @@ class NumberOptionField(NumberField):
     def __init__(self, option: NumberOption) -> None:
         super().__init__(option.unit, (option.least, option.most), option.decimals)
         self._option = option
-        self.setKeyboardTracking(False)
 
     def chosen(self) -> float:
         """Return the number; a count is whole."""
@@ -37,11 +36,11 @@ class NumberOptionField(NumberField):
 
     def show_chosen(self, number: float) -> None:
         """Show another number."""
-        self.setValue(number)
+        self.set_value(number)
 
     def retranslate(self) -> None:
         """Translate its texts."""
-        self.setSpecialValueText(worded(self._option.unknown))
+        self.set_empty_text(worded(self._option.unknown))
 
 
 class SurfaceField(ChoiceField):
@@ -107,7 +106,7 @@ class TaskForm(Translated, QWidget):
         self._is_chosen.toggled.connect(self._on_changed)
         for field in self._fields.values():
             if isinstance(field, NumberOptionField):
-                field.valueChanged.connect(self._on_changed)
+                field.value_changed.connect(self._on_changed)
             else:
                 field.activated.connect(self._on_changed)
 

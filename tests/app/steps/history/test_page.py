@@ -30,6 +30,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
+from tests.app.typed_numbers import type_number
 
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.chains.growth import append, own_chain
@@ -509,9 +510,9 @@ def test_the_capability_is_studied_with_a_tolerance_and_a_reference(desk: Desk) 
     (message,) = row.findChildren(SignLabel)
     assert message.value().text == ""
     tolerance, x, *_ = row.findChildren(NumberField)
-    tolerance.setValue(9.0)
+    type_number(tolerance, 9.0)
     row.findChildren(QCheckBox)[0].click()
-    x.setValue(1.0)
+    type_number(x, 1.0)
 
     assert "Cg: x 0.30" in message.value().text  # 0.2 * 9 / (6 * 1)
     assert "Cgk: x 0.30" in message.value().text

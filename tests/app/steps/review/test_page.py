@@ -32,6 +32,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.app.pictures import colors_in
+from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
 from tests.simulated_plans import still_view
 
@@ -949,7 +950,7 @@ def test_the_budget_is_checked_by_monte_carlo_on_request(
     names = [tabs.tabText(i) for i in range(tabs.count())]
     tabs.setCurrentIndex(names.index("Uncertainty"))
     row = the(page, MonteCarloRow)
-    the(row, NumberField).setValue(20)
+    type_number(the(row, NumberField), 20)
     start, cancel = row.findChildren(PushButton)
     start.click()
     cancel.click()

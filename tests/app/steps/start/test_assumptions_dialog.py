@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from PySide6.QtWidgets import QDialogButtonBox
 from pytestqt.qtbot import QtBot
+from tests.app.typed_numbers import type_number
 
 from lightpen.model.assumptions import USUAL
 from lightpen_app.steps.start.assumptions_panel import (
@@ -37,14 +38,14 @@ def test_what_is_typed_is_assumed_at_once(
     qtbot: QtBot, dialog: AssumptionsDialog
 ) -> None:
     with qtbot.waitSignal(dialog.value_changed):
-        field(dialog, "Form error").setValue(1.5)
+        type_number(field(dialog, "Form error"), 1.5)
     assert dialog.value() == replace(USUAL, form_error=0.0015)
 
 
 def test_the_rest_of_the_camera_goes_with_its_focal_length(
     dialog: AssumptionsDialog,
 ) -> None:
-    field(dialog, "Focal length").setValue(1.0)
+    type_number(field(dialog, "Focal length"), 1.0)
     assert dialog.value().focal_length == pytest.approx(0.01)
     assert dialog.value().principal_point == pytest.approx(10.0)
 
@@ -53,7 +54,7 @@ def test_a_measured_temperature_has_an_uncertainty_of_its_own(
     dialog: AssumptionsDialog,
 ) -> None:
     assert not field(dialog, "Uncertainty").isEnabled()
-    field(dialog, "Pen temperature").setValue(23.5)
+    type_number(field(dialog, "Pen temperature"), 23.5)
     assert dialog.value().temperature_c == 23.5
     assert field(dialog, "Uncertainty").isEnabled()
     assert not field(dialog, "Temperature difference").isEnabled()
@@ -71,5 +72,5 @@ def test_the_panel_tells_whether_a_station_has_its_own(qtbot: QtBot) -> None:
     panel = AssumptionsPanel()
     qtbot.addWidget(panel)
     with qtbot.waitSignal(panel.value_changed):
-        field(panel.dialog, "Scale").setValue(20.0)
+        type_number(field(panel.dialog, "Scale"), 20.0)
     assert panel.value() == replace(USUAL, scale=20e-6)

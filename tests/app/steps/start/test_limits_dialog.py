@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QLabel, QLineEdit
 from pytestqt.qtbot import QtBot
+from tests.app.typed_numbers import type_number
 
 from lightpen.model.limits import (
     LIMITS,
@@ -87,7 +88,7 @@ def test_limits_are_laid_down_only_with_a_signature(
     assert isinstance(buttons, QDialogButtonBox)
     save = buttons.button(QDialogButtonBox.StandardButton.Save)
     assert not save.isEnabled()
-    field(dialog, "Length: error").setValue(0.01)
+    type_number(field(dialog, "Length: error"), 0.01)
     sign(dialog)
     reported: list[Any] = []
     dialog.signed.connect(lambda *what: reported.append(what))

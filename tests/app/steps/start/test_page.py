@@ -15,7 +15,6 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QTranslator
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
-    QAbstractSpinBox,
     QApplication,
     QCheckBox,
     QComboBox,
@@ -116,7 +115,7 @@ class Opened:
         match field:
             case QComboBox():
                 return field.currentText()
-            case QLineEdit() | QAbstractSpinBox():
+            case QLineEdit():
                 return field.text()
         raise TypeError(name)
 
