@@ -2709,6 +2709,10 @@
         <translation>工位的接受限值</translation>
     </message>
     <message>
+        <source>The minimum number of images exceeds the maximum number.</source>
+        <translation>最少图像数大于最多图像数。</translation>
+    </message>
+    <message>
         <source>Results outside these limits need a supervisor&apos;s approval and a reason. Each change is recorded with name and time.</source>
         <translation>超出限值的结果须由主管批准并说明理由。每次更改都连同姓名和时间记录。</translation>
     </message>
@@ -3271,6 +3275,33 @@
     <message>
         <source>Close</source>
         <translation>关闭</translation>
+    </message>
+</context>
+<context>
+    <name>NumberField</name>
+    <message>
+        <source>Enter a number, {0}.</source>
+        <translation>请输入数值，{0}。</translation>
+    </message>
+    <message>
+        <source>{0} is not a unit here; enter {1}.</source>
+        <translation>此处不能使用单位 {0}；请输入 {1}。</translation>
+    </message>
+    <message>
+        <source>Enter a whole number.</source>
+        <translation>请输入整数。</translation>
+    </message>
+    <message>
+        <source>At most {0} decimals are possible.</source>
+        <translation>最多 {0} 位小数。</translation>
+    </message>
+    <message>
+        <source>Allowed: {0}.</source>
+        <translation>允许范围：{0}。</translation>
+    </message>
+    <message>
+        <source>For {0} enter {1}.</source>
+        <translation>如指 {0}，请输入 {1}。</translation>
     </message>
 </context>
 <context>
