@@ -218,7 +218,7 @@ def _video_samples(folder: Path) -> Iterator[Sample]:
 
 
 def _read_video(path: Path) -> None:
-    for load in frame_loaders_in_process(path, count_frames_in_process(path)):
+    for load in frame_loaders_in_process(path, count_frames_in_process(path)[0]):
         try:
             load()
         except FileError:

@@ -10,6 +10,7 @@ MESSAGES = {
     "file.cy": "principal point cy",
     "warning.rig-file-contradicted": "The images contradict the rig file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that no camera was moved, or calibrate the rig again.",
     "warning.pen-file-contradicted": "The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen, or measure the pen again.",
+    "warning.images-turned": "The images are turned by 180 degrees against the intrinsics file: its principal point agrees with them only if they are turned back. Use images as the camera delivers them, or the intrinsics of the camera mounted like this.",
     "warning.camera-file-contradicted": "The images contradict the intrinsics file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.",
     "warning.camera-file-of-rig-contradicted": "The images contradict the file of camera {camera}: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.",
     "file.distortion": "distortion coefficient {name}",

@@ -3,14 +3,13 @@
 import argparse
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from lightpen.formats.pen_content import UNITS
 from lightpen.model.assumptions import COLDEST, WARMEST
 from lightpen.model.decision_rules import DecisionRule
-from lightpen.model.limits import LIMITS, VerificationLimits
+from lightpen.model.limits import LIMITS
 
 DataFolder: TypeAlias = Callable[[], Path]
 

@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,7 +16,9 @@ from lightpen.commands.calibrate_options import (
     separation_of,
 )
 from lightpen.commands.console import (
+    images_at,
     lacking,
+    note,
     printing,
     progress,
     require_other_file,
@@ -39,7 +40,6 @@ from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
-from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.pen_files import read_pen
@@ -173,24 +173,20 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
     if not names:
         return
     if len(names) == 1:
-        note = message("record.image-unacknowledged", image=names[0])
+        remark = message("record.image-unacknowledged", image=names[0])
     elif len(names) <= MAX_NAMED:
-        note = message("record.images-unacknowledged", images=", ".join(names))
+        remark = message("record.images-unacknowledged", images=", ".join(names))
     else:
-        note = message(
+        remark = message(
             "record.many-images-unacknowledged", n_images=len(names), first=names[0]
         )
-    _note(note)
+    note(remark)
 
 
 def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") -> None:
     """Report why the intrinsics of a camera, of a rig if named, may be outdated."""
     for doubt in unmodelled_effects_of(camera, local_now().date(), options.temperature):
-        _note(of_camera(name, doubt) if name else doubt)
-
-
-def _note(note: Message) -> None:
-    print(shown(f"lightpen: {note}"), file=sys.stderr)
+        note(of_camera(name, doubt) if name else doubt)
 
 
 def _lacking(option: str, images: Sequence[str]) -> UsageError:
@@ -289,14 +285,14 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
     else:
         _require_one_each(options.images, rig.n_cameras, in_order)
         _require_other_names(options.images, rig.names)
-        sources = [find_images(p).of_bits(options.bits) for p in options.images]
+        sources = [images_at(p).of_bits(options.bits) for p in options.images]
         files = tuple(file for source in sources for file in source.files)
         require_other_file(options.json, *files, *rig_file.camera_files)
         pairing = pair_images([source.names for source in sources], rig.names)
         with progress("Finding LEDs") as report:
             observations = observe_rig_images(sources, pairing, rig, pen, report)
     if pairing.by_order:
-        _note(message("rig.paired-by-order"))
+        note(message("rig.paired-by-order"))
     origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
     return _Calibrated(
         calibrate_rig(
@@ -362,7 +358,7 @@ def _observe(
         require_other_file(options.json, path)
         centers = read_centers(path, pen.n_leds)
         return observe_centers(centers, camera, pen), (path,)
-    source = find_images(*given).of_bits(options.bits)
+    source = images_at(*given).of_bits(options.bits)
     require_other_file(options.json, *source.files)
     with progress("Finding LEDs") as report:
         return observe_images(source, camera, pen, report), source.files

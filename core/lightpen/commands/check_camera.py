@@ -11,6 +11,7 @@ from lightpen.commands.arguments import (
     number_from,
 )
 from lightpen.commands.console import (
+    images_at,
     printing,
     progress,
     require_other_file,
@@ -22,7 +23,6 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import adjusted_intrinsics
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
-from lightpen.formats.images import find_images
 from lightpen.formats.json_records import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
@@ -49,7 +49,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
 
 @printing
 def _check_camera(options: argparse.Namespace) -> None:
-    source = find_images(*options.images).of_bits(options.bits)
+    source = images_at(*options.images).of_bits(options.bits)
     require_other_file(options.json, options.camera, options.pen, *source.files)
     camera = read_camera(options.camera)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)

@@ -15,8 +15,9 @@ from msgspec import Struct
 from lightpen.errors import UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import A_FILE, unreadable, write_whole
+from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.json_records import record_bytes
-from lightpen.messages import printable
+from lightpen.messages import Message, printable
 
 DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK = 0, 1, 2, 3, 4
 LINE_INTERVAL = 15.0  # s, of lines of progress
@@ -93,6 +94,20 @@ def are_same(one: Path, other: Path) -> bool:
     with suppress(OSError):  # one of them is not there, or is not accessible
         return one.samefile(other)
     return os.path.realpath(one) == os.path.realpath(other)
+
+
+def note(remark: Message) -> None:
+    """Print a remark beside the result."""
+    print(shown(f"lightpen: {remark}"), file=sys.stderr)
+
+
+def images_at(*places: str) -> ImageSource:
+    """Find images as `find_images`, and print what is to be said of their files."""
+    source = find_images(*places)
+    remark = source.remark()
+    if remark is not None:
+        note(remark)
+    return source
 
 
 @contextmanager

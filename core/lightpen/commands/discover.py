@@ -9,7 +9,14 @@ from pathlib import Path
 
 from lightpen.commands.arguments import above_zero, add_bits, add_file, add_json, finite
 from lightpen.commands.calibrate_options import separation_of
-from lightpen.commands.console import are_same, printing, progress, shown, write_record
+from lightpen.commands.console import (
+    are_same,
+    images_at,
+    printing,
+    progress,
+    shown,
+    write_record,
+)
 from lightpen.commands.touched import touches_at
 from lightpen.discovery.discover import discover
 from lightpen.discovery.picture import picture_of_pen
@@ -33,7 +40,7 @@ from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import require_folder_of, write_whole
-from lightpen.formats.images import SUFFIXES, find_images
+from lightpen.formats.images import SUFFIXES
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
 from lightpen.model.camera import Camera
@@ -271,7 +278,7 @@ def _sightings(
 ) -> Sightings:
     """Read a swing, which must be of the images of the camera file."""
     if not options.centers:
-        sightings = find_spots(find_images(*places).of_bits(options.bits), report)
+        sightings = find_spots(images_at(*places).of_bits(options.bits), report)
     else:
         size = options.image_size or (None if camera is None else camera.image_size)
         if size is None:

@@ -11,6 +11,7 @@ import numpy as np
 from lightpen.commands.arguments import above_zero, add_json, number_from
 from lightpen.commands.console import (
     are_same,
+    images_at,
     printing,
     progress,
     require_other_file,
@@ -20,7 +21,6 @@ from lightpen.commands.console import (
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import CameraForm, write_camera
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
-from lightpen.formats.images import find_images
 from lightpen.formats.json_records import plain
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.rig_files import write_rig
@@ -200,7 +200,7 @@ def _board(options: argparse.Namespace) -> tuple[Board, BoardTolerances]:
 @printing
 def _intrinsics(options: argparse.Namespace) -> None:
     board, tolerances = _board(options)
-    source = find_images(*options.images)
+    source = images_at(*options.images)
     require_other_file(options.json, *source.files, options.out)
     _require_new_file(options.out, *source.files)
     with progress("Finding the board") as report:
@@ -232,7 +232,7 @@ def _extrinsics(options: argparse.Namespace) -> None:
     board, tolerances = _board(options)
     names = (options.names[0], options.names[1])
     _require_names(names)
-    sources = [find_images(options.left), find_images(options.right)]
+    sources = [images_at(options.left), images_at(options.right)]
     files = [file for source in sources for file in source.files]
     given = options.cameras or []
     require_other_file(options.json, *files, *given, options.out)

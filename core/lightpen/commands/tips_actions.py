@@ -18,13 +18,12 @@ from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
 from lightpen.commands.arguments import FORGOTTEN, data_of
-from lightpen.commands.console import Command, printing, progress, shown
+from lightpen.commands.console import Command, images_at, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.detection.observations import observe_images
 from lightpen.errors import ArchiveError, NoArchiveError, UsageError
 from lightpen.estimation.spin import SpinFit, fit_spin
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
@@ -162,7 +161,7 @@ def _spun(options: argparse.Namespace) -> SpinFit:
     camera = read_camera(options.camera)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     with progress("Finding LEDs") as report:
-        seen = observe_images(find_images(*options.images), camera, pen, report)
+        seen = observe_images(images_at(*options.images), camera, pen, report)
     fit = [i for i, reason in enumerate(seen.reasons) if not reason]
     return fit_spin(seen.rotations[fit])
 

@@ -6,11 +6,11 @@ import struct
 import sys
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from io import BytesIO
 from pathlib import Path
 from threading import Condition
-from typing import Any
+from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
@@ -27,10 +27,13 @@ from lightpen.formats.image_headers import (
     damaged_image,
     read_image_header,
 )
+from lightpen.formats.tiff_pages import PagePlace, TiffPage, is_tiff, read_page
 from lightpen.messages import Message, message
 
 IMAGE_FILE = message("file.image")
 MAX_FILE_SIZE = 150_000_000  # bytes; the largest image, of 16 bits, not compressed
+MAX_STACK_SIZE = 10**12  # bytes, of all pages of a TIFF
+TIFF_SUFFIXES = (".tif", ".tiff")
 MAX_MEMORY = 250_000_000  # bytes that all images take while they are decoded
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
 MAX_PNG_CHUNKS = (
@@ -78,25 +81,25 @@ def release_freed_memory() -> None:
         trim(0)
 
 
-def read_image(path: Path) -> Image:
-    """Read one image file as grey values of 8 or 16 bit.
+def read_image(path: Path, page: PagePlace | None = None) -> Image:
+    """Read one image file, or a page of a TIFF, as grey values of 8 or 16 bit.
 
     The bytes are read first and decoded then: `cv2.imread` fails on names outside
-    the code page of Windows.
+    the code page of Windows. Pixels stay as stored, whatever an orientation tag says.
     """
-    with opened(path, IMAGE_FILE, MAX_FILE_SIZE) as stream:
-        header = read_image_header(stream, path.name)
-        size = os.fstat(stream.fileno()).st_size
-        with _MEMORY.given(_needed(header, size, path.name)):
-            stream.seek(0)
-            return _decoded(stream.read(size), path.name)
+    with opened_image(path) as stream:
+        return _read(stream, path.name, page)
 
 
 def decode_image(data: bytes, name: str) -> Image:
     """Decode the bytes of an image file as grey values of 8 or 16 bit, (H, W)."""
-    header = read_image_header(BytesIO(data), name)
-    with _MEMORY.given(_needed(header, len(data), name)):
-        return _decoded(data, name)
+    return _read(BytesIO(data), name, None)
+
+
+def opened_image(path: Path) -> AbstractContextManager[BinaryIO]:
+    """Open an image file; a TIFF, which may have many pages, of any size."""
+    is_stack = path.suffix.lower() in TIFF_SUFFIXES
+    return opened(path, IMAGE_FILE, MAX_STACK_SIZE if is_stack else MAX_FILE_SIZE)
 
 
 def full_scale_of(image: Image) -> int:
@@ -154,8 +157,37 @@ class _Memory:
 _MEMORY = _Memory(MAX_MEMORY)
 
 
+def _read(stream: BinaryIO, name: str, place: PagePlace | None) -> Image:
+    start = stream.read(4)
+    if is_tiff(start):
+        page = read_page(stream, name, place)
+        with _MEMORY.given(_needed(page.header, 2 * page.n_bytes, name)):
+            return _page(stream, page, name)
+    stream.seek(0)
+    header = read_image_header(stream, name)
+    size = stream.seek(0, os.SEEK_END)
+    with _MEMORY.given(_needed(header, size, name)):
+        stream.seek(0)
+        return grey_image(_decoded(stream.read(size), name), name)
+
+
+def _page(stream: BinaryIO, page: TiffPage, name: str) -> Image:
+    planes = [
+        _decoded(page.file_of_plane(stream, plane), name)
+        for plane in range(page.n_planes)
+    ]
+    # Of planes the order is red, green, blue; OpenCV's is the other way round.
+    image = planes[0] if len(planes) < 3 else np.stack(planes[2::-1], axis=-1)
+    grey = grey_image(image, name)
+    if page.is_inverted:
+        grey = np.bitwise_not(grey)
+    if page.unused_bits:
+        return np.right_shift(grey, page.unused_bits, dtype=np.uint16)
+    return grey
+
+
 def _needed(header: ImageHeader, size: int, name: str) -> int:
-    """Return the memory needed to read and decode a file of this size, bytes."""
+    """Return the memory needed to decode bytes of this number, with them."""
     # OpenCV decodes into memory of its own and then copies the image to numpy's.
     needed = size + header.decoded + max(header.decoded, header.working)
     if needed > MAX_MEMORY:
@@ -170,7 +202,7 @@ def _needed(header: ImageHeader, size: int, name: str) -> int:
     return needed
 
 
-def _decoded(data: bytes, name: str) -> Image:
+def _decoded(data: bytes, name: str) -> npt.NDArray[Any]:
     if data.startswith(PNG_SIGNATURE):
         _check_png(data, name)
     elif data.startswith(b"\xff\xd8"):
@@ -181,7 +213,7 @@ def _decoded(data: bytes, name: str) -> Image:
         raise FileError("image.undecodable", name=name, problem=error.err) from error
     if image is None:
         raise damaged_image(name)
-    return grey_image(np.asarray(image), name)
+    return np.asarray(image)
 
 
 def grey_image(image: npt.NDArray[Any], name: str | Message) -> Image:

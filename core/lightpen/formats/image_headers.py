@@ -28,11 +28,7 @@ _JPEG_PROGRESSIVE = frozenset({0xC2, 0xCA})
 _JPEG_SCAN = 0xDA
 _JPEG_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD9)})
 _JPEG_MARKERS = 1000  # before the pixels; a colour profile takes 255
-_TIFF_VALUES = {1: "B", 3: "H", 4: "I"}  # by the type of an entry
-_TIFF_TAGS = frozenset({256, 257, 258, 259, 277, 278, 322, 323})  # that are evaluated
-_TIFF_ENTRIES = 500
 _WEBP_ANIMATED = 0x02  # of the flags
-_TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
 
 
 @dataclass(frozen=True)
@@ -99,8 +95,6 @@ def _reader(start: bytes, name: _Name) -> _Reader:
         return _jpeg
     if start.startswith(b"BM"):
         return _bmp
-    if start.startswith((b"II*\0", b"MM\0*")):
-        return _tiff
     if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
         return _webp
     if re.match(rb"P[1-6][\s#]", start):
@@ -185,55 +179,6 @@ def _bmp(stream: BinaryIO, name: _Name) -> ImageHeader:
         raise damaged_image(name)
     return ImageHeader(
         width, abs(height), width * abs(height) * (4 if bits == 32 else 3)
-    )
-
-
-def _tiff(stream: BinaryIO, name: _Name) -> ImageHeader:
-    order = "<" if _exactly(stream, 2, name) == b"II" else ">"
-    _, place = struct.unpack(order + "HI", _exactly(stream, 6, name))
-    stream.seek(place)
-    (count,) = struct.unpack(order + "H", _exactly(stream, 2, name))
-    if count > _TIFF_ENTRIES:
-        raise damaged_image(name)
-    entries = _exactly(stream, 12 * count, name)
-    values: dict[int, int] = {}
-    for i in range(count):
-        tag, kind, n_values = struct.unpack_from(order + "HHI", entries, 12 * i)
-        if tag not in _TIFF_TAGS:
-            continue
-        # The decoder takes the first of a tag, and also types that none is written in.
-        if kind not in _TIFF_VALUES or n_values == 0 or tag in values:
-            raise damaged_image(name)
-        layout = order + _TIFF_VALUES[kind]
-        if n_values * struct.calcsize(layout) <= 4:
-            (values[tag],) = struct.unpack_from(layout, entries, 12 * i + 8)
-        else:  # of several, such as the depths of channels, the first
-            (offset,) = struct.unpack_from(order + "I", entries, 12 * i + 8)
-            stream.seek(offset)
-            (values[tag],) = struct.unpack(
-                layout, _exactly(stream, struct.calcsize(layout), name)
-            )
-    return _tiff_header(values, name)
-
-
-def _tiff_header(values: dict[int, int], name: _Name) -> ImageHeader:
-    width, height = values.get(256, 0), values.get(257, 0)
-    depth, compression, channels = (
-        values.get(258, 1),
-        values.get(259, 1),
-        values.get(277, 1),
-    )
-    if compression not in _TIFF_LOSSLESS:
-        raise FileError("image.tiff-compression", name=name, compression=compression)
-    if not 1 <= channels <= 4 or depth > 64:
-        raise damaged_image(name)
-    # It is decoded strip by strip or tile by tile, each from a copy.
-    strip = width * min(values.get(278, height), height)
-    if 322 in values or 323 in values:
-        strip = values.get(322, 0) * values.get(323, 0)
-    bytes_a_pixel = 4 * max(-(-depth // 8), 1)
-    return ImageHeader(
-        width, height, width * height * channels * -(-depth // 8), strip * bytes_a_pixel
     )
 
 

@@ -3,8 +3,8 @@
 import glob
 import os
 import re
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,13 +18,18 @@ from lightpen.errors import FileError
 from lightpen.formats.decoding import (
     IMAGE_FILE,
     MAX_FILE_SIZE,
+    TIFF_SUFFIXES,
     keep_freed_memory,
+    opened_image,
     read_image,
 )
 from lightpen.formats.files import opened, unreadable
 from lightpen.formats.image_headers import read_image_header
+from lightpen.formats.mosaic import is_mosaic
+from lightpen.formats.orientation import orientation_remark
+from lightpen.formats.tiff_pages import PagePlace, is_tiff, page_places
 from lightpen.formats.video_process import count_frames, frame_loaders
-from lightpen.messages import message, printable
+from lightpen.messages import Message, message, printable
 
 
 class MemoryRoom:
@@ -65,10 +70,11 @@ class MemoryRoom:
         return largest is not None and (self._n + 1) * largest <= self._budget
 
 
-SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
+SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
 IMAGE_FOLDER = "images"
 IN_FLIGHT = 4  # images per thread that may wait in memory
+LOOKED_AT_FIRST = 4  # images, whether they are raw ones of a colour camera
 WORK_MEMORY = 250_000_000  # bytes that all threads take
 
 Seen = TypeVar("Seen")
@@ -84,6 +90,8 @@ class ImageSource:
     # Brightest value that a pixel can have, if stated; else levels of each image show
     # it, see `lightpen.formats.decoding.full_scale_of`.
     full_scale: int | None = None
+    # Returns what is to be said of the files, such as their orientation tags.
+    remark: Callable[[], Message | None] = lambda: None
 
     def of_bits(self, bits: int | None) -> "ImageSource":
         """Return these images of a stated bit depth, if it is stated."""
@@ -101,15 +109,21 @@ def look_at_all(
     Images are released at once; processing runs a few images ahead. ``look`` takes the
     loader of an image; an exception ends the processing. ``memory_a_pixel``, bytes,
     limits the threads by `WORK_MEMORY`; they are at most as many as there are
-    processors.
+    processors. Raises `FileError` if the first images are raw ones of a colour camera.
     """
     keep_freed_memory()
     room = MemoryRoom(WORK_MEMORY)
+    mosaics: list[bool] = []  # of the first images
 
     def look_in_room(load: Callable[[], Image]) -> Seen:
         def loaded() -> Image:
             image = load()
             room.note(memory_a_pixel * image.size)
+            if (
+                len(mosaics) < LOOKED_AT_FIRST
+                and (found := is_mosaic(image)) is not None
+            ):
+                mosaics.append(found)
             return image
 
         with room.one():
@@ -122,8 +136,15 @@ def look_at_all(
             waiting.append(executor.submit(look_in_room, load))
             if len(waiting) >= IN_FLIGHT * n_threads:
                 yield waiting.popleft().result()
+                _require_no_mosaics(mosaics, source)
         while waiting:
             yield waiting.popleft().result()
+            _require_no_mosaics(mosaics, source)
+
+
+def _require_no_mosaics(first: list[bool], source: ImageSource) -> None:
+    if len(first) >= min(LOOKED_AT_FIRST, len(source.names)) and all(first):
+        raise FileError("image.mosaic", name=printable(source.names[0]))
 
 
 def find_images(*places: str) -> ImageSource:
@@ -143,14 +164,45 @@ def find_images(*places: str) -> ImageSource:
 
 
 def image_files(files: list[Path]) -> ImageSource:
-    """Return the source of these image files, in their order."""
+    """Return the source of these image files, in their order, with all their pages."""
+    pages = [(file, place) for file in files for place in _pages(file)]
+    n_pages = Counter(file for file, _ in pages)
+    numbers: Counter[Path] = Counter()
+    names = []
+    for file, _ in pages:
+        numbers[file] += 1
+        page = f"{file.stem} page {numbers[file]}"
+        names.append(file.name if n_pages[file] == 1 else page)
 
     def loaders() -> Iterator[Callable[[], Image]]:
-        for file in files:
-            yield partial(read_image, file)
+        for file, place in pages:
+            yield partial(_page, file, place)
 
-    names = tuple(file.name for file in files)
-    return ImageSource(names, tuple(files), loaders, _stated_full_scale(files))
+    return ImageSource(
+        tuple(names),
+        tuple(files),
+        loaders,
+        _stated_full_scale(files),
+        partial(orientation_remark, tuple(files)),
+    )
+
+
+def _pages(file: Path) -> Sequence[PagePlace | FileError | None]:
+    """Return the pages of a TIFF, or its fault; None for the image of other formats."""
+    if file.suffix.lower() not in TIFF_SUFFIXES:
+        return [None]
+    try:
+        with opened_image(file) as stream:
+            is_stack = is_tiff(stream.read(4))
+            return page_places(stream, file.name) if is_stack else [None]
+    except FileError as error:
+        return [error]
+
+
+def _page(file: Path, page: PagePlace | FileError | None) -> Image:
+    if isinstance(page, FileError):
+        raise page
+    return read_image(file, page)
 
 
 def _stated_full_scale(files: list[Path]) -> int | None:
@@ -198,9 +250,15 @@ def _image_files_in(folder: Path) -> list[Path]:
 
 
 def _video(path: Path) -> ImageSource:
-    n_frames = count_frames(path)
+    n_frames, degrees = count_frames(path)
     names = tuple(f"frame {i + 1}" for i in range(n_frames))
-    return ImageSource(names, (path,), partial(frame_loaders, path, n_frames))
+    turned = message("video.orientation", name=printable(path.name), degrees=degrees)
+    return ImageSource(
+        names,
+        (path,),
+        partial(frame_loaders, path, n_frames),
+        remark=lambda: turned if degrees else None,
+    )
 
 
 def _by_name(path: Path) -> list[tuple[int, str]]:

@@ -108,14 +108,14 @@ STDERR = 2  # file descriptor, for output of libraries
 MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 
 
-def count_frames(path: Path) -> int:
-    """Return the number of frames of a video; see `videos`.
+def count_frames(path: Path) -> tuple[int, int]:
+    """Return the number of frames of a video, and its turn, degrees; see `videos`.
 
     Raises `FileError` as there, or if decoding it takes too much memory.
     """
     with _decoder(_send_count, path) as receive:
-        n_frames: int = receive()
-    return n_frames
+        counted: tuple[int, int] = receive()
+    return counted
 
 
 def frame_loaders(path: Path, n_frames: int) -> Iterator[Callable[[], Image]]:

@@ -17,6 +17,7 @@ from lightpen.messages import Message, message, printable
 MAX_VIDEO_FRAMES = 30_000
 MAX_VIDEO_PIXELS = 20_000_000  # of a frame; a decoder keeps several
 MOTION_JPEG = "MJPG"
+UNCOMPRESSED = "\0\0\0\0"  # FFmpeg reports so whatever layout its header names
 # Anything else FFmpeg may take for raw pixels, of a layout that it has not.
 CODECS = frozenset(
     {
@@ -27,8 +28,10 @@ CODECS = frozenset(
 )
 
 
-def count_frames_in_process(path: Path) -> int:
-    """Return the number of frames of a video, not trusting its header.
+def count_frames_in_process(path: Path) -> tuple[int, int]:
+    """Return the number of frames of a video, not trusting its header, and its turn.
+
+    The turn is what a player makes of the frames by the header, degrees.
 
     They are counted as they come, not decoded; too long or too large a video is
     refused.
@@ -42,6 +45,9 @@ def count_frames_in_process(path: Path) -> int:
             MAX_VIDEO_PIXELS,
         )
         codec = _codec(stream)
+        degrees = int(stream.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
+        if stream.isOpened() and codec == UNCOMPRESSED:
+            raise FileError("video.uncompressed", path=path)
         if stream.isOpened() and codec not in CODECS:
             raise FileError("video.codec", path=path, codec=quoted(codec))
         n_frames = 0
@@ -57,7 +63,7 @@ def count_frames_in_process(path: Path) -> int:
         raise FileError("image.video", path=path)
     if n_frames > MAX_VIDEO_FRAMES:
         raise FileError("video.too-many-frames", path=path, most=MAX_VIDEO_FRAMES)
-    return n_frames
+    return n_frames, degrees
 
 
 def frame_loaders_in_process(
@@ -85,9 +91,12 @@ def _opened_video(path: Path, *parameters: int) -> cv2.VideoCapture:
     if not _has_ffmpeg():
         return cv2.VideoCapture(name, cv2.CAP_OPENCV_MJPEG)
     # One thread: each takes the memory of some frames.
-    return cv2.VideoCapture(
+    stream = cv2.VideoCapture(
         name, cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *parameters]
     )
+    # Frames as stored, see `lightpen.formats.orientation`.
+    stream.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
+    return stream
 
 
 def _has_ffmpeg() -> bool:

@@ -6656,6 +6656,14 @@ mm</translation>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
     </message>
     <message>
+        <source>The header of {name} asks players to turn its frames by {degrees} degrees. This is not applied: the frames are used as stored, which must be the orientation that the intrinsics file was made for.</source>
+        <translation>{name} 的文件头要求播放器把画面旋转 {degrees} 度。程序不执行这一旋转：画面按存储的方向使用，内参文件必须是在这一方向上标定的。</translation>
+    </message>
+    <message>
+        <source>The images are turned by 180 degrees against the intrinsics file: its principal point agrees with them only if they are turned back. Use images as the camera delivers them, or the intrinsics of the camera mounted like this.</source>
+        <translation>图像相对于内参文件旋转了 180 度：只有转回来，文件中的主点才与图像相符。请使用相机原样输出的图像，或使用按此安装方式标定的相机内参。</translation>
+    </message>
+    <message>
         <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
         <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
     </message>
@@ -6948,6 +6956,30 @@ mm</translation>
         <translation>封印文件</translation>
     </message>
     <message>
+        <source>shown mirrored left to right</source>
+        <translation>左右镜像显示</translation>
+    </message>
+    <message>
+        <source>shown mirrored top to bottom</source>
+        <translation>上下镜像显示</translation>
+    </message>
+    <message>
+        <source>shown turned by 180 degrees</source>
+        <translation>旋转 180 度显示</translation>
+    </message>
+    <message>
+        <source>shown turned by 90 degrees and mirrored</source>
+        <translation>旋转 90 度并镜像显示</translation>
+    </message>
+    <message>
+        <source>shown turned by 90 degrees to the left</source>
+        <translation>向左旋转 90 度显示</translation>
+    </message>
+    <message>
+        <source>shown turned by 90 degrees to the right</source>
+        <translation>向右旋转 90 度显示</translation>
+    </message>
+    <message>
         <source>straightness</source>
         <translation>直线度</translation>
     </message>
@@ -7034,6 +7066,10 @@ mm</translation>
     <message>
         <source>{n_points} points can be used, a plane needs at least {needed}. Probe the plate all over.</source>
         <translation>有 {n_points} 个可用的测点，平面至少需要 {needed} 个。请在整个平板上触测。</translation>
+    </message>
+    <message>
+        <source>{n_tagged} of {n_images} images, the first of them {name}, have the orientation tag {tag} ({meaning}). It is not applied: the pixels are used as stored, which must be the orientation that the intrinsics file was made for. If another program turned the images, save them again as the camera delivers them.</source>
+        <translation>{n_images} 幅图像中有 {n_tagged} 幅（第一幅为 {name}）带有方向标记 {tag}（{meaning}）。程序不执行该标记：像素按存储的方向使用，内参文件必须是在这一方向上标定的。如果图像被其他程序旋转过，请按相机原样输出重新保存。</translation>
     </message>
     <message>
         <source>{n_tips} calibration does not show repeatability; give at least two, usually ten.</source>
@@ -7136,6 +7172,10 @@ mm</translation>
         <translation>{name} 有 {n_cells:,} 个单元格；最多读取 {most:,} 个。请检查文件是否正确，或将其拆分。</translation>
     </message>
     <message>
+        <source>{name} has {n_channels} channels a pixel; 1 (grey), 3 (colour) or 4 are needed. Save the channels as pages or as files of their own.</source>
+        <translation>{name} 的每个像素有 {n_channels} 个通道；需要 1 个（灰度）、3 个（彩色）或 4 个。请把各通道分别保存为页或单独的文件。</translation>
+    </message>
+    <message>
         <source>{name} has {n_frames} frames; at most {most} are read. Check that this is the right file, or split it.</source>
         <translation>{name} 有 {n_frames} 帧；最多读取 {most} 帧。请检查文件是否正确，或将其拆分。</translation>
     </message>
@@ -7154,6 +7194,10 @@ mm</translation>
     <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that this is the right file.</source>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
+    </message>
+    <message>
+        <source>{name} is the raw image of a colour camera: its pixels repeat the pattern of a Bayer filter, which moves the centres of LEDs. Save the images in colour (demosaiced) or grey, or use a monochrome camera.</source>
+        <translation>{name} 是彩色相机的原始图像：像素重复拜耳滤光片的图案，会使 LED 中心偏移。请保存为彩色图像（已去马赛克）或灰度图像，或使用黑白相机。</translation>
     </message>
     <message>
         <source>{name} is {width} x {height} px, the other images are {usual_width} x {usual_height} px. Replay only images of one camera together.</source>
@@ -9382,6 +9426,10 @@ mm</translation>
     <message>
         <source>The video {path} has the unsupported codec {codec}. Save it with FFV1 or MJPG, or save its frames as images.</source>
         <translation>视频 {path} 的编码为 {codec}，此处不支持。请以 FFV1 或 MJPG 编码保存，或将各帧另存为图像。</translation>
+    </message>
+    <message>
+        <source>The video {path} has uncompressed frames, which are not read from videos. Save its frames as images, or convert it to FFV1, which loses nothing.</source>
+        <translation>视频 {path} 的画面未压缩，程序不读取这种视频。请把画面保存为图像，或无损转换为 FFV1。</translation>
     </message>
     <message>
         <source>The views disagree on the pose of the second camera: {n_agree} of {n_pairs} agree. A camera was moved, or image pairs are not simultaneous. Check the names and order of the images.</source>

@@ -10,6 +10,7 @@ import pytest
 
 from lightpen.errors import FileError
 from lightpen.formats.image_headers import ImageHeader, read_image_header
+from lightpen.formats.tiff_pages import is_tiff, read_page
 
 RNG = np.random.default_rng(0)
 WIDTH, HEIGHT = 67, 45
@@ -24,6 +25,8 @@ def encoded(suffix: str, image: Any, *options: int) -> bytes:
 
 
 def header_of(data: bytes) -> ImageHeader:
+    if is_tiff(data):
+        return read_page(BytesIO(data), "image", None).header
     return read_image_header(BytesIO(data), "image")
 
 
@@ -74,7 +77,6 @@ def test_a_header_that_ends_early_is_damaged(name: str) -> None:
         b"\0\0\0\x1cftypavif" + bytes(100),
         b"GIF89a" + bytes(100),
         b"v/1\x01" + bytes(100),  # OpenEXR
-        b"II+\0" + bytes(100),  # TIFF beyond 4 GB
         b"not an image at all",
     ],
 )
@@ -100,20 +102,12 @@ def test_more_pixels_than_those_of_cameras_are_refused() -> None:
 def test_a_tile_counts_by_its_own_size() -> None:
     entries = [(256, 100), (257, 100), (258, 8), (322, 16_000), (323, 16_000)]
     packed = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
-    data = b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed
+    data = b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed + bytes(4)
 
     assert header_of(data).working >= 16_000 * 16_000
 
 
-def test_a_lossy_tiff_is_refused() -> None:
-    entries = [(256, 100), (257, 100), (259, 7)]
-    packed = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
-
-    with pytest.raises(FileError, match="compression 7"):
-        header_of(b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed)
-
-
-@pytest.mark.parametrize("kind", [6, 8, 9, 11, 13, 16])
+@pytest.mark.parametrize("kind", [6, 8, 9, 11, 12])
 def test_a_size_that_the_decoder_reads_and_is_not_known_here_is_refused(
     kind: int,
 ) -> None:
@@ -123,7 +117,7 @@ def test_a_size_that_the_decoder_reads_and_is_not_known_here_is_refused(
     )
 
     with pytest.raises(FileError, match="damaged"):
-        header_of(b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed)
+        header_of(b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed + bytes(4))
 
 
 def jpeg_head(kind: int, n_channels: int, n_scanned: int) -> bytes:

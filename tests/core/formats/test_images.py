@@ -1,6 +1,7 @@
 """Images from folders, patterns and videos; what is damaged is named."""
 
 import os
+import struct
 import subprocess
 import sys
 import zlib
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.arrays import Image
+from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import (
     decode_image,
@@ -20,7 +21,8 @@ from lightpen.formats.decoding import (
     full_scale_of,
     read_image,
 )
-from lightpen.formats.images import find_images
+from lightpen.formats.images import find_images, look_at_all
+from lightpen.formats.mosaic import is_mosaic
 from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
 
 RNG = np.random.default_rng(0)
@@ -313,7 +315,7 @@ def test_without_ffmpeg_motion_jpeg_is_read_and_other_videos_are_refused(
     writer.write(GREY)
     writer.release()
 
-    n_frames = count_frames_in_process(good)
+    n_frames, _ = count_frames_in_process(good)
     frames = [load().shape for load in frame_loaders_in_process(good, n_frames)]
     assert frames == [(48, 64)] * 6
     with pytest.raises(FileError, match="reads Motion JPEG in"):
@@ -397,3 +399,94 @@ def test_images_that_state_no_full_scale_have_that_of_their_levels() -> None:
     assert full_scale_of(np.minimum(deep, 1023)) == 1023
     assert full_scale_of(np.minimum(deep, 1000)) == 1000  # pixels pile up there
     assert full_scale_of(np.minimum(deep, 255).astype(np.uint8)) == 255
+
+
+def test_an_uncompressed_video_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "raw.avi"
+    writer = cv2.VideoWriter(str(path), 0, 20, (64, 48), isColor=False)
+    writer.write(GREY)
+    writer.release()
+
+    with pytest.raises(FileError, match=r"uncompressed frames.*FFV1"):
+        count_frames_in_process(path)
+
+
+def mosaic_of(colours: tuple[float, float, float], pattern: str) -> Image:
+    """Return the raw image of discs of a colour (red, green, blue)."""
+    image: FloatArray = np.zeros((96, 128))
+    for x, y in RNG.uniform(20, 76, (6, 2)):
+        cv2.circle(image, (round(x), round(y)), 6, 200.0, -1, cv2.LINE_AA)
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 1.0), np.float64)
+    gains = np.array([colours["RGB".index(letter)] for letter in pattern])
+    raw = image * np.tile(gains.reshape(2, 2), (48, 64)) + 5
+    return np.asarray(raw, np.uint8)
+
+
+@pytest.mark.parametrize("pattern", ["RGGB", "BGGR", "GRBG", "GBRG"])
+@pytest.mark.parametrize(
+    "colours", [(0.5, 1.0, 0.6), (1.0, 0.15, 0.05), (0.1, 1.0, 0.1), (0.05, 0.3, 1.0)]
+)
+def test_raw_images_of_a_colour_camera_are_named(
+    tmp_path: Path, colours: tuple[float, float, float], pattern: str
+) -> None:
+    for i in range(5):
+        (tmp_path / f"{i}.png").write_bytes(png(mosaic_of(colours, pattern)))
+
+    with pytest.raises(FileError, match="Bayer"):
+        list(look_at_all(find_images(str(tmp_path)), lambda load: load(), 1))
+
+
+@pytest.mark.parametrize("gains", [(1, 1, 1, 1), (1, 0.9, 1, 0.9), (1, 1, 0.85, 0.85)])
+def test_uneven_columns_or_rows_are_no_mosaic(gains: tuple[float, ...]) -> None:
+    even = mosaic_of((1.0, 1.0, 1.0), "RGGB").astype(np.float64)
+    image = even * np.tile(np.reshape(gains, (2, 2)), (48, 64))
+
+    assert is_mosaic(image.astype(np.uint8)) is False
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".webp", ".tif"])
+@pytest.mark.parametrize("tag", [3, 6])
+def test_an_orientation_tag_is_said_and_not_applied(
+    tmp_path: Path, suffix: str, tag: int
+) -> None:
+    exif = b"II*\0" + struct.pack("<IHHHIII", 8, 1, 274, 3, 1, tag, 0)
+    path = tmp_path / f"turned{suffix}"
+    if suffix == ".tif":
+        entries = [(256, 64), (257, 48), (258, 8), (259, 1), (262, 1)]
+        entries += [(273, 8 + 2 + 9 * 12 + 4), (274, tag), (277, 1), (279, GREY.size)]
+        packed = b"".join(
+            struct.pack("<HHII", at, 4, 1, value) for at, value in entries
+        )
+        head = b"II*\0" + struct.pack("<IH", 8, len(entries))
+        path.write_bytes(head + packed + bytes(4) + GREY.tobytes())
+    else:
+        kept = [cv2.IMWRITE_JPEG_QUALITY, 100, cv2.IMWRITE_WEBP_QUALITY, 101]
+        data = bytes(cv2.imencode(suffix, GREY, kept)[1])
+        path.write_bytes(with_exif(data, suffix, exif))
+
+    source = find_images(str(path))
+
+    remark = str(source.remark())
+    assert f"orientation tag {tag}" in remark
+    assert "not applied" in remark
+    (load,) = source.open()
+    assert np.abs(load().astype(int) - GREY).max() <= 4  # rounding of JPEG
+
+
+def with_exif(data: bytes, suffix: str, exif: bytes) -> bytes:
+    """Return a JPEG, PNG or WebP file with an Exif part."""
+    if suffix == ".jpg":
+        part = b"Exif\0\0" + exif
+        return data[:2] + struct.pack(">HH", 0xFFE1, len(part) + 2) + part + data[2:]
+    if suffix == ".png":
+        part = b"eXIf" + exif
+        chunk = (
+            struct.pack(">I", len(exif)) + part + struct.pack(">I", zlib.crc32(part))
+        )
+        return data[:-12] + chunk + data[-12:]  # before the end
+    chunk = b"EXIF" + struct.pack("<I", len(exif)) + exif
+    return data + chunk
+
+
+def test_images_without_tag_need_no_remark(folder: Path) -> None:
+    assert find_images(str(folder)).remark() is None

@@ -21,7 +21,7 @@ from lightpen.formats.video_process import count_frames, frame_loaders
 if __name__ == "__main__":
     path = Path(sys.argv[1])
     try:
-        for load in frame_loaders(path, count_frames(path)):
+        for load in frame_loaders(path, count_frames(path)[0]):
             load()
     except FileError as error:
         print(error)
@@ -88,7 +88,7 @@ def test_a_decoder_that_is_gone_is_reported(tmp_path: Path) -> None:
         writer.write(noise)
     writer.release()
     before = children()
-    loaders = frame_loaders(path, count_frames(path))
+    loaders = frame_loaders(path, count_frames(path)[0])
     first = next(loaders)()
     (decoder,) = children() - before
     os.kill(decoder, 9)
@@ -120,7 +120,7 @@ def test_what_a_decoder_says_of_a_damaged_video_is_not_on_the_console(
     data = bytearray(path.read_bytes())
     data[len(data) // 3 : len(data) // 3 + 1000] = bytes(1000)
     path.write_bytes(data)
-    for load in frame_loaders(path, count_frames(path)):
+    for load in frame_loaders(path, count_frames(path)[0]):
         with suppress(FileError):
             load()
     path.write_bytes(b"no video")

@@ -26,7 +26,12 @@ from lightpen_app.widgets.state_banner import State
 translate = QCoreApplication.translate
 
 # What the sentence of a verdict has in it whose cause is the intrinsics file.
-OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
+OF_CAMERA = {
+    "share.camera",
+    "share.rig",
+    "warning.camera-file-contradicted",
+    "warning.images-turned",
+}
 OF_FILES = (
     NextStep.CHECK_FILES,
     NextStep.CHECK_CAMERA,

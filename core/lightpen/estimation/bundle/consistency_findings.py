@@ -16,7 +16,7 @@ from lightpen.estimation.bundle.priors import Prior, Priors
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
+from lightpen.model.rig import Rig, of_camera
 
 VAGUE = 0.2  # of a value, U (k = 2): centres alone may give a negative diameter
 RELEASED = 10.0  # standard deviation of a released prior, times the deviation found
@@ -44,6 +44,8 @@ class Contradiction:
     camera: str  # name of the camera concerned; empty for a single camera
     of_rig: bool  # whether the rig file states it, not a camera file
     of_pen: bool = False  # whether the LED file states it
+    # Whether the file agrees with the images once they are turned by 180 degrees.
+    is_turned: bool = False
 
     @property
     def message(self) -> Message:
@@ -60,6 +62,9 @@ class Contradiction:
                 stated_u=self.stated_uncertainty,
                 unit=unit,
             )
+        if self.is_turned:
+            turned = message("warning.images-turned")
+            return of_camera(self.camera, turned) if self.camera else turned
         if not self.camera:
             return message(
                 "warning.camera-file-contradicted",
@@ -155,6 +160,11 @@ def contradictions_of(
     for f, released in inputs.numbers.items():
         name = rig.names[f] if f < rig.n_cameras and rig.names else ""
         of_file = _contradictions(fits[f], released)
+        is_camera = f < rig.n_cameras
+        if is_camera and _are_turned(
+            of_file, rig.cameras[f], bundle.state.rig.cameras[f]
+        ):
+            of_file = [replace(each, is_turned=True) for each in of_file]
         found += [replace(each, camera=name) for each in of_file] if name else of_file
     return tuple(sorted(found, key=lambda each: -each.deviations))
 
@@ -233,6 +243,20 @@ def _contradictions(fit: FileFit, released: tuple[int, ...]) -> list[Contradicti
             )
         )
     return found
+
+
+def _are_turned(found: list[Contradiction], stated: Camera, fitted: Camera) -> bool:
+    """Return whether a half turn of the images explains contradicted coordinates."""
+    file, images = stated.intrinsics[2:4], fitted.intrinsics[2:4]
+    turned = np.array(stated.image_size) - 1 - file
+    if np.any(np.abs(images - turned) > np.abs(images - file)):
+        return False
+    wanted = dict(zip((each.code for each in PRINCIPAL_POINT), turned, strict=True))
+    of_point = [each for each in found if each.what.code in wanted]
+    return bool(of_point) and all(
+        abs(wanted[each.what.code] - each.estimated) < each.estimated_uncertainty
+        for each in of_point
+    )
 
 
 def _without(prior: Prior, fit: FileFit, released: tuple[int, ...]) -> Prior:
