@@ -217,14 +217,14 @@ class Preparation:
             names = replace(names, ball_diameter=None)
         return replace(self, names=names, nominal_tip=None)
 
-    def with_last(self, last: Result) -> Self:
-        """Return a copy for the tip of a result, with its ball and nominal centre."""
-        tip, ball_diameter = last.names.tip, last.names.ball_diameter
-        names = replace(self.names, tip=tip, ball_diameter=ball_diameter)
-        nominal_tip = last.nominal_tip
+    def completed(self, last: Result) -> Self:
+        """Return a copy with ball and nominal centre of the last result, if unknown."""
+        names, nominal_tip = self.names, self.nominal_tip
+        if names.ball_diameter is None:
+            names = replace(names, ball_diameter=last.names.ball_diameter)
         of_file = None if self.pen_file is None else self.pen_file.pen.nominal_tip
-        if _same(nominal_tip, of_file):  # it is not the tip's own
-            nominal_tip = None
+        if nominal_tip is None and not _same(last.nominal_tip, of_file):
+            nominal_tip = last.nominal_tip  # it is the tip's own
         return replace(self, names=names, nominal_tip=nominal_tip)
 
     def with_listed(self, tip: ListedTip) -> Self:

@@ -136,11 +136,11 @@ class NextTipsControl(QObject):
 
     def _on_chosen(self, tip: NextTip) -> None:
         self._run.runner.ask(lambda workflow: workflow.abandon())
-        chosen = self._selection.preparation
-        if tip.last is not None:
-            chosen = chosen.with_last(tip.last)
+        now = self._selection.preparation
+        chosen = now.renamed(replace(now.names, pen=tip.pen, tip=tip.tip))
         if tip.listed is not None:
             chosen = chosen.with_listed(tip.listed)
-        names = replace(chosen.names, pen=tip.pen)
-        self._selection.set_preparation(replace(chosen, names=names))
+        if tip.last is not None:
+            chosen = chosen.completed(tip.last)
+        self._selection.set_preparation(chosen)
         self.chosen.emit()

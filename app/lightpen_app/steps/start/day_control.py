@@ -22,6 +22,7 @@ from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 REFRESH_MS = 500
+LONGEST_NAME = 16  # letters of a tip on the main button
 N_MISFITS = 10  # images by which the LEDs are judged
 
 
@@ -48,6 +49,7 @@ class DayControl(QObject):
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self.refresh_readiness)
         view.tip_chosen.connect(self._on_tip_chosen)
+        view.rows_changed.connect(self._on_rows_changed)
         view.tip_entered.connect(self._on_tip_entered)
         view.temperature_entered.connect(self._on_temperature_entered)
         view.step_requested.connect(self.step_requested)
@@ -66,9 +68,8 @@ class DayControl(QObject):
     def refresh(self) -> None:
         """Update tips and readiness."""
         now, statuses = self._selection.preparation, self._workbench.library.statuses
-        names = now.names
         self._view.set_tips(
-            tip_rows(now, statuses), (names.pen, names.tip), tip_details(now, statuses)
+            tip_rows(now, statuses), self._names(), tip_details(now, statuses)
         )
         self.refresh_readiness()
 
@@ -78,7 +79,7 @@ class DayControl(QObject):
         place = PARTED.join(map(shortened, (names.station, names.operator)))
         before, items = self._view.readiness(), self._items()
         now = self._selection.preparation
-        can_swing = not now.missing_inputs()
+        can_swing = not (now.missing_inputs() or self._why_not_swing())
         is_asked = now.asks_temperature or now.lacks_temperature
         self._view.set_question(now.assumptions.temperature_c, is_asked=is_asked)
         self._view.set_ready(place, items, can_swing=can_swing)
@@ -89,14 +90,15 @@ class DayControl(QObject):
         """Return the action of the main button: swing, or show the missing input."""
         amber = self._first_amber()
         if amber is None:
-            return MainAction(self.tr("Start swing"))
-        names = {
+            tip = shortened(self._selection.preparation.names.tip, LONGEST_NAME)
+            return MainAction(self.tr("Swing tip {0}").format(tip), self._why_not_swing())
+        steps = {
             "camera": self.tr("Check the camera"),
             "leds": self.tr("Check the LEDs"),
             "temperature": self.tr("Enter the temperature"),
             "verify": self.tr("Verify the tip"),
         }
-        return MainAction(names[amber.step])
+        return MainAction(steps[amber.step])
 
     def run_main_action(self) -> None:
         """Run the action of the main button."""
@@ -105,6 +107,20 @@ class DayControl(QObject):
             self._view.take_temperature()
         else:
             self.step_requested.emit("swing" if amber is None else amber.step)
+
+    def _why_not_swing(self) -> str:
+        """Return that the chosen tip is not among those that are searched."""
+        names, text, rows = self._names(), self._view.search(), self._view.rows()
+        if not text or any((row.pen, row.tip) == names for row in rows):
+            return ""
+        if rows:
+            return self.tr("Choose a tip in the table, or clear the search.")
+        words = self.tr("No tip matches {0}. Press Enter, or clear the search.")
+        return words.format(shortened(text))
+
+    def _names(self) -> tuple[str, str]:
+        names = self._selection.preparation.names
+        return names.pen, names.tip
 
     def _first_amber(self) -> ReadinessItem | None:
         return next((item for item in self._items() if item.is_amber), None)
@@ -135,6 +151,10 @@ class DayControl(QObject):
     def _on_temperature_entered(self, temperature_c: float | None) -> None:
         now = self._selection.preparation
         self._selection.set_preparation(now.with_temperature(temperature_c))
+
+    def _on_rows_changed(self) -> None:
+        self.refresh_readiness()
+        self.changed.emit()
 
     def _on_tip_chosen(self, pen: str, tip: str) -> None:
         now = self._selection.preparation

@@ -71,6 +71,7 @@ class DayView(Translated, QWidget):
 
     tip_chosen = Signal(str, str)  # pen and tip of the row that was chosen
     tip_entered = Signal(str)  # text of the field
+    rows_changed = Signal()  # the user narrowed the table or widened it
     # Temperature of the pen, degrees Celsius, or None if not measured.
     temperature_entered = Signal(object)
     step_requested = Signal(str)  # where something is put right
@@ -121,9 +122,9 @@ class DayView(Translated, QWidget):
         self._ready.step_requested.connect(self._on_step_requested)
         self._temperature.entered.connect(self._on_answered)
         self._answer.clicked.connect(self._on_answered)
-        self._search.textChanged.connect(self._fill)
+        self._search.textChanged.connect(self._on_narrowed)
         self._search.entered.connect(self.tip_entered)
-        self._which.activated.connect(self._fill)
+        self._which.activated.connect(self._on_narrowed)
         self._table.selectionModel().currentRowChanged.connect(self._on_row_changed)
         self._swing.clicked.connect(self.swing_requested)
         self._setup.clicked.connect(self.setup_requested)
@@ -148,6 +149,10 @@ class DayView(Translated, QWidget):
     def rows(self) -> tuple[TipRow, ...]:
         """Return the rows that are shown."""
         return self._shown
+
+    def search(self) -> str:
+        """Return the text that the rows match."""
+        return self._search.text().strip()
 
     def set_narrow(self, narrow: bool) -> None:
         """Put the last result below the table where there is little width."""
@@ -181,7 +186,7 @@ class DayView(Translated, QWidget):
 
     def _fill(self) -> None:
         """Show the rows that match what is typed."""
-        text, is_all = self._search.text().strip(), self._which.currentIndex() == 0
+        text, is_all = self.search(), self._which.currentIndex() == 0
         self._shown = tuple(
             row
             for row in self._rows
@@ -197,6 +202,10 @@ class DayView(Translated, QWidget):
                 self._table.selectRow(index)
         selection.blockSignals(blocked)
         self._table.viewport().update()
+
+    def _on_narrowed(self) -> None:
+        self._fill()
+        self.rows_changed.emit()
 
     def _cells(self, row: TipRow) -> list[QStandardItem]:
         texts = (row.tip, row.pen, row.due.text, row.uncertainty, row.age)

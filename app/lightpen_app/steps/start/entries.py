@@ -20,7 +20,6 @@ class EntryPresenter(QObject):
     """Fills the fields from the selection and applies entries."""
 
     edited = Signal()  # something is being typed; it may be unfinished
-    tip_named = Signal()  # another tip was named
 
     def __init__(
         self,
@@ -85,8 +84,6 @@ class EntryPresenter(QObject):
         if is_other and listed is not None and is_bare:
             renamed = renamed.with_listed(listed)
         self._selection.set_preparation(renamed)
-        if is_other:
-            self.tip_named.emit()
 
     def _on_item_chosen(self, kind: ItemKind, name: str) -> None:
         """Apply a selected pen, tip or cone; a tip with its properties."""
@@ -95,7 +92,6 @@ class EntryPresenter(QObject):
         tip = self._library.tip(name)
         if kind is ItemKind.TIP and tip is not None:
             self._selection.set_preparation(now.with_listed(tip))
-            self.tip_named.emit()
         elif kind is ItemKind.PEN:
             names = replace(now.names, pen=name)
             self._selection.set_preparation(replace(now, names=names))
@@ -108,7 +104,6 @@ class EntryPresenter(QObject):
         self._take_names()
         now = self._selection.preparation
         self._selection.set_preparation(now.renamed(replace(now.names, tip="")))
-        self.tip_named.emit()
 
     def _on_station_changed(self, name: str) -> None:
         """Bring back a known station; a new one takes over the present choices."""

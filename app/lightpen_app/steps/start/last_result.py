@@ -48,10 +48,6 @@ class LastResultPresenter(QObject):
         """Read the current result."""
         self._look_up(lambda result: None)
 
-    def look_up_tip(self) -> None:
-        """Read the current result; enter ball and nominal centre of a new tip."""
-        self._look_up(self._fill_in)
-
     def show_trend(self) -> None:
         """Show the trend of the tip if there is room."""
         pen, tip, is_simulated = _key(self._selection.preparation)
@@ -84,10 +80,9 @@ class LastResultPresenter(QObject):
         )
 
     def _fill_in(self, result: Result | None) -> None:
-        now = self._selection.preparation
-        is_bare = now.names.ball_diameter is None and now.nominal_tip is None
-        if is_bare and result is not None:
-            self._selection.set_preparation(now.with_last(result))
+        if result is not None:
+            completed = self._selection.preparation.completed(result)
+            self._selection.set_preparation(completed)
 
     def _on_failed(self, sentence: str) -> None:
         self._panel.set_value(LastResult(fault=sentence))
@@ -95,7 +90,7 @@ class LastResultPresenter(QObject):
     def _on_selected(self, before: Preparation) -> None:
         self.show_status()
         if _key(self._selection.preparation) != _key(before):
-            self.look_up()
+            self._look_up(self._fill_in)
 
     def show_status(self) -> None:
         """Mark the selected tip by its status."""

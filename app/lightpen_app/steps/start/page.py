@@ -88,7 +88,6 @@ class StartPage(ResponsiveLayout, Page):
         self._control.changed.connect(self.changed)
         self._control.step_requested.connect(self.step_requested)
         self._entries.edited.connect(self._refresh)
-        self._entries.tip_named.connect(self._last.look_up_tip)
         self._unfinished.step_requested.connect(self.step_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
         workbench.folder_watch.counted.connect(setup.folder.set_others)
@@ -126,7 +125,8 @@ class StartPage(ResponsiveLayout, Page):
         why_not = self._entries.why_not_on()
         if not self.is_day:
             return MainAction(self.tr("Continue to the camera"), why_not)
-        return MainAction(self._control.main_action().text, why_not)
+        action = self._control.main_action()
+        return MainAction(action.text, why_not or action.why_not)
 
     @override
     def run_main_action(self) -> None:

@@ -401,6 +401,21 @@ def test_a_known_tip_brings_its_ball_and_nominal_centre(
     assert now.nominal_tip.tolist() == [-1.3, -90.4, -23.9]
 
 
+def test_a_tip_has_its_ball_again_after_another_was_chosen_from_the_list(
+    start: Opened, workbench: Workbench, qtbot: QtBot
+) -> None:
+    accepted(workbench, timedelta(3), tip="T-99", ball=5.0)
+    start.type_into("Probe tip", "T-98")
+    view = start.page.findChild(DayView)
+    assert view is not None
+    pen = workbench.selection.preparation.names.pen
+
+    view.tip_chosen.emit(pen, "T-99")
+
+    qtbot.waitUntil(lambda: workbench.selection.preparation.names.ball_diameter == 5.0)
+    assert workbench.selection.preparation.names.tip == "T-99"
+
+
 def test_a_ball_that_is_typed_with_another_tip_stays(
     start: Opened, workbench: Workbench
 ) -> None:
