@@ -573,8 +573,8 @@
 <context>
     <name>DayControl</name>
     <message>
-        <source>Start swing</source>
-        <translation>开始摆动</translation>
+        <source>Swing tip {0}</source>
+        <translation>摆动测头 {0}</translation>
     </message>
     <message>
         <source>Check the camera</source>
@@ -591,6 +591,14 @@
     <message>
         <source>Verify the tip</source>
         <translation>验证测头</translation>
+    </message>
+    <message>
+        <source>Choose a tip in the table, or clear the search.</source>
+        <translation>请在表中选择测头，或清除搜索内容。</translation>
+    </message>
+    <message>
+        <source>No tip matches {0}. Press Enter, or clear the search.</source>
+        <translation>没有与 {0} 匹配的测头。请按回车键，或清除搜索内容。</translation>
     </message>
 </context>
 <context>
