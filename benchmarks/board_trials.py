@@ -6,9 +6,8 @@ draws sets of views with everything in usual sizes at random: noise, points of t
 board, residual field of the lens, smooth errors of single views; some are rendered as
 images and detected. Each set is calibrated as `lightpen intrinsics` does. It prints how
 often 95 % intervals contain the truth, and the size of differences between random
-halves of the views over their standard uncertainty: by U as it is stated (which
-contains what both halves share), and by its share that halves draw anew; and what was
-said of these sets, in which nothing is wrong.
+halves of the views over the share of their standard uncertainty that halves draw anew;
+and what was said of these sets, in which nothing is wrong.
 """
 
 import argparse
@@ -28,10 +27,9 @@ from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.distortion import FEW, fit_camera
-from lightpen.intrinsics.effects import smooth_functions
+from lightpen.intrinsics.effects import MixedFit, fit_effects
 from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.start import BoardPoses
-from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
@@ -70,15 +68,10 @@ TOLERANCES = BoardTolerances()
 
 
 class Trial(NamedTuple):
-    """Errors of one set in standard uncertainties, (9,) each, and its messages.
-
-    `single` are the scores of single views over what they may be, rms over the views.
-    """
+    """Errors of one set in standard uncertainties, (9,) each, and its messages."""
 
     errors: FloatArray
     halves: FloatArray
-    repeated: FloatArray
-    single: FloatArray
     remarks: tuple[str, ...]
 
 
@@ -129,10 +122,27 @@ def observe_points(
     points = true @ np.swapaxes(poses.rotations, 1, 2) + poses.translations[:, None]
     pixels = camera.project(points)
     pixels += field.at(pixels)
-    functions = smooth_functions(board)
+    functions = _smooth_functions(board)
     drawn = rng.standard_normal((len(pixels), functions.shape[1], 2))
     pixels += rng.uniform(*SMOOTH) * (functions @ drawn)
     return pixels + rng.normal(0, rng.uniform(*NOISE), pixels.shape)
+
+
+def _smooth_functions(board: Board) -> FloatArray:
+    """Return functions of second and third order over the board, (N, 7).
+
+    Orthogonal to each other and to functions of lower order, of mean square 1.
+    """
+    x, y = board.points[:, 0], board.points[:, 1]
+    u, v = x / np.abs(x).max(), y / np.abs(y).max()
+    powers = [(i - j, j) for i in range(4) for j in range(i + 1)]
+    columns = np.stack([u**i * v**j for i, j in powers], axis=-1)
+    orthogonal, triangle = np.linalg.qr(columns)
+    independent = np.abs(np.diag(triangle)) > 1e-9 * np.sqrt(len(x))
+    independent[:3] = False  # a place and a tilt are the pose's
+    functions = orthogonal[:, independent] * np.sqrt(len(x))
+    functions.flags.writeable = False
+    return np.asarray(functions)
 
 
 def render_points(
@@ -170,23 +180,17 @@ def run_trial(seed: int, *, rendered: bool, size: str = "400x300") -> Trial | st
         return found.choice.message.code
     adjustment = found.adjustment
     errors = _intrinsics(adjustment) - camera.intrinsics
-    change = _change(found, rng)
-    stated, repeated = (np.full(len(errors), np.nan),) * 2 if change is None else change
     return Trial(
         errors / _sigmas(adjustment.covariance),
-        stated,
-        repeated,
-        _single(found),
+        _halves(found, rng),
         tuple(remark.code for remark in found.remarks),
     )
 
 
-def _change(
-    found: CameraCalibration, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray] | None:
-    """Return the difference of two halves by U and by its share that is drawn anew.
+def _halves(found: CameraCalibration, rng: np.random.Generator) -> FloatArray:
+    """Return the difference of two halves by its uncertainty, (9,).
 
-    None where half the views leave corners open.
+    NaN where half the views leave corners open.
     """
     order = rng.permutation(found.views.n_views)
     is_first = np.isin(np.arange(len(order)), order[: len(order) // 2])
@@ -196,22 +200,10 @@ def _change(
             for which in (is_first, ~is_first)
         )
     except CalibrationError:
-        return None
+        return np.full(4 + FEW, np.nan)
     change = _intrinsics(one.adjustment) - _intrinsics(other.adjustment)
-    return (
-        change
-        / np.hypot(*(_sigmas(each.adjustment.covariance) for each in (one, other))),
-        change / np.hypot(*(_sigmas(each.repeatability) for each in (one, other))),
-    )
-
-
-def _single(found: CameraCalibration) -> FloatArray:
-    """Return what each view would change, over its standard uncertainty, rms."""
-    scores, n = found.effects.scores, found.views.n_views
-    at = found.adjustment.of_intrinsics(0)
-    changes = [scores.change(one) for one in np.eye(n)]
-    z = [score[at] ** 2 / np.diag(known)[at] for score, known in changes]
-    return np.asarray(np.sqrt(np.mean(z, axis=0)))
+    sigmas = np.hypot(*(_sigmas(each.repeatability) for each in (one, other)))
+    return np.asarray(change / sigmas)
 
 
 def _fit(views: Views, near: BoardFit) -> MixedFit:
@@ -266,10 +258,9 @@ def _print(words: str, trials: list[Trial | str]) -> None:
     z = np.array([trial.errors for trial in good])
     covered = 100 * np.mean(np.abs(z) < NORMAL_95, axis=0)
     print(f"  errors: in 95 % intervals {np.round(covered, 1)} %")
-    for name in ("halves", "repeated", "single"):
-        z = np.array([getattr(trial, name) for trial in good])
-        each, together = np.sqrt(np.nanmean(z**2, axis=0)), np.sqrt(np.nanmean(z**2))
-        print(f"  {name}: z {np.round(each, 2)}, together {together:.2f}")
+    z = np.array([trial.halves for trial in good])
+    each, together = np.sqrt(np.nanmean(z**2, axis=0)), np.sqrt(np.nanmean(z**2))
+    print(f"  halves: z {np.round(each, 2)}, together {together:.2f}")
     remarks = Counter(remark for trial in good for remark in trial.remarks)
     print(f"  refused or of another lens model {dict(refused)}; said {dict(remarks)}")
 

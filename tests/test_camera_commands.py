@@ -47,21 +47,6 @@ def run(*words: str | Path) -> int:
 
 
 @pytest.mark.slow
-def test_a_file_of_kalibr_holds_the_lens_that_was_calibrated(
-    pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "camera.yaml"
-    words = ("intrinsics", pairs / "left", "--board", BOARD, "--out", file)
-    status = run(*words, "--form", "kalibr")
-
-    assert status == 0
-    assert "without k3" in capsys.readouterr().out
-    found = read_camera(file)
-    assert found.covariance is not None
-    assert found.fx == pytest.approx(CAMERA.fx, abs=4 * found.covariance[0, 0] ** 0.5)
-
-
-@pytest.mark.slow
 def test_a_camera_file_is_made_of_a_folder_of_images(
     pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

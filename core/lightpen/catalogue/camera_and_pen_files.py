@@ -16,7 +16,6 @@ MESSAGES = {
     "camera-file.not-pinhole": "{name} describes a camera of the model {model}; the model pinhole is needed. Calibrate the camera again with pinhole-radtan.",
     "camera-file.radial-count": "RadialDistortion in {name} has {counted} where 2 or 3 are needed. Correct it, or export the file again.",
     "camera-file.distortion-model": "{name} has the distortion model {model}, which is not supported. Calibrate the camera again with plumb_bob (radtan), rational_polynomial or equidistant.",
-    "camera-file.kalibr-coefficients": "{name} cannot be written in the form of Kalibr: its model radtan has only k1 k2 p1 p2, and this camera has more coefficients. Write it in the form of OpenCV.",
     "camera-file.fisheye-count": "{name} has {counted}; the fisheye model needs 4 (k1 k2 k3 k4). Export the file again.",
     "camera-file.no-size": "{name} does not state the image size. Add the lines image_width and image_height, in pixels.",
     "camera-file.matrix-form": "The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.",

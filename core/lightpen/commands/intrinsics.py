@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import above_zero, add_json, number_from
+from lightpen.commands.arguments import add_json, number_from
 from lightpen.commands.console import (
     are_same,
     images_at,
@@ -19,7 +19,7 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.errors import UsageError
-from lightpen.formats.camera_file_writing import CameraForm, write_camera
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
 from lightpen.formats.json_records import plain
 from lightpen.formats.pairing import pair_images
@@ -63,13 +63,6 @@ def add_intrinsics(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--serial", default="", metavar="TEXT", help="serial number of the camera"
     )
-    parser.add_argument(
-        "--form",
-        choices=[form.value for form in CameraForm],
-        default=CameraForm.OPENCV.value,
-        help="layout of the intrinsics file (opencv); kalibr holds no k3, so that the "
-        "lens model is then one without",
-    )
     _add_temperature(parser)
     parser.add_argument(
         "--leave-out",
@@ -107,12 +100,6 @@ def add_extrinsics(parser: argparse.ArgumentParser) -> None:
         help="names of the cameras (left right)",
     )
     parser.add_argument(
-        "--interval",
-        type=above_zero,
-        metavar="MS",
-        help="time between two views of a sequence, to state the camera lag in ms",
-    )
-    parser.add_argument(
         "--out",
         type=Path,
         default=Path("rig.json"),
@@ -130,9 +117,8 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="BOARD",
         help="such as chessboard:11x8:20 (inner corners, side of a square in mm), "
-        "charuco:12x9:20:15:DICT_5X5_100 (squares, side, marker), charuco-legacy:..., "
-        "markers:5x7:30:6:DICT_6X6_250 (side, gap), circles:9x7:20:10 (distance, "
-        "diameter), asymmetric-circles:4x11:20:10",
+        "charuco:12x9:20:15:DICT_5X5_100 (squares, side, marker), circles:9x7:20:10 "
+        "(distance, diameter), asymmetric-circles:4x11:20:10",
     )
     parser.add_argument(
         "--flatness",
@@ -142,36 +128,19 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         help=f"standard uncertainty of the board flatness ({USUAL.flatness:g})",
     )
     parser.add_argument(
-        "--squareness",
-        type=number_from(1e-9, 0.1, "share", "of 1"),
-        default=USUAL.squareness,
-        metavar="SHARE",
-        help="relative standard uncertainty of the board's aspect ratio "
-        f"({USUAL.squareness:g})",
-    )
-    parser.add_argument(
         "--scale-sigma",
         type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.scale,
         metavar="SHARE",
         help=f"relative standard uncertainty of the board's scale ({USUAL.scale:g})",
     )
-    check = parser.add_mutually_exclusive_group()
-    check.add_argument(
+    parser.add_argument(
         "--measured",
         type=float,
         nargs=3,
         metavar=("STATED", "MEASURED", "U"),
         help="a length of the board as stated by BOARD, as measured, and U (k = 2) of "
         "the measurement, mm: scales the board and replaces --scale-sigma",
-    )
-    check.add_argument(
-        "--pixel-pitch",
-        type=float,
-        nargs=2,
-        metavar=("PITCH", "U"),
-        help="pixel pitch of a screen that shows the board, and its U (k = 2), mm; "
-        "BOARD then states lengths in pixels",
     )
 
 
@@ -187,14 +156,10 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
 def _board(options: argparse.Namespace) -> tuple[Board, BoardTolerances]:
     """Return the board in mm, with its measured scale if any, and its tolerances."""
     board, scale = parse_board(options.board), options.scale_sigma
-    check = None
     if options.measured:
         check = ScaleCheck(*options.measured)
-    elif options.pixel_pitch:
-        check = ScaleCheck.of_pixels(*options.pixel_pitch)
-    if check is not None:
         board, scale = check.scaled(board), check.sigma
-    return board, BoardTolerances(options.flatness, options.squareness, scale)
+    return board, BoardTolerances(flatness=options.flatness, scale=scale)
 
 
 @printing
@@ -208,18 +173,13 @@ def _intrinsics(options: argparse.Namespace) -> None:
         views = observed.views
         _require_known(options.leave_out, source.names)
         kept = ~np.isin(views.names, options.leave_out)
-        form = CameraForm(options.form)
         calibration = calibrate_camera(
-            views.chosen(kept),
-            tolerances,
-            local_now().date(),
-            _part(report, 0.7, 1.0),
-            has_k3=form is not CameraForm.KALIBR,
+            views.chosen(kept), tolerances, local_now().date(), _part(report, 0.7, 1.0)
         )
     camera = replace(
         calibration.camera, serial=options.serial, temperature_c=options.temperature
     )
-    write_camera(camera, options.out, form)
+    write_camera(camera, options.out)
     print(shown(intrinsics_text(calibration, observed)))
     print(shown(f"\nThe intrinsics file is {options.out}."))
     if options.json is not None:
@@ -253,9 +213,7 @@ def _extrinsics(options: argparse.Namespace) -> None:
                 seen_width=size[0],
                 seen_height=size[1],
             )
-    calibration = calibrate_pair(
-        observed.views, tolerances, names, cameras, options.interval
-    )
+    calibration = calibrate_pair(observed.views, tolerances, names, cameras)
     written = list(given)
     if not written:
         for name, camera in zip(names, calibration.rig.cameras, strict=True):

@@ -26,7 +26,6 @@ from lightpen.intrinsics.distortion import (
     FISHEYE,
     FOLDING,
     MANY,
-    N_FOLDS,
     PULLS,
     WORTH,
     Choice,
@@ -37,6 +36,7 @@ from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.model.camera import Camera
 from lightpen.model.rig import rig_of
 
+N_FOLDS = 5
 N_STEPS, N_FOLD_STEPS = 20, 6
 OUTLYING = 4.0  # times the usual residual of an image: it tests no lens
 

@@ -200,7 +200,7 @@ def _remarks_on_camera(discovery: Discovery) -> list[Message]:
     choice = discovery.lens_choice
     if choice is not None:
         drawn = message("discover.drawn-in", coefficients=choice.drawn_coefficients)
-        return [drawn] if choice.draws_in else []
+        return [drawn] if choice.pull is not None else []
     stated = discovery.calibration.bundle.unknowns.start.rig.cameras[0]
     sigma = USUAL.focal_length * stated.fx
     if stated.covariance is not None:

@@ -79,7 +79,6 @@ def adjust_board(
     start: BoardState,
     tolerances: BoardTolerances,
     stated: tuple[FloatArray | None, ...] = (),
-    converged: float = CONVERGED,
 ) -> BoardFit:
     """Fit everything to the points of all views.
 
@@ -91,14 +90,12 @@ def adjust_board(
         Start values; intrinsics as in the files where ``stated`` is set.
     stated : tuple of (4 + n, 4 + n) array or None
         Information of the intrinsics of each camera beside the views; none where None.
-    converged : float
-        Share of the sum of squares that the last step may gain.
     """
     prior = _prior(start, tolerances, stated)
     origin, state = start, start
     sigma = max(_rms(board_residuals(views, state)), FINEST)
     for _ in range(NOISE_ROUNDS):
-        state, system = _settled(views, state, origin, prior, sigma, converged)
+        state, system = _settled(views, state, origin, prior, sigma)
         information, scores = _eliminated(system)
         both = information.sum(axis=0) / sigma**2 + prior
         covariance = _inverse(both)
@@ -122,12 +119,16 @@ def adjust_board(
     )
 
 
-def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
-    """Return the residuals (V, C, N, 2), px, of views whose poses alone are fitted."""
+def fit_board_poses(views: Views, state: BoardState) -> BoardFit:
+    """Return the fit of the poses alone; its covariance is as of the held numbers."""
     n = sum(len(camera.intrinsics) for camera in state.cameras)
     held = np.diag(np.full(n + N_POSE * (len(state.cameras) - 1) + N_SHAPE, 1e20))
-    _, system = _settled(views, state, state, held, 1.0, CONVERGED)
-    return system.residuals
+    found, system = _settled(views, state, state, held, 1.0)
+    information, scores = _eliminated(system)
+    rms = _rms(system.residuals)
+    return BoardFit(
+        views.board, found, system.residuals, rms, information, scores, held, 0 * held
+    )
 
 
 def view_information(
@@ -147,12 +148,7 @@ def view_information(
 
 
 def _settled(
-    views: Views,
-    start: BoardState,
-    origin: BoardState,
-    prior: FloatArray,
-    sigma: float,
-    converged: float,
+    views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
 ) -> tuple[BoardState, _System]:
     state, damping = start, FIRST_DAMPING
     residuals = board_residuals(views, state)
@@ -173,7 +169,7 @@ def _settled(
         gained = cost - reached
         state, cost, damping = moved, reached, max(damping / 10, 1e-12)
         system = _system(views, state, there)
-        if gained <= converged * (cost + 1e-12):
+        if gained <= CONVERGED * (cost + 1e-12):
             return state, system
     raise CalibrationError("intrinsics.not-settled", n_steps=MAX_STEPS)
 

@@ -6,10 +6,6 @@ A board is described as ``KIND:COLUMNSxROWS:...`` with lengths in mm:
 ``chessboard:11x8:20``                           inner corners, side of a square
 ``charuco:12x9:20:15:DICT_5X5_100``              squares, their side, side of a marker,
                                                  dictionary of the markers
-``charuco-legacy:...``                           the same, as OpenCV laid it out until
-                                                 4.6
-``markers:5x7:30:6:DICT_6X6_250``                markers, their side, the gap between
-                                                 them, dictionary
 ``circles:9x7:20:10``                            circles, their distance, diameter
 ``asymmetric-circles:4x11:20:10``                circles; each second row is set off by
                                                  the distance, and twice that apart
@@ -32,11 +28,9 @@ from lightpen.errors import UsageError
 
 MIN_SIDE, MAX_SIDE = 2, 100  # points or squares along a side
 MAX_LENGTH = 10_000.0  # mm
-CORNERS = 4  # of a marker
 FORMS = (
-    "chessboard:11x8:20, charuco:12x9:20:15:DICT_5X5_100, "
-    "charuco-legacy:12x9:20:15:DICT_5X5_100, markers:5x7:30:6:DICT_6X6_250, "
-    "circles:9x7:20:10, asymmetric-circles:4x11:20:10"
+    "chessboard:11x8:20, charuco:12x9:20:15:DICT_5X5_100, circles:9x7:20:10, "
+    "asymmetric-circles:4x11:20:10"
 )
 
 
@@ -45,8 +39,6 @@ class BoardKind(StrEnum):
 
     CHESSBOARD = "chessboard"
     CHARUCO = "charuco"
-    LEGACY_CHARUCO = "charuco-legacy"
-    MARKERS = "markers"
     CIRCLES = "circles"
     ASYMMETRIC_CIRCLES = "asymmetric-circles"
 
@@ -58,7 +50,7 @@ class BoardKind(StrEnum):
     @property
     def has_markers(self) -> bool:
         """Whether its points are numbered."""
-        return self in (BoardKind.CHARUCO, BoardKind.LEGACY_CHARUCO, BoardKind.MARKERS)
+        return self is BoardKind.CHARUCO
 
 
 @dataclass(frozen=True)
@@ -66,14 +58,13 @@ class Board:
     """A flat board with known points."""
 
     kind: BoardKind
-    # `columns`, `rows`: inner corners of a chessboard, else squares, markers, circles.
+    # `columns`, `rows`: inner corners of a chessboard, else squares, circles.
     columns: int
     rows: int
-    # Side of a square, side of a marker of a board of markers alone, or distance of the
-    # circles (half of that within a row, if they are asymmetric), mm
+    # Side of a square, or distance of the circles (half of that within a row, if they
+    # are asymmetric), mm
     pitch: float
-    # Side of a marker of a ChArUco board, gap between markers, or diameter of the
-    # circles, mm; 0 of a chessboard.
+    # Side of a marker, or diameter of the circles, mm; 0 of a chessboard.
     detail: float = 0.0
     dictionary: str = ""  # marker dictionary, by its OpenCV name; empty without markers
 
@@ -120,11 +111,6 @@ class Board:
     @property
     def _grid(self) -> FloatArray:
         """Points from the first one on, (N, 2), mm, in the order they are found in."""
-        if self.kind is BoardKind.MARKERS:
-            step = self.pitch + self.detail
-            square = self.pitch * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-            corners = step * _lattice(self.columns, self.rows)[:, None] + square
-            return np.asarray(corners.reshape(-1, 2))
         if self.kind is BoardKind.ASYMMETRIC_CIRCLES:
             lattice = _lattice(self.columns, self.rows)
             lattice[:, 0] = 2 * lattice[:, 0] + lattice[:, 1] % 2
@@ -182,11 +168,8 @@ def _check(board: Board, text: str) -> None:
             least=MIN_SIDE,
             most=MAX_SIDE,
         )
-    is_smaller = (
-        board.kind is BoardKind.MARKERS
-        or board.detail
-        < (2**0.5 if board.kind is BoardKind.ASYMMETRIC_CIRCLES else 1) * board.pitch
-    )
+    nearest = 2**0.5 if board.kind is BoardKind.ASYMMETRIC_CIRCLES else 1.0
+    is_smaller = board.detail < nearest * board.pitch
     has_detail = board.detail > 0 or board.kind is BoardKind.CHESSBOARD
     if not (0 < board.pitch <= MAX_LENGTH and has_detail and is_smaller):
         raise UsageError("board.lengths", text=text)
@@ -196,21 +179,19 @@ def _check(board: Board, text: str) -> None:
         cv2.aruco, board.dictionary
     ):
         raise UsageError("board.dictionary", text=text)
-    known = len(marker_dictionary(board).bytesList)
-    if n_markers(board) > known:
+    known, needed = len(marker_dictionary(board).bytesList), _n_markers(board)
+    if needed > known:
         raise UsageError(
             "board.markers",
             text=text,
-            needed=n_markers(board),
+            needed=needed,
             dictionary=board.dictionary,
             known=known,
         )
 
 
-def n_markers(board: Board) -> int:
-    """Return the number of markers on a board."""
-    squares = board.columns * board.rows
-    return squares if board.kind is BoardKind.MARKERS else squares // 2
+def _n_markers(board: Board) -> int:
+    return board.columns * board.rows // 2
 
 
 def _no_board(text: str) -> UsageError:

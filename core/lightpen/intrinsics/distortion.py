@@ -14,17 +14,12 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.formats.camera_checks import folds
-from lightpen.intrinsics.adjustment import (
-    CONVERGED,
-    FINEST,
-    adjust_board,
-    fit_board_poses,
-)
+from lightpen.intrinsics.adjustment import FINEST, adjust_board
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen.intrinsics.effects import held_out_errors
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.uncertainty_map import apart_in_image
-from lightpen.intrinsics.unevenness import fit_unevenness
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
@@ -33,13 +28,10 @@ FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
 FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
 PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
-NO_K3 = 1e-12  # the pull of a model without k3
 USUAL_SIZE = 0.5  # of a coefficient that is drawn towards 0, rms
-N_FOLDS = 5
 WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
+LARGE = 10.0  # of a coefficient, if the views do not determine it
 ALIKE = 1.5  # times the held-out error: another model that is near to the views
-ROUGHLY = 1e-5  # of the sum of squares; open coefficients would drift on for long
-EVEN = np.zeros(3)  # mm: all points lie where the board has them
 SIGMAS = 2.0  # of the gain of all views
 MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
@@ -62,8 +54,6 @@ class Choice:
     def message(self) -> Message:
         """The reason as text."""
         own = self.held_out[self.n_coefficients]
-        if self.pull == NO_K3:
-            return message("intrinsics.four", held_out=own)
         others = tuple(
             _other_model(n, rms)
             for n, rms in self.held_out.items()
@@ -78,11 +68,6 @@ class Choice:
         given = self.pull
         return given, *(pull for pull in pulls if given is None or pull < given)
 
-    @property
-    def draws_in(self) -> bool:
-        """Whether the corners of the image are undetermined."""
-        return self.pull is not None and self.pull != NO_K3
-
     def with_shrinkage(self, covariance: FloatArray, first: int = 0) -> FloatArray:
         """Return a covariance of the intrinsics with what the pull may take away.
 
@@ -96,7 +81,7 @@ class Choice:
         first : int
             Index of the intrinsics in it.
         """
-        if self.pull is None or not self.draws_in:
+        if self.pull is None:
             return covariance
         folding = first + 4 + np.array(FOLDING[self.n_coefficients])
         moved = covariance[:, folding] / self.pull**2
@@ -106,7 +91,7 @@ class Choice:
     @property
     def remark(self) -> Message | None:
         """Message if the corners of the image are undetermined."""
-        if not self.draws_in:
+        if self.pull is None:
             return None
         return message("intrinsics.drawn-in", coefficients=self.drawn_coefficients)
 
@@ -160,47 +145,37 @@ def choose_distortion(
     tolerances: BoardTolerances,
     fitted: BoardFit,
     report: Callable[[float], None],
-    *,
-    has_k3: bool = True,
-) -> tuple[Choice, BoardFit, FloatArray]:
-    """Return the lens model, its fit, and the cross-validation errors.
+) -> tuple[Choice, BoardFit]:
+    """Return the lens model and its fit.
 
-    A model with another number than 5 coefficients must be better. Without ``has_k3``,
-    the lens models are a fisheye and the one with 4 coefficients, k3 being 0.
+    A model with another number than 5 coefficients must be better.
     """
     first = _Drawn(fitted, None)
-    others: list[Callable[[], _Drawn | None]]
-    if not has_k3:
-        plain = convert_lens(first.camera, FEW) or first.camera
-        others = [lambda: _converted(views, tolerances, first.fitted, FISHEYE)]
-        if len(plain.distortion) == FEW:
-            first = _Drawn(fit_camera(views, tolerances, plain, NO_K3), NO_K3)
-    elif first.camera.lens is LensModel.BROWN:
-        if folds(first.camera):
-            first = _unfolded(views, tolerances, first.camera) or first
-        others = [lambda: _richer(views, tolerances, first.camera)]
-        if is_wide(first.camera, views.pixels[:, 0]):
-            others.append(lambda: _converted(views, tolerances, first.fitted, FISHEYE))
-    else:
-        others = [
-            lambda: _converted(views, tolerances, first.fitted, FEW),
-            lambda: _rational(views, tolerances, first.fitted),
-        ]
-    best, errors = first, _held_out(views, tolerances, first)
+    is_plain = first.camera.lens is LensModel.BROWN
+    if is_plain and folds(first.camera):
+        first = _unfolded(views, tolerances, first.camera) or first
+    best, errors = first, held_out_errors(views, first.fitted)
     held_out = {best.n_coefficients: rms_together(errors, views)}
     tried = {best.n_coefficients: best.camera}
-    report(0.5)
-    for other in others:
-        with suppress(CalibrationError):  # part of the views does not determine so many
-            trial = other()
+    is_off = is_wide(first.camera, views.pixels[:, 0])
+    others = []
+    if is_plain and (is_off or _promises_more(views, first.fitted, errors)):
+        others.append(MANY)
+    if not is_plain:
+        others += [FEW, MANY]
+    elif is_off:
+        others.append(FISHEYE)
+    for done, n in enumerate(others, 1):
+        report(0.4 + 0.4 * done / len(others))
+        with suppress(CalibrationError):  # the views do not determine so many
+            trial = _trial(views, tolerances, first.fitted, n)
             if trial is None:
                 continue
-            trial_errors = _held_out(views, tolerances, trial)
+            trial_errors = held_out_errors(views, trial.fitted)
             rms = rms_together(trial_errors, views)
-            held_out[trial.n_coefficients] = rms
-            tried[trial.n_coefficients] = trial.camera
+            held_out[n], tried[n] = rms, trial.camera
             before = held_out[best.n_coefficients]
-            if trial.n_coefficients == FEW:  # the plain lens, unless contradicted
+            if n == FEW:  # the plain lens, unless contradicted
                 is_better = not is_significantly_less(before, rms, errors, trial_errors)
             else:
                 is_better = is_significantly_less(rms, before, trial_errors, errors)
@@ -213,7 +188,24 @@ def choose_distortion(
     if another in tried and held_out[another] < ALIKE * held_out[own]:
         seen = views.pixels[views.seen]
         apart = apart_in_image(best.camera, tried[another], seen)
-    return Choice(own, held_out, best.pull, apart), best.fitted, errors
+    return Choice(own, held_out, best.pull, apart), best.fitted
+
+
+def _promises_more(views: Views, fitted: BoardFit, errors: FloatArray) -> bool:
+    """Return whether 3 more coefficients predict views better, to the first order."""
+    camera = fitted.state.cameras[0]
+    distortion = np.append(camera.distortion, np.zeros(MANY - FEW))
+    cameras = (replace(camera, distortion=distortion),)
+    n = len(fitted.prior)
+    at = np.r_[0 : 4 + FEW, 4 + MANY : n + MANY - FEW]
+    prior = np.eye(n + MANY - FEW) / LARGE**2
+    prior[np.ix_(at, at)] = fitted.prior
+    more = replace(fitted, state=replace(fitted.state, cameras=cameras), prior=prior)
+    try:
+        rms = rms_together(held_out_errors(views, more), views)
+    except CalibrationError:  # the views do not determine so many
+        return False
+    return rms < (1 - WORTH) * rms_together(errors, views)
 
 
 def is_significantly_less(
@@ -246,23 +238,21 @@ def is_wide(camera: Camera, pixels: FloatArray) -> bool:
     return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
 
 
-def _converted(
-    views: Views, tolerances: BoardTolerances, fitted: BoardFit, n_coefficients: int
+def _trial(
+    views: Views, tolerances: BoardTolerances, first: BoardFit, n_coefficients: int
 ) -> "_Drawn | None":
     """Return the fit with another lens model, started from a fit."""
-    near = convert_lens(fitted.state.cameras[0], n_coefficients)
-    most = ALIKE * fitted.rms
-    return None if near is None else _fit_whole(views, tolerances, near, most)
-
-
-def _rational(
-    views: Views, tolerances: BoardTolerances, fisheye: BoardFit
-) -> "_Drawn | None":
-    """Return the fit with all coefficients, from a fisheye near to it."""
-    few = convert_lens(fisheye.state.cameras[0], FEW)
+    camera = first.state.cameras[0]
+    if n_coefficients != MANY:
+        near = convert_lens(camera, n_coefficients)
+        most = ALIKE * first.rms
+        return None if near is None else _fit_whole(views, tolerances, near, most)
+    few = camera if camera.lens is LensModel.BROWN else convert_lens(camera, FEW)
     if few is None:
-        return _converted(views, tolerances, fisheye, MANY)
-    return _richer(views, tolerances, few)
+        near = convert_lens(camera, MANY)
+        return None if near is None else _fit_whole(views, tolerances, near)
+    more = np.append(few.distortion, np.zeros(MANY - FEW))
+    return _fit_whole(views, tolerances, replace(few, distortion=more))
 
 
 def _fit_whole(
@@ -286,25 +276,10 @@ def _fit_whole(
 
 
 def fit_camera(
-    views: Views,
-    tolerances: BoardTolerances,
-    near: Camera,
-    pull: float | None = None,
-    offsets: FloatArray = EVEN,
-    poses: BoardPoses | None = None,
+    views: Views, tolerances: BoardTolerances, near: Camera, pull: float | None = None
 ) -> BoardFit:
-    """Fit camera, poses and board from an initial camera; see `Choice` for the pull.
-
-    Parameters
-    ----------
-    offsets : (3,) or (N, 3) array
-        Of the points of the board, mm.
-    poses : BoardPoses, optional
-        Initial poses, of a fit to more views: this one then ends at larger steps.
-    """
-    known = None
-    converged = ROUGHLY if poses else CONVERGED
-    poses = poses or rough_poses(near, views)
+    """Fit camera, poses and board from an initial camera; see `Choice` for the pull."""
+    known, poses = None, rough_poses(near, views)
     if pull is not None:
         distortion = near.distortion.copy()
         folding = FOLDING[len(distortion)]
@@ -314,26 +289,9 @@ def fit_camera(
         at = 4 + np.array(folding)
         known[at, at] = pull**-2
     state = BoardState(
-        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE), offsets
+        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
-    return adjust_board(views, state, tolerances, (known,), converged)
-
-
-def fit_determined(
-    views: Views,
-    tolerances: BoardTolerances,
-    near: Camera,
-    pull: float | None = None,
-    offsets: FloatArray = EVEN,
-    poses: BoardPoses | None = None,
-) -> BoardFit:
-    """Fit as `fit_camera`, by the weakest prior where the views leave a lens open."""
-    try:
-        return fit_camera(views, tolerances, near, pull, offsets, poses)
-    except CalibrationError:
-        if pull is not None or len(near.distortion) != MANY:
-            raise
-        return fit_camera(views, tolerances, near, PULLS[0], offsets, poses)
+    return adjust_board(views, state, tolerances, (known,))
 
 
 def rms_together(errors: FloatArray, views: Views) -> float:
@@ -373,40 +331,6 @@ def _unfolded(
         if not folds(drawn.camera):
             return drawn
     return None
-
-
-def _richer(views: Views, tolerances: BoardTolerances, few: Camera) -> _Drawn | None:
-    """Return the fit with all coefficients."""
-    more = np.append(few.distortion, np.zeros(MANY - FEW))
-    return _fit_whole(views, tolerances, replace(few, distortion=more))
-
-
-def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> FloatArray:
-    """Return the error of each view by a fit of the others, (V,), px rms.
-
-    Uneven squares add the same error to every lens model and would hide its gain.
-    """
-    errors = np.full(views.n_views, np.nan)
-    fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
-    fitted = found.fitted
-    poses = fitted.state.poses
-    for fold in range(int(fold_of.max()) + 1):
-        own = fold_of == fold
-        others, start = views.chosen(~own), poses.chosen(~own)
-        near = replace(
-            fitted,
-            state=replace(fitted.state, poses=start),
-            residuals=fitted.residuals[~own],
-        )
-        uneven, _ = fit_unevenness((others,), [near])
-        state = fit_determined(
-            others, tolerances, found.camera, found.pull, uneven, start
-        ).state
-        state = replace(state, poses=poses.chosen(own))
-        residuals = fit_board_poses(views.chosen(own), state)
-        squares = np.square(residuals).sum(axis=-1)
-        errors[own] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
-    return errors
 
 
 def rough_poses(near: Camera, views: Views) -> BoardPoses:

@@ -1,317 +1,447 @@
-"""Normal equations of a fitted board and its random effects, view by view.
+"""Errors of board and lens beside the model of a fit, and a robust covariance.
 
-The unknowns are those of the board adjustment without the poses, then the points of the
-board (x y z each, mm), then the nodes of each lens' residual field (u v each, px). Each
-view has its pose, the coefficients of a smooth error of its own, and for each further
-camera a rigid motion of the board between the exposures, which also absorbs other
-pose-like errors (blur, shadows). The points of each camera are weighted by its noise.
+The residuals of a fit are linear in its unknowns, in the places of all points of the
+board (as in a calibration that releases the object [1]_), and in a smooth residual
+field of the lens over the image. The variances of noise, points and field follow from
+restricted maximum likelihood, by the fixed point of [2]_; amplitude and length of the
+field are averaged over a grid, weighted by the likelihood.
+
+What one view has to itself (blur, shadows, a board that gives way) makes its residuals
+depend on each other. The covariance therefore takes whole views as independent, and
+nothing less: it is cluster-robust [3]_. The same equations predict each view by the
+others alone, so its residual there is cross-validated without another fit.
+
+References
+----------
+.. [1] K. H. Strobl, G. Hirzinger, "More accurate pinhole camera calibration with
+   imperfect planar target", ICCV Workshops 2011.
+.. [2] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447,
+   equation 27.
+.. [3] R. M. Bell, D. F. McCaffrey, "Bias reduction in standard errors for linear
+   regression with multi-stage samples", Survey Methodology 28 (2002) 169-181.
 """
 
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import FINEST, linearise
-from lightpen.intrinsics.board_fit import N_POSE, BoardFit
-from lightpen.intrinsics.boards import Board
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import (
+    board_residuals,
+    fit_board_poses,
+    linearise,
+    moved_state,
+)
+from lightpen.intrinsics.board_fit import N_POSE, N_SHAPE, BoardFit
 from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
+
+LENGTHS = (0.3, 0.15, 0.6)  # of the field, in the image's longer side
+SPREADS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the amplitude, in the likeliest one
+LEAST = 1e-3  # of the noise: a component of no effect
+LEAST_SPREAD = 0.3  # of the noise: an amplitude that may yet be
+FIRST = 0.2  # of the noise: start value of a component
+MAX_ROUNDS = 20
+CONVERGED = 0.1  # of twice the logarithm of the likelihood
+KNOWN = 1e-2  # least number of effects that a variance is estimated from
+FINER = (2**0.5, 2**0.25)  # ratio of further lengths to one that is singled out
+SINGLED = 0.9  # of the likelihood, by one length
+LARGE = 4.0  # times the noise: a field beside which the fit is far off
+SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
 
 
 @dataclass(frozen=True)
 class VarianceComponents:
-    """Standard deviations of the random effects."""
+    """Standard deviations of noise and effects."""
 
-    noise: float  # of one coordinate, px; of several cameras the geometric mean
+    noise: float  # of one coordinate, px
     # `in_plane` and `out_of_plane`: of the points of the board, mm
     in_plane: float
     out_of_plane: float
-    view: float  # of the smooth error of a view, px
-    # Of the turns, and of the shifts, of the board in a view of a further camera, px
-    # rms; alike in all directions.
-    between: float
-    lenses: tuple[float, ...]  # amplitude of the residual field of each camera, px
-    # Of the mean offset of a column of points along the rows, or of a row along the
-    # columns, mm; for independent points, that of one point over the root of their
-    # number.
-    lines: float
+    field: float  # amplitude of the lens field, px
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
-    """Normal equations for points of 1 px noise."""
+class MixedFit:
+    """A fitted board with the effects of board and lens."""
 
-    normal: FloatArray  # (p, p)
-    right: FloatArray  # (V, p)
-    # (V, p, s), of the normal equations of each view, by the first s unknowns.
-    columns: FloatArray
-    cross: FloatArray  # (V, p, o)
-    # `own_own`, `own_right`: (V, o, o), (V, o), of pose and smooth errors of each view.
-    own_own: FloatArray
-    own_right: FloatArray
-    n_between: int  # number of these that cameras differ by; they are the last
-    squares: float  # of the residuals, px^2
-    n: int  # number of coordinates
-    # `shared_prior` and `prior_pull`: (s, s) and (p,), information of the priors of the
-    # board adjustment, and their gradient.
-    shared_prior: FloatArray
-    prior_pull: FloatArray
-    fields: tuple[LensField, ...]  # of amplitude 1, one a camera
-    # (3 N, g), orthonormal offsets of whole rows and columns of the board.
-    lines: FloatArray
+    # At the estimate, with the robust covariance; residuals without the field.
+    adjustment: BoardFit
+    components: VarianceComponents
+    # (p, p), share of the covariance that another set of views draws again.
+    repeatability: FloatArray
+    field: LensField | None  # None if the views do not support one
+    held_out: FloatArray  # (V,), residual of each view by the others, px rms
+
+
+class _Design(NamedTuple):
+    """Linear equations of the residuals, the pose of each view eliminated.
+
+    Their unknowns are n of the fit, 3 N of the points, and the nodes of the field.
+    """
+
+    blocks: FloatArray  # (V, 2 N, p)
+    left: FloatArray  # (V, 2 N)
+    normal: FloatArray
+    right: FloatArray
+    squares: float
+    n: int  # coordinates less poses
+    projector: FloatArray  # (V, 2 N, 6), orthonormal; what poses explain
+    fit_prior: FloatArray
+    pull: FloatArray  # (p,), gradient of the priors at the fit
     n_points: int
+    mm: float  # size of a pixel on the board
+    field: LensField | None = None  # of amplitude 1
+    node_prior: FloatArray = np.zeros((0, 0))
 
     @property
-    def n_shared(self) -> int:
-        """Number of unknowns of the board adjustment but the poses."""
-        return len(self.shared_prior)
+    def n_fit(self) -> int:
+        return len(self.fit_prior)
 
     @property
-    def n_views(self) -> int:
-        """Number of views."""
-        return len(self.right)
-
-    @property
-    def of_errors(self) -> tuple[slice, slice]:
-        """Indices of the smooth errors of a view, and of those between cameras."""
-        n_own = self.own_right.shape[-1]
-        n_smooth = n_own - self.n_between
-        return slice(N_POSE, n_smooth), slice(n_smooth, n_own)
-
-    def own_prior(self, components: VarianceComponents) -> FloatArray:
-        """Return the information of pose and smooth errors of a view, (o,)."""
-        prior = np.zeros(self.own_right.shape[-1])
-        smooth, between = self.of_errors
-        prior[smooth], prior[between] = components.view**-2, components.between**-2
-        return prior
-
-    @property
-    def of_points(self) -> slice:
-        """Indices of the points of the board, x y z each."""
-        return slice(self.n_shared, self.n_shared + 3 * self.n_points)
-
-    def of_field(self, camera: int) -> slice:
-        """Return the indices of the nodes of a lens, u v each."""
-        sizes = [2 * len(each.nodes) for each in self.fields]
-        begin = self.of_points.stop + sum(sizes[:camera])
-        return slice(begin, begin + sizes[camera])
+    def n_plain(self) -> int:
+        return self.n_fit + 3 * self.n_points
 
     def prior(self, components: VarianceComponents) -> FloatArray:
         """Return the information of all priors, (p, p)."""
+        own = np.power([components.in_plane] * 2 + [components.out_of_plane], -2.0)
+        n, n_plain = self.n_fit, self.n_plain
         prior = np.zeros_like(self.normal)
-        prior[: self.n_shared, : self.n_shared] = self.shared_prior
-        at = np.arange(self.of_points.start, self.of_points.stop)
-        deviations = [components.in_plane, components.in_plane, components.out_of_plane]
-        prior[at, at] = np.tile(np.power(deviations, -2.0), self.n_points)
-        further = self._line_variance(components) ** -1 - components.in_plane**-2
-        prior[self.of_points, self.of_points] += further * self.lines @ self.lines.T
-        for c, amplitude in enumerate(components.lenses):
-            own = self.of_field(c)
-            prior[own, own] = self._node_information(c) / amplitude**2
+        prior[:n, :n] = self.fit_prior
+        at = np.arange(n, n_plain)
+        prior[at, at] = np.tile(own, self.n_points)
+        if self.field is not None:
+            prior[n_plain:, n_plain:] = self.node_prior / components.field**2
         return prior
 
-    def prior_logarithm(self, components: VarianceComponents) -> float:
-        """Return the logarithm of the priors' determinant, but for a constant."""
-        n_lines = self.lines.shape[1]
-        logarithm = -(2 * self.n_points - n_lines) * np.log(components.in_plane**2)
-        logarithm -= n_lines * np.log(self._line_variance(components))
-        logarithm -= self.n_points * np.log(components.out_of_plane**2)
-        for field, amplitude in zip(self.fields, components.lenses, strict=True):
-            known = np.linalg.slogdet(field.node_information)[1]
-            logarithm += 2 * (known - len(field.nodes) * np.log(amplitude**2))
-        return float(logarithm)
 
-    def effects(
-        self, x: FloatArray, covariance: FloatArray, components: VarianceComponents
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the number of known effects, and their sum of squares.
-
-        Both of the points in their plane, out of it, of lines of them, and of each
-        lens. Squares of lines are those of means.
-        """
-        at, L = self.of_points, self.lines
-        points = x[at].reshape(-1, 3)
-        spread = np.diag(covariance)[at].reshape(-1, 3)
-        of_lines = float(np.sum((L.T @ x[at]) ** 2))
-        spread_of_lines = float(np.sum(L * (covariance[at, at] @ L)))
-        n_lines = L.shape[1]
-        in_plane = spread[:, :2].sum() - spread_of_lines
-        known: list[float] = [
-            2 * self.n_points - n_lines - in_plane / components.in_plane**2,
-            self.n_points - spread[:, 2].sum() / components.out_of_plane**2,
-            n_lines - spread_of_lines / self._line_variance(components),
-        ]
-        squares = [
-            float(np.sum(points[:, :2] ** 2)) - of_lines,
-            float(np.sum(points[:, 2] ** 2)),
-            of_lines / self.n_in_line,
-        ]
-        for c, amplitude in enumerate(components.lenses):
-            own = self.of_field(c)
-            information = self._node_information(c)
-            unknown = np.sum(information * covariance[own, own]) / amplitude**2
-            known.append(float(own.stop - own.start - unknown))
-            squares.append(float(x[own] @ information @ x[own]))
-        return np.array(known), np.array(squares)
-
-    @property
-    def n_in_line(self) -> float:
-        """Mean number of points of a row or column."""
-        return 2 * self.n_points / int(self.lines.shape[1])
-
-    def _line_variance(self, components: VarianceComponents) -> float:
-        return float(self.n_in_line * components.lines**2)
-
-    def _node_information(self, camera: int) -> FloatArray:
-        return np.asarray(
-            np.kron(self.fields[camera].node_information, np.eye(2)), dtype=np.float64
-        )
+class _Solution(NamedTuple):
+    design: _Design
+    components: VarianceComponents
+    deviance: float  # -2 times the logarithm of the likelihood, but for a constant
+    x: FloatArray
+    covariance: FloatArray
 
 
-def design_of(views: Views, fitted: BoardFit, length: float) -> Design:
-    """Return the normal equations at a fit; lens fields correlate over a length, px."""
-    state, n_views = fitted.state, views.n_views
-    n_shared, n_points = len(fitted.prior), views.board.n_points
-    fields = tuple(LensField.of(*size, 1.0, length) for size in views.image_sizes)
-    n_nodes = [2 * len(each.nodes) for each in fields]
-    points_at = n_shared + np.arange(3 * n_points)
-    n = n_shared + 3 * n_points + sum(n_nodes)
-    smooth = smooth_functions(views.board)
-    n_cameras, n_smooth = len(state.cameras), 2 * smooth.shape[1]
-    n_between = N_POSE * (n_cameras - 1)
-    n_own = N_POSE + n_smooth * n_cameras + n_between
-    weights = _weights(views, fitted.residuals)
-    squares = 0.0
-    normal = np.zeros((n, n))
-    right = np.zeros((n_views, n))
-    columns = np.zeros((n_views, n, n_shared))
-    cross = np.zeros((n_views, n, n_own))
-    own_own = np.zeros((n_views, n_own, n_own))
-    own_right = np.zeros((n_views, n_own))
-    begin = n_shared + 3 * n_points
-    for c, sight in enumerate(linearise(views, state, fitted.residuals)):
-        seen = views.seen[:, c, :, None]
-        # Where points are modelled: noise of the places would be taken for the field's.
-        at = np.nan_to_num(views.pixels[:, c] - fitted.residuals[:, c])
-        by_field = _both(np.where(seen, fields[c].basis(at), 0.0))
-        by_smooth = _both(np.where(seen, smooth, 0.0))
-        few = weights[c] * np.concatenate([sight.shared, by_field], axis=-1)
-        few_at = np.r_[0:n_shared, begin : begin + n_nodes[c]]
-        begin += n_nodes[c]
-        own = np.zeros((n_views, n_points, 2, n_own))
-        own[..., :N_POSE] = sight.own
-        mine = slice(N_POSE + n_smooth * c, N_POSE + n_smooth * (c + 1))
-        own[..., mine] = by_smooth
-        if c > 0:
-            sizes = np.square(sight.own).sum(axis=(0, 1, 2)) / max(2 * seen.sum(), 1)
-            sizes = np.repeat(np.sqrt(sizes.reshape(2, 3).mean(axis=1)), 3)
-            end = n_own - N_POSE * (n_cameras - 1 - c)
-            moved = sight.own / np.where(sizes > 0, sizes, 1.0)
-            own[..., end - N_POSE : end] = moved
-        own *= weights[c]
-        few, own = (each.reshape(n_views, 2 * n_points, -1) for each in (few, own))
-        left = weights[c] * sight.residuals.reshape(n_views, -1, 1)
-        squares += float(np.sum(left * left))
-        across, B = np.swapaxes(few, 1, 2), weights[c] * sight.by_board
-        normal[np.ix_(few_at, few_at)] += np.tensordot(few, few, axes=([0, 1], [0, 1]))
-        mixed = np.swapaxes(B, 2, 3) @ few.reshape(n_views, n_points, 2, -1)
-        columns[:, few_at] += across @ few[..., :n_shared]
-        columns[:, points_at] += mixed[..., :n_shared].reshape(n_views, -1, n_shared)
-        mixed = mixed.sum(axis=0).reshape(3 * n_points, -1)
-        normal[np.ix_(points_at, few_at)] += mixed
-        normal[np.ix_(few_at, points_at)] += mixed.T
-        blocks = np.einsum("vnik,vnil->nkl", B, B)
-        for i, j in np.ndindex(3, 3):
-            normal[points_at[i::3], points_at[j::3]] += blocks[:, i, j]
-        right[:, few_at] += (across @ left)[..., 0]
-        right[:, points_at] += np.einsum(
-            "vnik,vni->vnk", B, left.reshape(sight.residuals.shape)
-        ).reshape(n_views, -1)
-        cross[:, few_at] += across @ own
-        by_own = np.swapaxes(B, 2, 3) @ own.reshape(n_views, n_points, 2, -1)
-        cross[:, points_at] += by_own.reshape(n_views, 3 * n_points, n_own)
-        turned = np.swapaxes(own, 1, 2)
-        own_own += turned @ own
-        own_right += (turned @ left)[..., 0]
-    pull = np.zeros(n)
-    pull[:n_shared] = fitted.scores.sum(axis=0) / fitted.sigma**2
-    return Design(
-        normal,
-        right,
-        columns,
-        cross,
-        own_own,
-        own_right,
-        n_between,
-        squares,
-        2 * int(views.seen.sum()),
-        fitted.prior,
-        pull,
-        fields,
-        _lines(views.board),
-        n_points,
+def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
+    """Return a fit of one camera with effects of board and lens, from one without.
+
+    A large field moves it so far that all is linearised anew there.
+    """
+    found = _from(views, fitted)
+    if found.components.field > LARGE * found.components.noise:
+        state = replace(found.adjustment.state, offsets=fitted.state.offsets)
+        residuals = board_residuals(views, state)
+        found = _from(views, replace(fitted, state=state, residuals=residuals))
+    return found
+
+
+def _from(views: Views, fitted: BoardFit) -> MixedFit:
+    plain = _design_of(views, fitted)
+    longer = max(views.image_sizes[0])
+    designs = [_with_field(plain, views, fitted, each * longer) for each in LENGTHS]
+    components = _most_likely(designs[0]).components
+    without = _solved(plain, components)
+    found = [each for design in designs for each in _solutions(design, without)]
+    weights, best = _weighed(found)
+    for ratio in FINER:  # a length that the likelihood singles out
+        is_it = np.array([each.design.field is best.design.field for each in found])
+        if weights[is_it].sum() < SINGLED or best.design.field is None:
+            break
+        for length in (
+            best.design.field.length * ratio,
+            best.design.field.length / ratio,
+        ):
+            design = _with_field(plain, views, fitted, length)
+            found += _solutions(design, without)
+        weights, best = _weighed(found)
+    n, n_kept = plain.n_fit, len(without.x)
+    x = np.sum([w * s.x[:n_kept] for w, s in zip(weights, found, strict=True)], axis=0)
+    off = np.stack([s.x[:n] - x[:n] for s in found])
+    held_out, robust = _robust(best)
+    prior = best.design.prior(best.components)
+    total = best.covariance @ prior @ best.covariance + robust
+    between = np.einsum("s,si,sj->ij", weights, off, off)
+    field = None
+    if without.deviance - best.deviance > SIGNIFICANT:
+        field = _field(best, total, fitted)
+    adjustment = _moved(views, fitted, x, best.components.noise, field)
+    adjustment = replace(adjustment, covariance=total[:n, :n] + between)
+    squares = np.square(held_out).sum(axis=1) / views.seen.sum(axis=(1, 2))
+    return MixedFit(
+        adjustment, best.components, robust[:n, :n], field, np.sqrt(squares)
     )
 
 
-def _weights(views: Views, residuals: FloatArray) -> FloatArray:
-    """Return the weight of each camera's coordinates, (C,), their product 1.
+def _weighed(found: list[_Solution]) -> tuple[FloatArray, _Solution]:
+    """Return the weights of solutions by their likelihood, and the likeliest one."""
+    deviances = np.array([each.deviance for each in found])
+    weights = np.exp(-0.5 * (deviances - deviances.min()))
+    return weights / weights.sum(), found[int(np.argmin(deviances))]
 
-    By the scatter of the points about a smooth error of each view.
+
+def held_out_errors(views: Views, fitted: BoardFit) -> FloatArray:
+    """Return the residual of each view by a fit of the others, (V,), px rms.
+
+    The points of the board are free, as they add the same error to every lens model.
     """
-    if residuals.shape[1] == 1:
-        return np.ones(1)
-    x, y = views.board.points[:, 0], views.board.points[:, 1]
-    functions = np.c_[np.ones(len(x)), x / x.std(), y / y.std()]
-    functions = np.concatenate([functions, smooth_functions(views.board)], axis=1)
-    left = np.nan_to_num(residuals)
-    seen = views.seen.astype(np.float64)
-    known = np.einsum("ni,vcn,nj->vcij", functions, seen, functions, optimize=True)
-    known += 1e-9 * len(functions) * np.eye(functions.shape[1])
-    fitted = np.linalg.solve(known, functions.T @ left)
-    left = np.where(views.seen[..., None], left - functions @ fitted, 0.0)
-    n_free = np.maximum(views.seen.sum(axis=2) - functions.shape[1], 0).sum(axis=0)
-    noise = np.sqrt(np.square(left).sum(axis=(0, 2, 3)) / np.maximum(2 * n_free, 1))
-    noise = np.maximum(noise, FINEST)
-    return np.asarray(np.exp(np.mean(np.log(noise))) / noise)
+    design = _design_of(views, fitted)
+    held_out, _ = _robust(_most_likely(design))
+    squares = np.square(held_out).sum(axis=1) / views.seen.sum(axis=(1, 2))
+    return np.asarray(np.sqrt(squares))
 
 
-@cache
-def _lines(board: Board) -> FloatArray:
-    """Return the offsets of whole columns along x, and of rows along y, (3 N, g)."""
-    offsets = []
-    for axis in range(2):
-        places = np.round(board.points[:, axis] / board.pitch, 3)
-        for place in np.unique(places):
-            offset = np.zeros((len(places), 3))
-            offset[places == place, axis] = 1.0
-            offsets.append(offset.ravel() / np.linalg.norm(offset))
-    lines = np.stack(offsets, axis=1)
-    lines.flags.writeable = False
-    return lines
+def _design_of(views: Views, fitted: BoardFit) -> _Design:
+    (sight,) = linearise(views, fitted.state, fitted.residuals)
+    n_views, n_points, _, n = sight.shared.shape
+    blocks = np.zeros((n_views, n_points, 2, n + 3 * n_points))
+    blocks[..., :n] = sight.shared
+    at = np.arange(n_points)
+    for axis in range(3):
+        own = np.moveaxis(sight.by_board[..., axis], 1, 0)
+        blocks[:, at, :, n + 3 * at + axis] = own
+    blocks = blocks.reshape(n_views, 2 * n_points, -1)
+    projector = np.linalg.qr(sight.own.reshape(n_views, 2 * n_points, N_POSE))[0]
+    blocks = _without_poses(projector, blocks)
+    residuals = sight.residuals.reshape(n_views, 2 * n_points, 1)
+    left = _without_poses(projector, residuals)[..., 0]
+    pull = np.zeros(blocks.shape[-1])
+    # Priors are of what is 0 before: the shape, and folding coefficients.
+    state = fitted.state
+    pull[:n] = fitted.prior @ np.r_[state.cameras[0].intrinsics, state.shape]
+    camera, depths = fitted.state.cameras[0], fitted.state.poses.translations[:, 2]
+    normal, right = _normal_equations(blocks, left)
+    return _Design(
+        blocks,
+        left,
+        normal,
+        right,
+        float(np.sum(left**2)),
+        2 * int(views.seen.sum()) - N_POSE * n_views,
+        projector,
+        fitted.prior,
+        pull,
+        n_points,
+        float(np.nanmedian(depths)) / camera.fx,
+    )
 
 
-@cache
-def smooth_functions(board: Board) -> FloatArray:
-    """Return functions of second and third order over the board, (N, 7).
-
-    Orthogonal to each other and to functions of lower order, of mean square 1.
-    """
-    x, y = board.points[:, 0], board.points[:, 1]
-    u, v = x / np.abs(x).max(), y / np.abs(y).max()
-    powers = [(i - j, j) for i in range(4) for j in range(i + 1)]
-    columns = np.stack([u**i * v**j for i, j in powers], axis=-1)
-    orthogonal, triangle = np.linalg.qr(columns)
-    independent = np.abs(np.diag(triangle)) > 1e-9 * np.sqrt(len(x))
-    independent[:3] = False  # a place and a tilt are the pose's
-    functions = orthogonal[:, independent] * np.sqrt(len(x))
-    functions.flags.writeable = False
-    return np.asarray(functions)
-
-
-def _both(weights: FloatArray) -> FloatArray:
-    """Return weights (..., m) of u and of v alike, (..., 2, 2 m)."""
-    both = np.zeros((*weights.shape[:-1], 2, weights.shape[-1], 2))
+def _with_field(
+    plain: _Design, views: Views, fitted: BoardFit, length: float
+) -> _Design:
+    """Return the equations with a lens field of a correlation length, px."""
+    field = LensField.of(*views.image_sizes[0], 1.0, length)
+    # Where points are modelled: noise of the places would be taken for the field's.
+    at = np.nan_to_num(views.pixels[:, 0] - fitted.residuals[:, 0])
+    weights = np.where(views.seen[:, 0, :, None], field.basis(at), 0.0)
+    both = np.zeros((*weights.shape[:2], 2, weights.shape[-1], 2))
     both[..., 0, :, 0] = both[..., 1, :, 1] = weights
-    return both.reshape(*weights.shape[:-1], 2, -1)
+    columns = both.reshape(*plain.left.shape, -1)
+    columns = _without_poses(plain.projector, columns)
+    blocks = np.concatenate([plain.blocks, columns], axis=-1)
+    normal, right = _normal_equations(blocks, plain.left)
+    return plain._replace(
+        blocks=blocks,
+        normal=normal,
+        right=right,
+        pull=np.pad(plain.pull, (0, columns.shape[-1])),
+        field=field,
+        node_prior=np.asarray(np.kron(field.node_information, np.eye(2)), np.float64),
+    )
+
+
+def _normal_equations(
+    blocks: FloatArray, left: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    flat = blocks.reshape(-1, blocks.shape[-1])
+    return flat.T @ flat, flat.T @ left.ravel()
+
+
+def _without_poses(projector: FloatArray, columns: FloatArray) -> FloatArray:
+    explained = np.swapaxes(projector, 1, 2) @ columns
+    return np.asarray(columns - projector @ explained)
+
+
+def _most_likely(design: _Design) -> _Solution:
+    """Return the solution by the most likely components."""
+    noise = max(np.sqrt(design.squares / max(design.n, 1)), 1e-6)
+    mm = FIRST * noise * design.mm
+    components = VarianceComponents(noise, mm, mm, FIRST * noise)
+    before = np.inf
+    for _ in range(MAX_ROUNDS):
+        solution = _solved(design, components)
+        if before - solution.deviance < CONVERGED:
+            break
+        before = solution.deviance
+        components = _following(solution)
+    return solution
+
+
+def _solved(design: _Design, components: VarianceComponents) -> _Solution:
+    weight = components.noise**-2
+    covariance, logarithm = _inverse(weight * design.normal + design.prior(components))
+    right = weight * design.right - design.pull
+    x = covariance @ right
+    n_nodes = len(design.node_prior)
+    logarithm += 2 * n_nodes * np.log(components.field)
+    logarithm -= float(np.linalg.slogdet(design.node_prior)[1])
+    of_points = 2 * np.log(components.in_plane) + np.log(components.out_of_plane)
+    logarithm += 2 * design.n * np.log(components.noise)
+    logarithm += 2 * design.n_points * of_points
+    deviance = logarithm + weight * design.squares - float(right @ x)
+    return _Solution(design, components, float(deviance), x, covariance)
+
+
+def _following(solution: _Solution) -> VarianceComponents:
+    """Return the next components of the fixed point."""
+    design, components, x, C = solution[0], solution[1], solution.x, solution.covariance
+    n, n_plain, n_points = design.n_fit, design.n_plain, design.n_points
+    squares = np.square(x[n:n_plain]).reshape(n_points, 3).sum(axis=0)
+    spread = np.diag(C)[n:n_plain].reshape(n_points, 3).sum(axis=0)
+    in_plane = 2 * n_points - float(spread[:2].sum()) / components.in_plane**2
+    out_of_plane = n_points - float(spread[2]) / components.out_of_plane**2
+    nodes, own = x[n_plain:], design.node_prior
+    of_field = len(nodes) - float(np.sum(own * C[n_plain:, n_plain:])) / (
+        components.field**2
+    )
+    n_known = n - float(np.sum(design.fit_prior * C[:n, :n]))
+    n_known += in_plane + out_of_plane + of_field
+    rest = float(design.squares - 2 * x @ design.right + x @ design.normal @ x)
+    noise = float(np.sqrt(max(rest, 1e-30) / max(design.n - n_known, 1.0)))
+    least = LEAST * noise
+
+    def deviation(squares: float, known: float, least: float) -> float:
+        return max(float(np.sqrt(squares / max(known, KNOWN))), least)
+
+    return VarianceComponents(
+        noise,
+        deviation(squares[:2].sum(), in_plane, least * design.mm),
+        deviation(squares[2], out_of_plane, least * design.mm),
+        deviation(float(nodes @ own @ nodes), of_field, least)
+        if len(nodes)
+        else components.field,
+    )
+
+
+def _solutions(design: _Design, without: _Solution) -> list[_Solution]:
+    """Return the solutions with fields of several amplitudes.
+
+    Given that without a field, the other unknowns are eliminated.
+    """
+    n, components = design.n_plain, without.components
+    weight = components.noise**-2
+    cross = weight * design.normal[:n, n:]
+    drawn = without.covariance @ cross
+    own = weight * design.normal[n:, n:] - cross.T @ drawn
+    right = weight * design.right[n:] - cross.T @ without.x
+    logarithm = float(np.linalg.slogdet(design.node_prior)[1])
+    most = max(components.field, LEAST_SPREAD * components.noise)
+    found = []
+    for amplitude in (most * np.array(SPREADS)).tolist():
+        of_nodes, determinant = _inverse(own + design.node_prior / amplitude**2)
+        nodes, by_field = of_nodes @ right, drawn @ of_nodes
+        covariance = np.empty_like(design.normal)
+        covariance[:n, :n] = without.covariance + by_field @ drawn.T
+        covariance[n:, n:] = of_nodes
+        covariance[:n, n:] = -by_field
+        covariance[n:, :n] = -by_field.T
+        deviance = without.deviance + determinant - logarithm
+        deviance += 2 * len(nodes) * np.log(amplitude) - float(right @ nodes)
+        x = np.r_[without.x - drawn @ nodes, nodes]
+        its = replace(components, field=amplitude)
+        found.append(_Solution(design, its, deviance, x, covariance))
+    return found
+
+
+def _inverse(normal: FloatArray) -> tuple[FloatArray, float]:
+    """Return the inverse of normal equations, and the logarithm of the determinant.
+
+    By Cholesky's decomposition, in a third of the time of `numpy.linalg`. Raises
+    `CalibrationError` if something is left open.
+    """
+    from scipy.linalg.lapack import dpotrf, dpotri
+
+    factor, info = dpotrf(normal, lower=1)
+    if info != 0:
+        raise CalibrationError("intrinsics.open")
+    inverse = np.tril(dpotri(factor, lower=1)[0])
+    logarithm = 2 * float(np.log(np.diag(factor)).sum())
+    return np.asarray(inverse + np.tril(inverse, -1).T, dtype=np.float64), logarithm
+
+
+def _robust(solution: _Solution) -> tuple[FloatArray, FloatArray]:
+    """Return cross-validated residuals (V, 2 N), px, and the robust covariance (p, p).
+
+    By what each view changes, its leverage corrected for. Few views tell the variance
+    of many unknowns badly: the covariance by independent noise, scaled alike, counts as
+    much as one view for each unknown of the camera.
+    """
+    design, components, x, C = solution[0], solution[1], solution.x, solution.covariance
+    weight = components.noise**-2
+    held_out = np.empty_like(design.left)
+    changes = np.empty((len(design.left), len(C)))
+    for v, (block, left) in enumerate(zip(design.blocks, design.left, strict=True)):
+        rest = left - block @ x
+        by_block = block @ C
+        leverage = weight * by_block @ block.T
+        held_out[v] = np.linalg.solve(np.eye(len(rest)) - leverage, rest)
+        # The mean of both is the root of the correction, to the second order.
+        changes[v] = 0.5 * weight * (rest + held_out[v]) @ by_block
+    found = changes.T @ changes
+    expected = C - C @ design.prior(components) @ C
+    n_views, n = len(changes), design.n_fit - N_SHAPE
+    ratio = np.linalg.solve(expected[:n, :n], found[:n, :n])
+    scaled = max(float(np.trace(ratio)) / n, 1.0) * expected
+    blend = (n_views * found + n * scaled) / (n_views + n)
+    return held_out, blend
+
+
+def _field(best: _Solution, total: FloatArray, fitted: BoardFit) -> LensField:
+    """Return the lens field, and the intrinsics' covariance beside it.
+
+    Its covariance refers to the image: an error of the field shifts the intrinsics
+    along, and most of it cancels.
+    """
+    field = best.design.field
+    assert field is not None
+    nodes = np.arange(best.design.n_plain, len(total))
+    own = np.arange(fitted.of_intrinsics(0).stop)
+    C = best.covariance
+    drawn = np.linalg.solve(C[np.ix_(nodes, nodes)], C[np.ix_(nodes, own)]).T
+    both = total[np.ix_(np.r_[own, nodes], np.r_[own, nodes])]
+    alone = np.hstack([np.eye(len(own)), -drawn])
+    camera = fitted.state.cameras[0]
+    J = camera.intrinsics_jacobian(camera.unproject(field.nodes))
+    by_field = np.eye(len(nodes)) + J.reshape(len(nodes), -1) @ drawn
+    known = by_field @ total[np.ix_(nodes, nodes)] @ by_field.T
+    return replace(
+        field,
+        amplitude=best.components.field,
+        values=best.x[nodes].reshape(-1, 2),
+        covariance=0.5 * (known[0::2, 0::2] + known[1::2, 1::2]),
+        intrinsics_covariance=alone @ both @ alone.T,
+    )
+
+
+def _moved(
+    views: Views, fitted: BoardFit, x: FloatArray, noise: float, field: LensField | None
+) -> BoardFit:
+    """Return the fit after a step of all unknowns, its poses fitted there."""
+    n = len(fitted.prior)
+    poses = np.zeros((views.n_views, N_POSE))
+    state = moved_state(fitted.state, x[:n], poses)
+    state = replace(state, offsets=fitted.state.offsets + x[n:].reshape(-1, 3))
+    return replace(
+        fit_board_poses(without_field(views, field), state),
+        sigma=noise,
+        prior=fitted.prior,
+    )
+
+
+def without_field(views: Views, field: LensField | None) -> Views:
+    """Return the views of one camera with the residual field of its lens removed."""
+    if field is None:
+        return views
+    return replace(views, pixels=views.pixels - field.at(views.pixels))

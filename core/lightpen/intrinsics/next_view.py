@@ -43,14 +43,15 @@ def choose_next_view(adjustment: BoardFit, board: Board) -> SuggestedView:
     camera = adjustment.state.cameras[0]
     poses = _candidates(camera, board)
     state = replace(adjustment.state, poses=poses)
-    added = view_information(board, state, camera.image_size) / adjustment.sigma**2
-    known = np.linalg.inv(adjustment.covariance)
+    variance = adjustment.sigma**2
+    added = view_information(board, state, camera.image_size) / variance
+    known = adjustment.information.sum(axis=0) / variance + adjustment.prior
     fields = error_fields(camera).reshape(-1, len(camera.intrinsics))
     weights = np.zeros_like(known)
     at = adjustment.of_intrinsics(0)
     weights[at, at] = fields.T @ fields
     variances = np.einsum("vij,ij->v", np.linalg.inv(known + added), weights)
-    before = float(np.sum(adjustment.covariance * weights))
+    before = float(np.sum(np.linalg.inv(known) * weights))
     best = int(np.argmin(variances))
     outline = board.outline @ poses.rotations[best].T + poses.translations[best]
     return SuggestedView(

@@ -18,17 +18,8 @@ from lightpen.messages import Message, message, printable
 
 MEMORY_A_PIXEL = 5  # bytes: 16 bits, 8 bits, and copies
 EXAMINED = 3  # images that are searched for another board
-# Seen in a mirror they are others; a larger chessboard holds a smaller one either way.
-TELLS_SIDES = (
-    BoardKind.CHARUCO,
-    BoardKind.LEGACY_CHARUCO,
-    BoardKind.MARKERS,
-    BoardKind.ASYMMETRIC_CIRCLES,
-)
-OTHER_LAYOUT = {
-    BoardKind.CHARUCO: BoardKind.LEGACY_CHARUCO,
-    BoardKind.LEGACY_CHARUCO: BoardKind.CHARUCO,
-}
+# Seen in a mirror they are others; a chessboard is the same.
+TELLS_SIDES = (BoardKind.CHARUCO, BoardKind.ASYMMETRIC_CIRCLES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +100,6 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Message |
     mirrored = (image[:, ::-1].copy() for image in images())
     if board.kind in TELLS_SIDES and _is_found(mirrored, board):
         return message("intrinsics.mirrored", board=board.name)
-    if board.kind in OTHER_LAYOUT:
-        other = replace(board, kind=OTHER_LAYOUT[board.kind])
-        if _is_found(images(), other):
-            return message(
-                "intrinsics.other-layout", board=board.name, other=other.name
-            )
     if board.kind is BoardKind.CHESSBOARD:  # whose orientation is arbitrary
         return _other_count(images(), board)
     across = replace(board, columns=board.rows, rows=board.columns)
@@ -126,27 +111,16 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Message |
 def _other_count(images: Iterable[Image], board: Board) -> Message | None:
     """Return the message on a chessboard with another number of corners."""
     counts = [count for count in map(count_corners, images) if count is not None]
-    if not counts:
+    stated = max(board.columns, board.rows), min(board.columns, board.rows)
+    if not counts or max(counts) == stated:
         return None
-    seen = max(counts, key=lambda count: (count.columns * count.rows, count.is_whole))
-    rows, columns = sorted((board.rows, board.columns))
-    has_more = seen.columns > columns or seen.rows > rows
-    if seen.is_whole and (seen.columns, seen.rows) != (columns, rows):
-        return message(
-            "intrinsics.other-count",
-            columns=board.columns,
-            rows=board.rows,
-            seen_columns=seen.columns,
-            seen_rows=seen.rows,
-        )
-    if not has_more:
-        return None
+    columns, rows = max(counts)
     return message(
-        "intrinsics.larger-count",
+        "intrinsics.other-count",
         columns=board.columns,
         rows=board.rows,
-        seen_columns=seen.columns,
-        seen_rows=seen.rows,
+        seen_columns=columns,
+        seen_rows=rows,
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray
 from lightpen.errors import UsageError
-from lightpen.intrinsics.boards import Board, BoardKind, marker_dictionary
+from lightpen.intrinsics.boards import Board, marker_dictionary
 
 POINTS_A_MM = 72 / 25.4
 PAPERS = {  # mm
@@ -85,36 +85,19 @@ def _page_size(
 def _draw(board: Board) -> _Drawing:
     if board.kind.is_circles:
         return _draw_circles(board)
-    if board.kind is BoardKind.MARKERS:
-        return _draw_markers(board)
     extra = 0 if board.kind.has_markers else 1
     columns, rows = board.columns + extra, board.rows + extra
-    # Of an even number of rows the legacy layout begins with a white square.
-    first_black = int(board.kind is BoardKind.LEGACY_CHARUCO and rows % 2 == 0)
     areas, number = [], 0
     gap = 0.5 * (board.pitch - board.detail)
     for row in range(rows):
         for column in range(columns):
             x, y = column * board.pitch, row * board.pitch
-            if (row + column) % 2 == first_black:
+            if (row + column) % 2 == 0:
                 areas.append(_rectangle(x, y, board.pitch, board.pitch))
             elif board.kind.has_markers:
                 areas += _marker(board, number, x + gap, y + gap, board.detail)
                 number += 1
     return _Drawing(columns * board.pitch, rows * board.pitch, tuple(areas))
-
-
-def _draw_markers(board: Board) -> _Drawing:
-    step = board.pitch + board.detail
-    areas: list[str] = []
-    for number in range(board.columns * board.rows):
-        row, column = divmod(number, board.columns)
-        areas += _marker(board, number, column * step, row * step, board.pitch)
-    return _Drawing(
-        board.columns * step - board.detail,
-        board.rows * step - board.detail,
-        tuple(areas),
-    )
 
 
 def _draw_circles(board: Board) -> _Drawing:

@@ -1,8 +1,10 @@
 """Two cameras from views in which both detect one board.
 
-Everything is fitted together: both cameras, the place of the second, the board and its
-poses. A board that looks the same turned round is numbered as the places of the cameras
-have it, which is the same in all views.
+The intrinsics are as of each camera alone, or as of their files. With them the place of
+the second camera, the board and its poses are fitted together; the covariance of the
+place takes whole views as independent, and contains the intrinsics'. A board that looks
+the same turned round is numbered as the places of the cameras have it, which is the
+same in all views.
 """
 
 from dataclasses import dataclass, replace
@@ -11,27 +13,17 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    adjust_board,
-    fit_board_poses,
-    stated_information,
-)
-from lightpen.intrinsics.alternatives import USELESS
-from lightpen.intrinsics.board_findings import (
-    board_contradictions,
-    messages_on_board,
-    released_tolerances,
-)
+from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.calibration import (
     CameraCalibration,
     calibrate_camera,
     without_outliers,
 )
-from lightpen.intrinsics.camera_change import changed_camera
+from lightpen.intrinsics.changes import USELESS
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
+from lightpen.intrinsics.effects import without_field
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
-from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
@@ -42,54 +34,8 @@ MIN_PAIRS = 3
 MAX_VOTED = 60  # views that are compared with all
 ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view
 ALIKE_SHIFT = 0.15  # of its distance
-PEN_SPEED = 100.0  # mm/s
 APART = 3.0  # times the noise of each camera alone
-SIGMAS = 4.0
-OF_BOTH = (
-    "intrinsics.board-stretched",
-    "intrinsics.board-bent",
-    "intrinsics.duplicates",
-)  # found again by both cameras together
-LEAST_LAG = 0.02  # of the time between two views
-
-
-@dataclass(frozen=True)
-class PairLag:
-    """Time lag of the second camera, if the views are a sequence."""
-
-    # `views` and `sigma`: lag in view intervals, and its standard deviation.
-    views: float
-    sigma: float
-    interval_ms: float | None  # interval between two views, if known
-    px_per_ms: float  # displacement of a pen moved at 100 mm/s
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether it is significant, and large enough to matter."""
-        return abs(self.views) > max(SIGMAS * self.sigma, LEAST_LAG)
-
-    @property
-    def lag_ms(self) -> float | None:
-        """The same in ms, where the time between two views is known."""
-        return None if self.interval_ms is None else self.views * self.interval_ms
-
-    def remark(self, name: str) -> Message:
-        """Return the message on the camera of that name."""
-        if self.lag_ms is None:
-            return message(
-                "pair.late",
-                camera=name,
-                lag=abs(self.views),
-                u=2 * self.sigma,
-                px=self.px_per_ms,
-            )
-        return message(
-            "pair.late-by",
-            camera=name,
-            lag=abs(self.lag_ms),
-            u=2 * self.sigma * (self.interval_ms or 0.0),
-            px=abs(self.lag_ms) * self.px_per_ms,
-        )
+HELD = 1e20  # information of intrinsics that are not fitted again
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,18 +44,12 @@ class PairCalibration:
 
     rig: Rig  # with the covariance of the extrinsics, the board's scale included
     views: Views
-    effects: MixedFit
+    adjustment: BoardFit
     # Each camera by its own views; empty if files state the intrinsics.
     alone: tuple[CameraCalibration, ...]
     n_pairs: int  # views in which both cameras see the board
     left_out: tuple[str, ...]  # excluded views
-    lag: PairLag | None  # None if the board did not move enough between views
     remarks: tuple[Message, ...]
-
-    @property
-    def adjustment(self) -> BoardFit:
-        """The final fit."""
-        return self.effects.adjustment
 
     @property
     def baseline(self) -> float:
@@ -131,19 +71,12 @@ def calibrate_pair(
     tolerances: BoardTolerances,
     names: tuple[str, str],
     cameras: tuple[Camera, ...] = (),
-    interval_ms: float | None = None,
 ) -> PairCalibration:
     """Calibrate the extrinsics of the second of two cameras.
 
+    ``cameras`` are as in their files; by default they are calibrated by the same views.
     Raises `CalibrationError` if too few views are of both, or they contradict each
     other.
-
-    Parameters
-    ----------
-    cameras : tuple of Camera, optional
-        Cameras as in their files; by default they are estimated from the views as well.
-    interval_ms : float, optional
-        Time between two views, if they are a sequence.
     """
     alone: tuple[CameraCalibration, ...] = ()
     if not cameras:
@@ -152,15 +85,6 @@ def calibrate_pair(
         )
         cameras = tuple(each.camera for each in alone)
         views = _as_alone(views, alone)
-        # With the priors that keep their images from folding.
-        stated: tuple[FloatArray | None, ...] = tuple(
-            each.adjustment.prior_of(0) for each in alone
-        )
-    else:
-        stated = tuple(
-            None if camera.covariance is None else stated_information(camera.covariance)
-            for camera in cameras
-        )
     names_of_all = views.names
     views, duplicates = without_duplicates(views.chosen(np.any(views.found, axis=1)))
     both = np.all(views.found, axis=1)
@@ -172,62 +96,91 @@ def calibrate_pair(
         for c, (camera, name) in enumerate(zip(cameras, names, strict=True)):
             _require_fit(views.of_camera(c), camera, name)
         raise
-    poses = _poses(views, cameras, place)
+    views = views.chosen(np.all(views.found, axis=1))
+    for c, camera in enumerate(cameras):
+        even = without_field(views.of_camera(c), camera.lens_field)
+        pixels = views.pixels.copy()
+        pixels[:, c] = even.pixels[:, 0]
+        views = replace(views, pixels=pixels)
+    offsets = np.zeros(3)
+    if alone:  # the points of the board are as the first camera has them
+        offsets = alone[0].adjustment.board_points - views.board.points
     state = BoardState(
         cameras,
         np.stack([np.eye(3), place.rotations[0]]),
         np.stack([np.zeros(3), place.translations[0]]),
-        poses,
+        start_board_poses(cameras[0], views),
         np.zeros(N_SHAPE),
+        offsets,
     )
-    fitted = adjust_board(views, state, tolerances, stated)
-    lag = _lag(views, fitted, np.all(views.found, axis=1), interval_ms)
+    held = tuple(HELD * np.eye(len(camera.intrinsics)) for camera in cameras)
+    fitted = adjust_board(views, state, tolerances, held)
     usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
-    moved = _message_on_moved(views, fitted, usual)
+    moved = _message_on_moved(fitted, usual)
     kept = without_outliers(views, fitted)
     if int(kept.seen.sum()) < int(views.seen.sum()):
         which = np.isin(views.names, kept.names)
         poses = BoardPoses(*(each[which] for each in fitted.state.poses))
         views, state = kept, replace(state, poses=poses)
-        fitted = adjust_board(views, state, tolerances, stated)
-    denied = board_contradictions(fitted, tolerances)
-    if denied.any():
-        released = released_tolerances(tolerances)
-        fitted = adjust_board(views, state, released, stated)
-    effects = fit_effects(views, fitted)
-    fitted = effects.adjustment
-    rig = _rig(effects, names, tolerances, alone)
+        fitted = adjust_board(views, state, tolerances, held)
+    rotations, translations = fitted.state.rotations, fitted.state.translations
+    covariance = _covariance(fitted, tolerances)
     remarks = [
         of_camera(name, remark)
         for name, each in zip(names, alone, strict=False)
         for remark in each.remarks
-        if remark.code not in OF_BOTH
+        if remark.code != "intrinsics.duplicates"
     ]
     if duplicates:
         remarks.append(message_on_duplicates(views.n_views, duplicates))
-    if lag is not None and lag.is_significant:
-        remarks.append(lag.remark(names[1]))
-    elif moved is not None:
-        remarks.append(moved)
     return PairCalibration(
-        rig=rig,
+        rig=Rig(cameras, rotations, translations, covariance, names),
         views=views,
+        adjustment=fitted,
         alone=alone,
-        n_pairs=int(np.all(views.found, axis=1).sum()),
+        n_pairs=views.n_views,
         left_out=tuple(
             name for name in names_of_all if name not in (*views.names, *duplicates)
         ),
-        effects=effects,
-        lag=lag,
-        remarks=(*messages_on_board(fitted, tolerances, denied), *remarks),
+        remarks=(*remarks, *moved),
     )
+
+
+def _covariance(fitted: BoardFit, tolerances: BoardTolerances) -> FloatArray:
+    """Return the covariance of the place of the second camera, (6, 6), rad and mm.
+
+    What each view changes, its leverage corrected for, as in
+    `lightpen.intrinsics.effects`; then the intrinsics, as they move the place, and the
+    scale of the board.
+    """
+    cameras, first = fitted.state.cameras, fitted.of_places.start
+    n = fitted.of_places.stop - first
+    information = fitted.information[:, first:, first:]
+    variance = max(fitted.sigma, FINEST) ** 2
+    C = np.linalg.inv(information.sum(axis=0) + variance * fitted.prior[first:, first:])
+    changes = []
+    for own, score in zip(information, fitted.scores[:, first:], strict=True):
+        held_out = np.linalg.solve(np.eye(len(C)) - own @ C, score)
+        changes.append(C[:n] @ (0.5 * (score + held_out)))
+    found, expected = np.array(changes).T @ np.array(changes), variance * C[:n, :n]
+    scale = max(float(np.trace(np.linalg.solve(expected, found))) / n, 1.0)
+    n_views = len(changes)
+    covariance = (n_views * found + n * scale * expected) / (n_views + n)
+    by_intrinsics = -C[:n] @ fitted.information[:, first:, :first].sum(axis=0)
+    for c, camera in enumerate(cameras):
+        if camera.covariance is not None:
+            own = by_intrinsics[:, fitted.of_intrinsics(c)]
+            covariance = covariance + own @ camera.covariance @ own.T
+    shift = fitted.state.translations[1]
+    covariance[3:, 3:] += tolerances.scale**2 * np.outer(shift, shift)
+    return np.asarray(0.5 * (covariance + covariance.T))
 
 
 def _require_fit(views: Views, camera: Camera, name: str) -> None:
     """Raise `CalibrationError` if views do not fit their camera's file at any poses."""
     poses, shape = start_board_poses(camera, views), np.zeros(N_SHAPE)
     state = BoardState((camera,), np.eye(3)[None], np.zeros((1, 3)), poses, shape)
-    rms = float(np.sqrt(np.nanmean(np.square(fit_board_poses(views, state)))))
+    rms = fit_board_poses(views, state).rms
     if rms > USELESS * max(camera.image_size):
         raise CalibrationError("pair.other-lens", camera=name, rms=rms)
 
@@ -241,29 +194,6 @@ def _as_alone(views: Views, alone: tuple[CameraCalibration, ...]) -> Views:
         kept = [rows[name] for name in each.views.names]
         pixels[kept, c] = each.views.pixels[:, 0]
     return replace(views, pixels=pixels)
-
-
-def _rig(
-    effects: MixedFit,
-    names: tuple[str, str],
-    tolerances: BoardTolerances,
-    alone: tuple[CameraCalibration, ...],
-) -> Rig:
-    fitted = effects.adjustment
-    state, at = fitted.state, fitted.of_places
-    covariance = fitted.covariance[at, at].copy()
-    shift = state.translations[1]
-    covariance[3:, 3:] += tolerances.scale**2 * np.outer(shift, shift)
-    cameras = []
-    for c, (camera, field) in enumerate(
-        zip(state.cameras, effects.fields, strict=True)
-    ):
-        own = fitted.of_intrinsics(c)
-        known = fitted.covariance[own, own]
-        camera = replace(camera, covariance=known, lens_field=field)
-        change = alone[c].change if alone else None
-        cameras.append(camera if change is None else changed_camera(camera, change))
-    return Rig(tuple(cameras), state.rotations, state.translations, covariance, names)
 
 
 def _between(poses: tuple[BoardPoses, BoardPoses]) -> BoardPoses:
@@ -327,67 +257,14 @@ def _alike(
     return np.asarray((turns < ALIKE_TURN) & (apart < ALIKE_SHIFT * far))
 
 
-def _poses(views: Views, cameras: tuple[Camera, ...], place: BoardPoses) -> BoardPoses:
-    """Return the poses in the rig, by the second camera where the first saw nothing."""
-    first = start_board_poses(cameras[0], views)
-    second = start_board_poses(cameras[1], views, 1)
-    R, t = place.rotations[0], place.translations[0]
-    missing = np.isnan(first.translations[:, 0])
-    return BoardPoses(
-        np.where(missing[:, None, None], R.T @ second.rotations, first.rotations),
-        np.where(missing[:, None], (second.translations - t) @ R, first.translations),
-    )
-
-
-def _lag(
-    views: Views, fitted: BoardFit, both: BoolArray, interval_ms: float | None
-) -> PairLag | None:
-    """Return the time lag of the second camera from the motion of the board.
-
-    Its offset from the first camera is proportional to the velocity of the board.
-    """
-    state = fitted.state
-    first = start_board_poses(state.cameras[0], views)
-    points = fitted.board_points
-    in_first = points @ np.swapaxes(first.rotations, 1, 2)
-    in_first += first.translations[:, None]
-    in_second = in_first @ state.rotations[1].T + state.translations[1]
-    pixels = np.full_like(views.pixels[:, 1], np.nan)
-    pixels[both] = state.cameras[1].project(in_second[both])
-    middle = both[1:-1] & both[2:] & both[:-2]
-    if not middle.any():
-        return None
-    seen = _means(views.pixels[:, 1])
-    off = _means(views.pixels[:, 1] - pixels)[1:-1][middle].ravel()
-    speed = (0.5 * (seen[2:] - seen[:-2]))[middle].ravel()
-    power = float(speed @ speed)
-    if power < (SIGMAS * fitted.sigma / LEAST_LAG) ** 2:
-        return None
-    lag = float(speed @ off) / power
-    left = off - lag * speed
-    sigma = float(np.sqrt(left @ left / max(len(left) - 1, 1) / power))
-    depth = float(np.median(state.poses.translations[:, 2]))
-    return PairLag(
-        lag, sigma, interval_ms, PEN_SPEED / 1000 * state.cameras[0].fx / depth
-    )
-
-
-def _means(pixels: FloatArray) -> FloatArray:
-    """Return the means of the points of each view, (V, 2); NaN without any."""
-    counts = np.isfinite(pixels).sum(axis=1)
-    return np.asarray(np.nansum(pixels, axis=1) / np.where(counts > 0, counts, np.nan))
-
-
-def _message_on_moved(views: Views, fitted: BoardFit, usual: float) -> Message | None:
+def _message_on_moved(fitted: BoardFit, usual: float) -> tuple[Message, ...]:
     """Return the message on views in which the cameras disagree.
 
     ``usual`` are the residuals of a camera alone, px rms.
     """
-    both = np.all(views.found, axis=1)
-    rms = np.nanmax(fitted.view_rms[both], axis=1)
+    rms = np.nanmax(fitted.view_rms, axis=1)
     n_apart = int(np.sum(rms > APART * usual))
     if n_apart == 0:
-        return None
-    return message(
-        "pair.moved", n_views=n_apart, n_pairs=int(both.sum()), rms=float(rms.max())
-    )
+        return ()
+    largest = float(rms.max())
+    return (message("pair.moved", n_views=n_apart, n_pairs=len(rms), rms=largest),)

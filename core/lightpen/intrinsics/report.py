@@ -15,13 +15,22 @@ from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
-from lightpen.intrinsics.variance_components import MixedFit
 from lightpen.intrinsics.views import BoardTolerances
+from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
 
 COLUMNS, ROWS = 4, 3
+PINHOLE = ("fx", "fy", "cx", "cy")
+SHAPE_NAMES = (
+    "stretch",
+    "shear",
+    "bend_along_rows_mm",
+    "bend_across_mm",
+    "bend_along_columns_mm",
+)
+TITLE = 13  # characters
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,45 +64,25 @@ def measure_regions(fitted: BoardFit, camera: Camera) -> Regions:
     return Regions(n_points, np.sqrt(squares / counts), sums / counts[..., None])
 
 
-PINHOLE = ("fx", "fy", "cx", "cy")
-SHAPE_NAMES = (
-    "stretch",
-    "shear",
-    "bend_along_rows_mm",
-    "bend_across_mm",
-    "bend_along_columns_mm",
-)
-N_WORST = 5
-TITLE = 13  # characters
-
-
 def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> str:
     """Return the calibration of a camera as text for the screen."""
     camera, fitted = calibration.camera, calibration.adjustment
     assert camera.covariance is not None
     u = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
     uncertain = map_uncertainty(camera, camera.covariance)
-    coverage = cover(calibration.views, fitted.state.poses)
+    n_found = observed.views.n_views
     lines = [f"{'Intrinsics':<{TITLE}}{'':>18}{'U (k = 2)':>14}"]
+    names = (*PINHOLE, *camera.distortion_names)
     lines += [
         f"  {name:<{TITLE - 2}}{value:>18.6g}{of:>14.2g}"
-        for name, value, of in zip(
-            (*PINHOLE, *camera.distortion_names),
-            camera.intrinsics.tolist(),
-            u.tolist(),
-            strict=False,
-        )
+        for name, value, of in zip(names, camera.intrinsics, u, strict=False)
     ]
     lines += [
         "",
         f"{'Views':<{TITLE}}{calibration.views.n_views} used, the board found in "
-        f"{observed.views.n_views} of "
-        f"{observed.views.n_views + len(observed.unseen)} images",
+        f"{n_found} of {n_found + len(observed.unseen)} images",
+        *_left_out_lines(calibration.left_out, "they fit no other"),
     ]
-    if calibration.left_out:
-        lines.append(
-            f"  left out   {', '.join(calibration.left_out)}: they fit no other"
-        )
     if calibration.n_points_left_out:
         lines.append(f"  points     {calibration.n_points_left_out} left out")
     lines += [
@@ -103,17 +92,10 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
         f"{'Projection':<{TITLE}}standard uncertainty {uncertain.center:.4f} px in the "
         f"middle, {uncertain.typical:.4f} px over the image, {uncertain.worst:.4f} px "
         "at worst",
-        f"{'Coverage':<{TITLE}}{coverage.share:.0%} of the image, tilts "
-        f"{np.degrees(coverage.tilts.min()):.0f} to "
-        f"{np.degrees(coverage.tilts.max()):.0f} degrees",
-        *(f"  missing    {each}" for each in coverage.missing),
-        *_halves_lines(calibration),
-        *_board_lines(fitted),
+        *_coverage_lines(calibration),
+        _board_line(fitted),
+        *_remark_lines(calibration.remarks),
     ]
-    lines += _effects_lines(calibration.effects)
-    lines += ["", _region_lines(fitted, camera), "", *_worst_lines(calibration)]
-    if calibration.remarks:
-        lines += ["", *map(str, calibration.remarks)]
     return "\n".join(lines)
 
 
@@ -121,16 +103,14 @@ def intrinsics_record(
     calibration: CameraCalibration, unseen: Sequence[str], tolerances: BoardTolerances
 ) -> dict[str, Any]:
     """Return the calibration as a record; ``unseen`` names images without the board."""
-    camera, fitted, views = (
-        calibration.camera,
-        calibration.adjustment,
-        calibration.views,
-    )
+    camera, fitted = calibration.camera, calibration.adjustment
+    views, found = calibration.views, calibration.effects.components
     assert camera.covariance is not None
     uncertain = map_uncertainty(camera, camera.covariance)
-    regions, halves = measure_regions(fitted, camera), calibration.halves
+    regions = measure_regions(fitted, camera)
     coverage = cover(views, fitted.state.poses)
     next_view = choose_next_view(fitted, views.board)
+    field = calibration.effects.field
     return {
         "kind": "intrinsics",
         "board": views.board.name,
@@ -140,7 +120,10 @@ def intrinsics_record(
         "noise_px": fitted.sigma,
         "held_out_rms_px": calibration.held_out_rms,
         "distortion_choice": choice_record(calibration.choice),
-        "effects": _effects_record(calibration.effects),
+        "board_points_in_plane_mm": found.in_plane,
+        "board_points_out_of_plane_mm": found.out_of_plane,
+        "lens_field": field
+        and {"amplitude_px": field.amplitude, "length_px": field.length},
         "projection_uncertainty": {
             "middle_px": uncertain.center,
             "rms_px": uncertain.typical,
@@ -152,13 +135,6 @@ def intrinsics_record(
             "points": regions.n_points,
             "rms_px": regions.rms,
             "mean_px": regions.means,
-        },
-        "halves": halves
-        and {
-            "difference_px": halves.difference,
-            "expanded_uncertainty_px": halves.expanded_uncertainty,
-            "in_image_px": halves.in_image,
-            "detectable_zoom": halves.detectable_zoom,
         },
         "board_found": _board_record(fitted),
         "coverage": {
@@ -172,7 +148,7 @@ def intrinsics_record(
             {
                 "name": name,
                 "rms_px": fitted.view_rms[v, 0],
-                "held_out_rms_px": calibration.held_out[v],
+                "held_out_rms_px": calibration.effects.held_out[v],
                 "tilt_deg": float(np.degrees(coverage.tilts[v])),
                 "size_px": coverage.sizes[v],
                 "points": np.flatnonzero(views.seen[v, 0]),
@@ -204,26 +180,19 @@ def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
         "",
         f"{'Baseline':<{TITLE}}{calibration.baseline:.3f} mm, U = "
         f"{COVERAGE_FACTOR * calibration.baseline_sigma:.3f} mm",
-        f"{'Views':<{TITLE}}{calibration.n_pairs} of both cameras, "
-        f"{calibration.views.n_views} used of {observed.views.n_views}",
+        f"{'Views':<{TITLE}}{calibration.n_pairs} of both cameras used, of "
+        f"{observed.views.n_views}",
         f"{'Residuals':<{TITLE}}{fitted.rms:.4f} px rms",
+        *_left_out_lines(calibration.left_out, "of one camera, or the cameras differ"),
     ]
-    if calibration.left_out:
-        lines.append(
-            f"  left out   {', '.join(calibration.left_out)}: the cameras do not agree"
-        )
-    lines += _effects_lines(calibration.effects)
     for name, camera in zip(rig.names, rig.cameras, strict=True):
-        assert camera.covariance is not None
-        of = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
-        lines.append(
-            f"{name[: TITLE - 1]:<{TITLE}}fx {camera.fx:.2f} \u00b1 {of[0]:.2f}, fy "
-            f"{camera.fy:.2f} \u00b1 {of[1]:.2f}, cx {camera.cx:.2f} \u00b1 "
-            f"{of[2]:.2f}, cy {camera.cy:.2f} \u00b1 {of[3]:.2f} px"
-        )
-    lines += _board_lines(fitted)
-    if calibration.remarks:
-        lines += ["", *map(str, calibration.remarks)]
+        four = zip(PINHOLE, camera.intrinsics.tolist(), strict=False)
+        values = [f"{n} {value:.2f}" for n, value in four]
+        if camera.covariance is not None:
+            of = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
+            values = [f"{v} \u00b1 {b:.2f}" for v, b in zip(values, of, strict=False)]
+        lines.append(f"{name[: TITLE - 1]:<{TITLE}}{', '.join(values)} px")
+    lines += [_board_line(fitted), *_remark_lines(calibration.remarks)]
     return "\n".join(lines)
 
 
@@ -231,7 +200,7 @@ def pair_record(
     calibration: PairCalibration, observed: ObservedBoard, tolerances: BoardTolerances
 ) -> dict[str, Any]:
     """Return the calibration of two cameras as a record."""
-    rig, fitted, lag = calibration.rig, calibration.adjustment, calibration.lag
+    rig, fitted = calibration.rig, calibration.adjustment
     return {
         "kind": "extrinsics",
         "board": calibration.views.board.name,
@@ -249,20 +218,8 @@ def pair_record(
         ),
         "rms_px": fitted.rms,
         "noise_px": fitted.sigma,
-        "effects": _effects_record(calibration.effects),
         "views_of_both": calibration.n_pairs,
         "board_found": _board_record(fitted),
-        "lag": (
-            None
-            if lag is None
-            else {
-                "in_views": lag.views,
-                "standard_uncertainty": lag.sigma,
-                "ms": lag.lag_ms,
-                "px_per_ms_at_100_mm_per_s": lag.px_per_ms,
-                "significant": lag.is_significant,
-            }
-        ),
         "views": [
             {"name": name, "rms_px": rms}
             for name, rms in zip(calibration.views.names, fitted.view_rms, strict=True)
@@ -277,115 +234,46 @@ def _row(title: str, values: FloatArray) -> str:
     return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)
 
 
-def _halves_lines(calibration: CameraCalibration) -> list[str]:
-    halves = calibration.halves
-    if halves is None:
-        return []
-    differences = ", ".join(
-        f"{name} {value:+.2f} \u00b1 {u:.2f}"
-        for name, value, u in zip(
-            PINHOLE,
-            halves.difference.tolist(),
-            halves.expanded_uncertainty.tolist(),
-            strict=False,
-        )
-    )
+def _left_out_lines(names: tuple[str, ...], why: str) -> list[str]:
+    return [f"  left out   {', '.join(names)}: {why}"] if names else []
+
+
+def _coverage_lines(calibration: CameraCalibration) -> list[str]:
+    coverage = cover(calibration.views, calibration.adjustment.state.poses)
+    least, most = np.degrees([coverage.tilts.min(), coverage.tilts.max()])
     return [
-        f"{'Halves':<{TITLE}}{differences} px; {halves.in_image:.3f} px in the image",
-        f"{'Zoom':<{TITLE}}a change of {halves.detectable_zoom:.2%} after half of the "
-        "views would be found",
+        f"{'Coverage':<{TITLE}}{coverage.share:.0%} of the image, tilts {least:.0f} to "
+        f"{most:.0f} degrees",
+        *(f"  missing    {each}" for each in coverage.missing),
     ]
 
 
-def _board_lines(fitted: BoardFit) -> list[str]:
+def _board_line(fitted: BoardFit) -> str:
     stretch, shear, *bends = fitted.state.shape.tolist()
-    return [
+    return (
         f"{'Board':<{TITLE}}stretched by {1e6 * stretch:+.0f} ppm, sheared by "
         f"{1e6 * shear:+.0f} ppm, bent by "
         + " ".join(f"{bend:+.3f}" for bend in bends)
         + " mm"
-    ]
+    )
 
 
-def _region_lines(fitted: BoardFit, camera: Camera) -> str:
-    regions = measure_regions(fitted, camera)
-    lines = ["Residuals by region of the image: px rms (mean u, mean v)"]
-    for rms, mean, n_points in zip(
-        regions.rms, regions.means, regions.n_points, strict=True
-    ):
-        lines.append(
-            "".join(
-                f"  {r:.3f} ({u:+.3f} {v:+.3f})" if n else f"  {'-':^22}"
-                for r, (u, v), n in zip(rms, mean, n_points, strict=True)
-            )
-        )
-    return "\n".join(lines)
-
-
-def _worst_lines(calibration: CameraCalibration) -> list[str]:
-    rms = calibration.adjustment.view_rms[:, 0]
-    return [
-        "Worst views, px rms (by the others)",
-        *(
-            f"  {calibration.views.names[v]:<28}{rms[v]:8.4f} "
-            f"({calibration.held_out[v]:.4f})"
-            for v in calibration.worst_first[:N_WORST]
-        ),
-    ]
-
-
-def _effects_lines(effects: MixedFit) -> list[str]:
-    found, is_pair = effects.components, len(effects.fields) > 1
-    lines = [
-        f"{'Effects':<{TITLE}}noise {found.noise:.4f} px, smooth error of a view "
-        f"{found.view:.4f} px, points of the board {found.in_plane:.4f} mm in plane "
-        f"and {found.out_of_plane:.4f} mm out of plane, its rows and columns "
-        f"{found.lines:.4f} mm"
-        + (f", motion between the exposures {found.between:.4f} px" if is_pair else "")
-    ]
-    lines += [
-        f"{'Lens field':<{TITLE}}amplitude {field.amplitude:.4f} px, correlation "
-        f"length {field.length:.0f} px"
-        for field in effects.fields
-        if field is not None
-    ]
-    return lines
-
-
-def _effects_record(effects: MixedFit) -> dict[str, Any]:
-    found = effects.components
-    return {
-        "noise_px": found.noise,
-        "view_px": found.view,
-        "between_exposures_px": found.between if len(effects.fields) > 1 else None,
-        "board_in_plane_mm": found.in_plane,
-        "board_out_of_plane_mm": found.out_of_plane,
-        "board_lines_mm": found.lines,
-        "lens_fields": [
-            field and {"amplitude_px": field.amplitude, "length_px": field.length}
-            for field in effects.fields
-        ],
-        "lens_field_log_likelihood_gain": 0.5 * effects.field_gain,
-        "clustering_by_view": effects.clustering,
-    }
+def _remark_lines(remarks: tuple[Message, ...]) -> list[str]:
+    return ["", *map(str, remarks)] if remarks else []
 
 
 def _camera_record(camera: Camera) -> dict[str, Any]:
-    assert camera.covariance is not None
     names = (*PINHOLE, *camera.distortion_names)
-    return {
+    record = {
         "image_size": camera.image_size,
         "lens_model": camera.lens.value,
         "intrinsics": dict(zip(names, camera.intrinsics.tolist(), strict=True)),
-        "expanded_uncertainty": dict(
-            zip(
-                names,
-                (COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))).tolist(),
-                strict=False,
-            )
-        ),
         "covariance": camera.covariance,
     }
+    if camera.covariance is not None:
+        u = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
+        record["expanded_uncertainty"] = dict(zip(names, u.tolist(), strict=False))
+    return record
 
 
 def _tolerances_record(tolerances: BoardTolerances) -> dict[str, float]:

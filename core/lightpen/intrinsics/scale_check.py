@@ -1,4 +1,4 @@
-"""Scale of a board, by a caliper on a print or by the pixel pitch of a screen."""
+"""Scale of a board, by a caliper on its print."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,6 @@ from lightpen.intrinsics.boards import Board
 from lightpen.messages import printable
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
-PIXEL = 1.0  # length of a screen that its pixel pitch measures
 LARGEST_U = 0.05  # of the length
 FARTHEST = 0.1  # of the stated length: more is another unit or a slip, no printer
 
@@ -22,7 +21,7 @@ class ScaleCheck:
     the length, or a print is far from what was stated.
     """
 
-    stated: float  # as the description of the board has it: mm, or pixels of a screen
+    stated: float  # as the description of the board has it, mm
     measured: float  # mm
     expanded_uncertainty: float  # U (k = 2), mm
 
@@ -37,7 +36,7 @@ class ScaleCheck:
                 u=self.expanded_uncertainty,
             )
         off = abs(self.measured - self.stated)
-        if self.stated != PIXEL and off > FARTHEST * self.stated:
+        if off > FARTHEST * self.stated:
             raise UsageError(
                 "board.scale-check-far", stated=self.stated, measured=self.measured
             )
@@ -48,26 +47,16 @@ class ScaleCheck:
         return self.expanded_uncertainty / COVERAGE_FACTOR / self.measured
 
     @classmethod
-    def of_pixels(cls, pitch: float, expanded_uncertainty: float) -> "ScaleCheck":
-        """Return the check of a screen by its pixel pitch and U, mm."""
-        return cls(PIXEL, pitch, expanded_uncertainty)
-
-    @classmethod
     def parse(cls, text: str) -> "ScaleCheck":
-        """Return the check of a text: stated, measured, U; or pixel pitch, U.
+        """Return the check of a text: stated, measured, U, mm.
 
-        Raises `UsageError` if it is neither.
+        Raises `UsageError` if it is none.
         """
         try:
-            values = [float(word) for word in text.replace(";", " ").split()]
-        except ValueError:
-            values = []
-        match values:
-            case [stated, measured, u]:
-                return cls(stated, measured, u)
-            case [pitch, u]:
-                return cls.of_pixels(pitch, u)
-        raise UsageError("board.scale-check-form", text=printable(text))
+            stated, measured, u = map(float, text.replace(";", " ").split())
+        except ValueError as error:
+            raise UsageError("board.scale-check-form", text=printable(text)) from error
+        return cls(stated, measured, u)
 
     def scaled(self, board: Board) -> Board:
         """Return the board with its lengths as they were measured, mm."""

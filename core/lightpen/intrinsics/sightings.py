@@ -14,6 +14,7 @@ References
    distinct points, corners and centres of circular features", ISPRS 1987.
 """
 
+from functools import partial
 from itertools import product
 from threading import Lock
 from typing import Any
@@ -24,15 +25,9 @@ import numpy.typing as npt
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.edge_fit import fit_edge
-from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
+from lightpen.intrinsics.boards import Board, BoardKind, marker_dictionary
 from lightpen.intrinsics.corner_fit import fit_corners
-from lightpen.intrinsics.squares import (
-    CornerCount,
-    count_from,
-    goes_on,
-    is_chequered,
-    is_first_dark,
-)
+from lightpen.intrinsics.squares import is_chequered, is_first_dark
 
 PARTS = (5, 4), (3, 3)  # of a chessboard, that grow
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
@@ -80,8 +75,6 @@ def find_points(
         points = _chessboard(grey, (board.columns, board.rows), quick=quick)
         if points is not None:
             points = _numbered(grey, _from_front(points, board), board)
-        if points is not None and goes_on(grey, _grid_of(points, board)):
-            return None  # it is a part of a larger board
     if points is None or not _is_spread(points, board):
         return None
     refined = _refined(image, points, board)
@@ -123,28 +116,30 @@ def _numbered(
     """
     if (board.columns + board.rows) % 2 == 0:
         return points
-    is_first = is_first_dark(grey, _grid_of(points, board))
+    grid = points.reshape(board.rows, board.columns, 2)
+    is_first = is_first_dark(grey, grid)
     return points if is_first else points[::-1]
 
 
-def count_corners(image: Image) -> CornerCount | None:
-    """Return the number of inner corners of a chessboard; None without one."""
+def count_corners(image: Image) -> tuple[int, int] | None:
+    """Return the inner corners along both sides of a chessboard, the larger first.
+
+    None without one, or where the image may cut it.
+    """
     grey = _to_8_bit(image)
     flags = THOROUGH | cv2.CALIB_CB_LARGER
-    sides = sorted({min(side, max(grey.shape)) for side in (SEARCHED_SMALL, SEARCHED)})
-    for side, corners in product(sides, PARTS):
-        small, _ = _smaller(grey, side)
+    sizes = sorted({min(side, max(grey.shape)) for side in (SEARCHED_SMALL, SEARCHED)})
+    for longer, corners in product(sizes, PARTS):
+        small, _ = _smaller(grey, longer)
         found, points, meta = cv2.findChessboardCornersSBWithMeta(small, corners, flags)
-        if found:
-            rows, columns = meta.shape[:2]
-            grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
-            if is_chequered(small, grid):
-                return count_from(small, grid)
+        if found and _is_board(small, points, meta.shape[::-1]):
+            grid = points.reshape(*meta.shape[:2], 2)
+            sides = map(partial(np.rot90, grid), range(4))
+            rim = np.concatenate([2 * side[0] - side[1] for side in sides])
+            is_whole = np.all((rim > 0) & (rim < np.array(small.shape[::-1])))
+            fewer, more = sorted(meta.shape[:2])
+            return (more, fewer) if is_whole else None
     return None
-
-
-def _grid_of(points: FloatArray, board: Board) -> FloatArray:
-    return points.reshape(board.rows, board.columns, 2)
 
 
 def for_search(image: Image) -> Image:
@@ -250,29 +245,17 @@ def _n_seen(points: FloatArray | None) -> int:
 
 
 def _by_markers(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:
-    points = np.full((board.n_points, 2), np.nan)
-    size, dictionary = (board.columns, board.rows), marker_dictionary(board)
-    if board.kind is BoardKind.MARKERS:
-        own = cv2.aruco.GridBoard(size, board.pitch, board.detail, dictionary)
-        parameters = cv2.aruco.DetectorParameters()
-        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        detector = cv2.aruco.ArucoDetector(dictionary, parameters)
-        corners, numbers, rejected = detector.detectMarkers(grey)
-        corners, numbers, *_ = detector.refineDetectedMarkers(
-            grey, own, corners, numbers, rejected
-        )
-        if numbers is None:
-            return None
-        for corner, number in zip(corners, numbers.ravel().tolist(), strict=True):
-            if number < board.columns * board.rows:
-                at = CORNERS * number
-                points[at : at + CORNERS] = corner.reshape(CORNERS, 2)
-        return points
-    charuco = cv2.aruco.CharucoBoard(size, board.pitch, board.detail, dictionary)
-    charuco.setLegacyPattern(board.kind is BoardKind.LEGACY_CHARUCO)
-    found, numbers, *_ = cv2.aruco.CharucoDetector(charuco).detectBoard(grey)
+    size = (board.columns, board.rows)
+    charuco = cv2.aruco.CharucoBoard(
+        size, board.pitch, board.detail, marker_dictionary(board)
+    )
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.detectInvertedMarker = True  # of a board in white on black
+    detector = cv2.aruco.CharucoDetector(charuco, detectorParams=parameters)
+    found, numbers, *_ = detector.detectBoard(grey)
     if numbers is None or found is None:
         return None
+    points = np.full((board.n_points, 2), np.nan)
     points[numbers.ravel()] = np.asarray(found).reshape(-1, 2)
     return points
 
@@ -280,7 +263,7 @@ def _by_markers(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:
 def _refined(image: Image, points: FloatArray, board: Board) -> FloatArray:
     """Return corners placed by the gradients round them."""
     reach = REFINED * _least_distance(points, board)
-    if board.kind.has_markers and board.kind is not BoardKind.MARKERS:
+    if board.kind.has_markers:
         to_marker = 0.5 * (1 - board.detail / board.pitch)
         reach = min(reach, reach * to_marker / REFINED)
     half = int(np.clip(round(reach), MIN_REFINED, MAX_REFINED))
@@ -301,7 +284,7 @@ def _refined(image: Image, points: FloatArray, board: Board) -> FloatArray:
         REFINING,
     )
     corners = moved[:, 0].astype(np.float64)
-    if board.kind is not BoardKind.MARKERS and half > LEAST_FITTED:
+    if half > LEAST_FITTED:
         edges = _edges_at(corners, board.points[inside, :2] / board.pitch)
         corners = fit_corners(image, corners, edges, half)
     refined[inside] = corners

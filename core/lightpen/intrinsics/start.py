@@ -23,6 +23,7 @@ from lightpen.model.fisheye import N_COEFFICIENTS
 USUAL_FOCAL_LENGTH = 1.5  # of the longer side of the image, where the views show none
 FISHEYE_FOCALS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)  # of the longer side
 STRAIGHTER = 0.5  # times the bend of rows by a pinhole
+STRAIGHT = 0.002  # of the longer side: the bend of rows before a usual lens
 FARTHEST = np.tan(np.radians(75.0))  # in the normalised plane, for a first pose
 MIN_POINTS = 6
 SOME = 8  # views that show a fisheye
@@ -47,9 +48,11 @@ def start_camera(views: Views, n_coefficients: int) -> Camera:
     straighter with it.
     """
     pinhole = _start_pinhole(views, n_coefficients)
+    bend = _bend(pinhole, views)
+    if bend < STRAIGHT * max(views.image_sizes[0]):
+        return pinhole
     fisheye = _start_fisheye(views)
-    is_straighter = _bend(fisheye, views) < STRAIGHTER * _bend(pinhole, views)
-    return fisheye if is_straighter else pinhole
+    return fisheye if _bend(fisheye, views) < STRAIGHTER * bend else pinhole
 
 
 def _start_fisheye(views: Views) -> Camera:

@@ -176,41 +176,27 @@ def _light(board: Board, places: FloatArray) -> FloatArray:
     """Return the brightness of the board at places on it."""
     if board.kind.is_circles:
         return _circles_light(board, places)
-    is_squares = board.kind is not BoardKind.MARKERS
     extra = 0 if board.kind.has_markers else 1
     columns, rows = board.columns + extra, board.rows + extra
-    step = board.pitch if is_squares else board.pitch + board.detail
-    width = columns * step - (0 if is_squares else board.detail)
-    height = rows * step - (0 if is_squares else board.detail)
+    step = board.pitch
+    width, height = columns * step, rows * step
     x, y = places[..., 0] + 0.5 * width, places[..., 1] + 0.5 * height
-    margin = WHITE_MARGIN * board.pitch
+    margin = WHITE_MARGIN * step
     on_sheet = (
         (x > -margin) & (x < width + margin) & (y > -margin) & (y < height + margin)
     )
-    column, row = np.floor(x / step).astype(int), np.floor(y / step).astype(int)
-    on_board = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    first = int(board.kind is BoardKind.LEGACY_CHARUCO and rows % 2 == 0)
-    white = np.ones(x.shape)
-    if is_squares:
-        squares = _squares(x / step, y / step, first)
-        edge = np.minimum(
-            _soft(np.minimum(x, width - x)), _soft(np.minimum(y, height - y))
-        )
-        white = 1 - edge * (1 - squares)
+    edge = np.minimum(_soft(np.minimum(x, width - x)), _soft(np.minimum(y, height - y)))
+    white = 1 - edge * (1 - _squares(x / step, y / step))
     if board.kind.has_markers:
-        marked = on_board & ((row + column) % 2 != first if is_squares else True)
-        side = board.detail if is_squares else board.pitch
-        gap = 0.5 * (board.pitch - board.detail) if is_squares else 0.0
-        numbers = (
-            _numbers(columns, rows, first)
-            if is_squares
-            else np.arange(columns * rows).reshape(rows, columns)
-        )
+        column, row = np.floor(x / step).astype(int), np.floor(y / step).astype(int)
+        on_board = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        marked = on_board & ((row + column) % 2 != 0)
+        gap = 0.5 * (step - board.detail)
         white[marked] *= _markers_white(
             board,
-            numbers[row[marked], column[marked]],
-            (x[marked] - column[marked] * step - gap) / side,
-            (y[marked] - row[marked] * step - gap) / side,
+            _numbers(columns, rows)[row[marked], column[marked]],
+            (x[marked] - column[marked] * step - gap) / board.detail,
+            (y[marked] - row[marked] * step - gap) / board.detail,
         )
     return np.asarray(np.where(on_sheet, BLACK + (WHITE - BLACK) * white, BEHIND))
 
@@ -225,11 +211,10 @@ def _soft(depth: FloatArray) -> FloatArray:
     return np.asarray(np.clip(0.5 + depth / width, 0, 1))
 
 
-def _squares(x: FloatArray, y: FloatArray, first: int) -> FloatArray:
+def _squares(x: FloatArray, y: FloatArray) -> FloatArray:
     """Return the brightness of a chessboard with squares of side 1, 0 to 1."""
     across, down = (2 * _soft(_wave(each)) - 1 for each in (x, y))
-    sign = 1 if first == 1 else -1
-    return np.asarray(0.5 + 0.5 * sign * across * down)
+    return np.asarray(0.5 - 0.5 * across * down)
 
 
 def _wave(x: FloatArray) -> FloatArray:
@@ -238,10 +223,10 @@ def _wave(x: FloatArray) -> FloatArray:
     return np.asarray((x - nearest) * np.where(nearest % 2 == 0, 1, -1))
 
 
-def _numbers(columns: int, rows: int, first: int) -> IntArray:
+def _numbers(columns: int, rows: int) -> IntArray:
     """Return the numbers of the markers in white squares, row by row."""
     row, column = np.mgrid[:rows, :columns]
-    white = (row + column) % 2 != first
+    white = (row + column) % 2 != 0
     return np.asarray(np.where(white, np.cumsum(white).reshape(white.shape) - 1, 0))
 
 

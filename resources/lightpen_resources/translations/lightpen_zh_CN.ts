@@ -229,10 +229,6 @@
         <translation>棋盘格</translation>
     </message>
     <message>
-        <source>Markers</source>
-        <translation>标记</translation>
-    </message>
-    <message>
         <source>Circles</source>
         <translation>圆点</translation>
     </message>
@@ -247,10 +243,6 @@
     <message>
         <source>Marker</source>
         <translation>标记</translation>
-    </message>
-    <message>
-        <source>Gap</source>
-        <translation>间隙</translation>
     </message>
     <message>
         <source>Distance</source>
@@ -367,8 +359,8 @@
         <translation>200 200.12 0.04 (mm)</translation>
     </message>
     <message>
-        <source>Measured with a caliper: stated length, measured length and its U (k = 2) in mm. Screen: pixel pitch and its U in mm; the board is then in pixels. The scale does not affect the intrinsics of one camera.</source>
-        <translation>用卡尺测量：标称长度、实测长度及其 U (k = 2)，单位 mm。屏幕：像素间距及其 U，单位 mm；此时标定板以像素为单位。比例不影响单台相机的内参。</translation>
+        <source>Measured with a caliper: stated length, measured length and its U (k = 2) in mm. The scale does not affect the intrinsics of one camera.</source>
+        <translation>用卡尺测量：标称长度、实测长度及其 U (k = 2)，单位 mm。比例不影响单台相机的内参。</translation>
     </message>
     <message>
         <source>From a folder...</source>
@@ -5776,10 +5768,6 @@ mm</translation>
         <translation>1 个数</translation>
     </message>
     <message>
-        <source>4 distortion coefficients (without k3, which a Kalibr file does not hold). Cross-validated error: {held_out:.4f} px.</source>
-        <translation>4 个畸变系数（不含 Kalibr 文件不能保存的 k3）。交叉验证误差：{held_out:.4f} px。</translation>
-    </message>
-    <message>
         <source>5 distortion coefficients are enough: they predict views that were left out to {held_out:.4f} px ({others}).</source>
         <translation>5 个畸变系数已足够：它们对留出视图的预测误差为 {held_out:.4f} px（{others}）。</translation>
     </message>
@@ -5958,6 +5946,10 @@ mm</translation>
     <message>
         <source>Enter the name of the supervisor.</source>
         <translation>请输入主管的姓名。</translation>
+    </message>
+    <message>
+        <source>5 distortion coefficients: no more would predict views better. Cross-validated error: {held_out:.4f} px.</source>
+        <translation>5 个畸变系数：更多系数不会更好地预测视图。交叉验证误差：{held_out:.4f} px。</translation>
     </message>
     <message>
         <source>Entries after entry {after} without a timestamp: {n}.</source>
@@ -6238,6 +6230,10 @@ mm</translation>
     <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
         <translation>{waited:.1f} s 内没有收到图像。请检查相机。</translation>
+    </message>
+    <message>
+        <source>No image shows a chessboard of {columns} x {rows} inner corners; the images show {seen_columns} x {seen_rows}. Count the inner corners of the whole board again.</source>
+        <translation>没有图像显示内角点为 {columns} x {rows} 的棋盘格；图像显示的是 {seen_columns} x {seen_rows}。请重新数整块标定板的内角点。</translation>
     </message>
     <message>
         <source>No length is given: all lengths are in hundredths of the largest distance between two LEDs.</source>
@@ -6628,14 +6624,6 @@ mm</translation>
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
     </message>
     <message>
-        <source>The cameras are not synchronised: {camera} lags by {lag:.1f} ± {u:.1f} ms (k = 2), an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.</source>
-        <translation>两台相机不同步：{camera} 滞后 {lag:.1f} ± {u:.1f} ms (k = 2)，光笔速度为 100 mm/s 时误差为 {px:.2f} px。请用同一信号触发两台相机。</translation>
-    </message>
-    <message>
-        <source>The cameras are not synchronised: {camera} lags by {lag:.2f} ± {u:.2f} view intervals (k = 2). Each millisecond is an error of {px:.2f} px at a pen speed of 100 mm/s. Trigger both cameras by one signal.</source>
-        <translation>两台相机不同步：{camera} 滞后 {lag:.2f} ± {u:.2f} 个视图间隔 (k = 2)。光笔速度为 100 mm/s 时，每毫秒误差为 {px:.2f} px。请用同一信号触发两台相机。</translation>
-    </message>
-    <message>
         <source>The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
         <translation>锥孔间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
     </message>
@@ -6842,10 +6830,6 @@ mm</translation>
     <message>
         <source>Verifies the tip: had it an error of {detectable:.4f} mm or more, this verification would show it (probability 95 %).</source>
         <translation>测头已验证：若测头误差达到 {detectable:.4f} mm 或更大，本次验证会显示出来（概率 95 %）。</translation>
-    </message>
-    <message>
-        <source>Zoom or focus changed at {name}: {before}; {after}. Mainly the focal lengths differ, so a change of the setting is likelier than another camera. Lock zoom and focus, and take all views again.</source>
-        <translation>从 {name} 起变焦或对焦发生了变化：{before}；{after}。主要是焦距不同，因此设置改变比换了相机更有可能。请锁定变焦和对焦，重新拍摄所有视图。</translation>
     </message>
     <message>
         <source>a Digital Calibration Certificate in the schema of PTB; it names the laboratory</source>
@@ -7094,10 +7078,6 @@ mm</translation>
     <message>
         <source>{name} begins with {start} and has no named values. Check that this is the right file.</source>
         <translation>{name} 以 {start} 开头，其中没有命名的值。请检查是否选对了文件。</translation>
-    </message>
-    <message>
-        <source>{name} cannot be written in the form of Kalibr: its model radtan has only k1 k2 p1 p2, and this camera has more coefficients. Write it in the form of OpenCV.</source>
-        <translation>{name} 无法以 Kalibr 形式写出：其 radtan 模型只有 k1 k2 p1 p2，而此相机有更多系数。请以 OpenCV 形式写出。</translation>
     </message>
     <message>
         <source>{name} contains more than one YAML document. Keep one of them.</source>
@@ -7360,10 +7340,6 @@ mm</translation>
         <translation>这些视图无法确定相机：它们过于相似。请增加标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
     </message>
     <message>
-        <source>The views fit only if the board {board} is bent by {bend:.0f} mm, which is implausible. Check the number and size of its squares, and that all images are from one camera with one setting.</source>
-        <translation>只有标定板 {board} 弯曲 {bend:.0f} mm 时视图才相符，这不合理。请检查方格的数量和尺寸，以及所有图像是否来自同一相机、同一设置。</translation>
-    </message>
-    <message>
         <source>The {what} {path} does not exist. Check the name and the folder.</source>
         <translation>{what} {path} 不存在。请检查名称和文件夹。</translation>
     </message>
@@ -7550,6 +7526,14 @@ mm</translation>
     <message>
         <source>the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen</source>
         <translation>光笔的方向 ({x:.2f}, {y:.2f}, {z:.2f})</translation>
+    </message>
+    <message>
+        <source>The camera, zoom or focus changed at {name}: {before}; {after}. Lock zoom and focus, and take all views again.</source>
+        <translation>相机、变焦或对焦在 {name} 处改变：{before}；{after}。请锁定变焦和对焦，并重新拍摄所有视图。</translation>
+    </message>
+    <message>
+        <source>The images are from two cameras, or were taken with two settings of zoom or focus: {one}; {other}. Use images of one camera with one setting.</source>
+        <translation>图像来自两台相机，或以两种变焦或对焦设置拍摄：{one}；{other}。请使用同一相机、同一设置的图像。</translation>
     </message>
     <message>
         <source>the disk is full. Free some space, or write to another disk.</source>
@@ -7744,6 +7728,10 @@ mm</translation>
         <translation>{reason} {n_images} 幅</translation>
     </message>
     <message>
+        <source>{n_named} of {n_views} views ({names}) differ from the others by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed.</source>
+        <translation>{n_views} 个视图中有 {n_named} 个（{names}）与其余视图在整幅图像上相差 {px:.2f} px（fx {fx:+.2f}、cx {cx:+.2f}、cy {cy:+.2f} px），超出偶然范围。请检查变焦、对焦或安装是否改变。</translation>
+    </message>
+    <message>
         <source>{n_others} lights move together, but not with the pen: there is a second pen, or a mirror, or the zoom changed. Remove or cover it, lock the zoom, and repeat the swing.</source>
         <translation>有 {n_others} 个光点一起移动，但不随光笔移动：可能有第二支光笔或反射镜，或者变焦已改变。请将其移走或遮住，锁定变焦，然后重新摆动。</translation>
     </message>
@@ -7858,10 +7846,6 @@ mm</translation>
     <message>
         <source>0 0 0 is not a direction. Enter the stylus axis from the ball into the pen, in the pen frame, such as 0 1 0.</source>
         <translation>0 0 0 不是方向。请给出测杆轴线在光笔坐标系中由测球指向光笔的方向，例如 0 1 0。</translation>
-    </message>
-    <message>
-        <source>5 distortion coefficients: the views do not determine 8. Cross-validated error: {held_out:.4f} px.</source>
-        <translation>采用 5 个畸变系数：这些视图不足以确定 8 个系数。交叉验证误差：{held_out:.4f} px。</translation>
     </message>
     <message>
         <source>A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.</source>
@@ -8058,10 +8042,6 @@ mm</translation>
     <message>
         <source>Entry {number} of chain {chain} was modified.</source>
         <translation>链 {chain} 的第 {number} 个条目被更改。</translation>
-    </message>
-    <message>
-        <source>Every second view differs from the others by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check that all images are from one camera with one setting.</source>
-        <translation>每隔一幅的图像与其余图像在像面上相差 {px:.2f} px（fx {fx:+.2f}、cx {cx:+.2f}、cy {cy:+.2f} px），超出偶然范围。请检查所有图像是否来自同一台相机且设置相同。</translation>
     </message>
     <message>
         <source>Expansion</source>
@@ -8406,18 +8386,6 @@ mm</translation>
     <message>
         <source>No image from camera {serial} for {waited:.1f} s. Check cable and trigger.</source>
         <translation>相机 {serial} 已有 {waited:.1f} s 没有送来图像。请检查线缆和触发。</translation>
-    </message>
-    <message>
-        <source>No image shows a chessboard of {columns} x {rows} inner corners; the images show {seen_columns} x {seen_rows} of a larger one. Count the inner corners of the whole board again.</source>
-        <translation>没有图像显示有 {columns} x {rows} 个内角点的棋盘格，而是显示了一个更大棋盘格的一部分，其中可见 {seen_columns} x {seen_rows} 个内角点。请重新数整个标定板的内角点。</translation>
-    </message>
-    <message>
-        <source>No image shows a chessboard of {columns} x {rows} inner corners; the images show {seen_columns} x {seen_rows}. Count the inner corners again.</source>
-        <translation>图像中没有 {columns} x {rows} 内角点的棋盘格，看到的是 {seen_columns} x {seen_rows}。请重新数内角点。</translation>
-    </message>
-    <message>
-        <source>No image shows the board {board}; the images show {other}, the layout of OpenCV up to 4.6. Specify that board.</source>
-        <translation>图像中没有标定板 {board}，看到的是 {other}：OpenCV 4.6 及更早版本的排布不同。请指定该标定板。</translation>
     </message>
     <message>
         <source>No image shows the board {board}; the images show {other}, with columns and rows swapped. Specify that board.</source>
@@ -8924,10 +8892,6 @@ mm</translation>
         <translation>坐标系无法确定：LED 1-4 的连线与 LED 5-10 的平面和列不平行，或相距太近。</translation>
     </message>
     <message>
-        <source>The images are from two cameras: {one}; {other}. Not only the focal lengths differ, so two cameras are likelier than a change of zoom or focus. Calibrate each camera with its own images. If there is only one, check that no image is rotated by 180°.</source>
-        <translation>图像来自两台相机：{one}；{other}。不仅焦距不同，因此是两台相机比变焦或对焦改变更有可能。请用各自的图像标定每台相机。如果只有一台相机，请检查是否有图像旋转了 180°。</translation>
-    </message>
-    <message>
         <source>The images are {time}; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
         <translation>图像{time}；结果已修正，其余部分计入 U。请用同一信号触发全部相机。</translation>
     </message>
@@ -8966,10 +8930,6 @@ mm</translation>
     <message>
         <source>The images show the board {board} mirrored. Turn off mirroring of the camera, or print the board again.</source>
         <translation>图像中的标定板 {board} 是镜像的。请关闭相机的镜像功能，或重新打印标定板。</translation>
-    </message>
-    <message>
-        <source>The images were taken with two settings of zoom or focus: {one}; {other}. Mainly the focal lengths differ, so two settings of one camera are likelier than two cameras. Use images with one setting, none of them rotated by 180°.</source>
-        <translation>图像是在两种变焦或对焦设置下拍摄的：{one}；{other}。主要是焦距不同，因此是一台相机的两种设置比两台相机更有可能。请使用同一设置下的图像，且没有图像旋转了 180°。</translation>
     </message>
     <message>
         <source>The intrinsics_covariance of {name} is not a covariance matrix: it must be symmetric, with correlations from -1 to 1. Correct or remove it.</source>
@@ -9446,10 +9406,6 @@ mm</translation>
     <message>
         <source>The views do not cover the image corners, where the estimated distortion would fold the image. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Add views with the board in each corner, or keep the pen out of the corners.</source>
         <translation>视图未覆盖图像四角，由其得出的畸变会使图像在那里折叠。已将 {coefficients} 减小到恰好不折叠；四角为外推值。请补充标定板位于各角的视图，或不要让光笔进入四角。</translation>
-    </message>
-    <message>
-        <source>The views from {name} on differ from those before by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed there.</source>
-        <translation>从 {name} 起的视图与之前的视图在图像上相差 {px:.2f} px（fx {fx:+.2f}，cx {cx:+.2f}，cy {cy:+.2f} px），超出偶然误差。请检查变焦、对焦或支架是否在那里发生了变化。</translation>
     </message>
     <message>
         <source>The {kind} {id} expired on {due}. Send it for inspection.</source>
@@ -10108,6 +10064,10 @@ mm</translation>
         <translation>{reason} {power}</translation>
     </message>
     <message>
+        <source>{text} is not a scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04.</source>
+        <translation>{text} 不是比例检查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04。</translation>
+    </message>
+    <message>
         <source>{time} early</source>
         <translation>提前 {time}</translation>
     </message>
@@ -10188,10 +10148,6 @@ mm</translation>
         <translation>{text} 不是标定板。请按如下形式命名：{forms}；长度单位为 mm。</translation>
     </message>
     <message>
-        <source>{text} is not a scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04; for a screen the pixel pitch and its U, such as 0.2331 0.0002.</source>
-        <translation>{text} 不是比例核查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04；屏幕则输入像素间距及其 U，例如 0.2331 0.0002。</translation>
-    </message>
-    <message>
         <source>{touch} is {distance:.2f} mm from the other points: the pen was lifted or slipped. Probe that posture again.</source>
         <translation>{touch} 与其他各点相距 {distance:.2f} mm：光笔曾抬起或滑动。请在该姿态下重新触测。</translation>
     </message>
@@ -10222,10 +10178,6 @@ mm</translation>
     <message>
         <source>The archive contains entries of chain {chain}, but not the chain itself.</source>
         <translation>存档含有链 {chain} 的条目，但没有该链本身。</translation>
-    </message>
-    <message>
-        <source>The columns of pixels are not perpendicular to the rows, by {degrees:.2f}°: the images were sheared by software, an interlaced source, or a rolling shutter before a moving board. Use unprocessed images of a board at rest.</source>
-        <translation>像素列与行不垂直，相差 {degrees:.2f}°：图像因软件、隔行信号或卷帘快门拍摄运动标定板而剪切变形。请使用静止标定板的未处理图像。</translation>
     </message>
     <message>
         <source>The cone is complete: this point does not count. Continue with the next artefact.</source>

@@ -79,6 +79,6 @@ def test_a_lens_is_drawn_towards_a_plain_one_where_it_would_fold_the_corners(
     found = station.discovered()
     require_lens(found.camera)
     assert found.lens_choice is not None
-    assert found.lens_choice.draws_in
+    assert found.lens_choice.pull is not None
     assert any("k3" in str(each) for each in remarks_of(found))
     assert (np.abs(errors_of(found, station).tip) < found.expanded_uncertainty).all()

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.camera_file_writing import CameraForm, write_camera
+from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import LensField
@@ -418,8 +418,7 @@ def test_a_flaw_of_a_chain_is_named(
         read_camera(saved(tmp_path, KALIBR.replace(old, new, 1)))
 
 
-@pytest.mark.parametrize("form", [*CameraForm])
-def test_a_fisheye_is_read_back_as_written(tmp_path: Path, form: CameraForm) -> None:
+def test_a_fisheye_is_read_back_as_written(tmp_path: Path) -> None:
     camera = Camera(
         *(1280, 800, 380.0, 381.0, 645.0, 396.0),
         distortion=np.array([-0.02, 0.01, -0.006, 0.001]),
@@ -427,7 +426,7 @@ def test_a_fisheye_is_read_back_as_written(tmp_path: Path, form: CameraForm) -> 
         serial="7",
         lens=LensModel.KANNALA_BRANDT,
     )
-    write_camera(camera, tmp_path / "camera.yaml", form)
+    write_camera(camera, tmp_path / "camera.yaml")
     found = read_camera(tmp_path / "camera.yaml")
 
     assert found.lens is LensModel.KANNALA_BRANDT
@@ -436,27 +435,6 @@ def test_a_fisheye_is_read_back_as_written(tmp_path: Path, form: CameraForm) -> 
     assert found.covariance is not None
     np.testing.assert_array_equal(found.covariance, camera.covariance)
     assert (found.image_size, found.serial) == (camera.image_size, "7")
-
-
-def test_a_pinhole_camera_is_read_back_from_the_form_of_kalibr(tmp_path: Path) -> None:
-    camera = Camera(
-        *(640, 480, 900.0, 899.0, 320.0, 240.0),
-        distortion=np.array([-0.1, 0.05, 1e-3, 2e-3, 0.0]),
-    )
-    write_camera(camera, tmp_path / "camera.yaml", CameraForm.KALIBR)
-
-    found = read_camera(tmp_path / "camera.yaml")
-    np.testing.assert_array_equal(found.intrinsics, camera.intrinsics)
-
-
-def test_what_kalibr_has_no_coefficient_for_is_not_written_so(tmp_path: Path) -> None:
-    camera = Camera(
-        *(640, 480, 900.0, 899.0, 320.0, 240.0),
-        distortion=np.array([-0.1, 0.05, 1e-3, 2e-3, 0.3]),
-    )
-
-    with pytest.raises(UsageError, match="Kalibr"):
-        write_camera(camera, tmp_path / "camera.yaml", CameraForm.KALIBR)
 
 
 def test_an_equidistant_file_of_ros_needs_four_coefficients(tmp_path: Path) -> None:
@@ -719,15 +697,14 @@ def cameras(draw: st.DrawFn) -> Camera:
     )
 
 
-@pytest.mark.parametrize("form", list(CameraForm))
 @pytest.mark.parametrize("covariance", [None, np.diag(np.arange(1.0, 10.0))])
 def test_what_was_known_of_a_camera_found_from_images_is_read_back(
-    tmp_path: Path, form: CameraForm, covariance: np.ndarray | None
+    tmp_path: Path, covariance: np.ndarray | None
 ) -> None:
     marks = np.array([[1.25, 2.5], [1000.125, 2000.0]])
     known = FoundCamera(marks, camera().intrinsics + 0.5, covariance)
     plain = np.append(DISTORTION[:4], 0.0)
-    write_camera(camera(distortion=plain, found=known), tmp_path / "cam.yaml", form)
+    write_camera(camera(distortion=plain, found=known), tmp_path / "cam.yaml")
 
     read = read_camera(tmp_path / "cam.yaml").found
 

@@ -9,16 +9,11 @@ from benchmarks import board_trials
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics import alternatives, calibration
+from lightpen.intrinsics.board_fit import board_points
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
-from lightpen.intrinsics.camera_change import find_change
-from lightpen.intrinsics.distortion import fit_camera
-from lightpen.intrinsics.variance_components import fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
-from lightpen.messages import Message
 from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
 from lightpen.simulator.boards import simulate_board_poses
 
 MakeViews = Callable[..., Views]
@@ -27,14 +22,6 @@ SLOWLY = np.linspace(0.0, 0.01, 20)  # zoom
 OTHER = Camera(
     *(640, 480, 870.0, 869.0, 310.0, 251.0),
     distortion=np.array([-0.15, 0.1, -5e-4, 3e-4, 0.0]),
-)
-ONE = Camera(
-    *(640, 360, 700.0, 699.7, 325.2, 174.3),
-    distortion=np.array([-0.12, 0.08, 3e-4, -2e-4, 0.02]),
-)
-TWO = Camera(
-    *(640, 360, 730.0, 729.2, 312.2, 186.3),
-    distortion=np.array([-0.16, 0.1, -3e-4, 2e-4, 0.0]),
 )
 
 
@@ -100,6 +87,10 @@ def test_one_pose_alone_is_refused_as_such(make_views: MakeViews) -> None:
         calibrated(replace(views, pixels=rest))
 
 
+def codes(found: CameraCalibration) -> set[str]:
+    return {remark.code for remark in found.remarks}
+
+
 @pytest.mark.slow
 def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
     make_views: MakeViews, camera: Camera
@@ -112,22 +103,6 @@ def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
 
 
 @pytest.mark.slow
-def test_the_least_zoom_that_is_said_to_be_found_is(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    before = make_views(n_views=20)
-    halves = calibrated(before).halves
-    assert halves is not None
-    assert halves.detectable_zoom < 0.005
-    for times, is_found in ((1.2, True), (0.2, False)):
-        other = zoomed(camera, 1 + times * halves.detectable_zoom)
-        after = make_views(n_views=20, of=other)
-        views = merged(before, after, np.arange(20) >= 10)
-        fit = fit_effects(views, fit_camera(views, BoardTolerances(), camera))
-        assert (find_change(fit, views.names) is not None) == is_found
-
-
-@pytest.mark.slow
 def test_a_small_change_is_a_finding_that_the_uncertainty_holds(
     make_views: MakeViews, camera: Camera
 ) -> None:
@@ -135,23 +110,9 @@ def test_a_small_change_is_a_finding_that_the_uncertainty_holds(
     after = make_views(n_views=24, of=replace(camera, cx=camera.cx + 3.0))
     found = calibrated(merged(before, after, np.arange(24) >= 12))
 
-    assert {each.code for each in found.remarks} & {
-        "intrinsics.step",
-        "intrinsics.drift",
-    }
+    assert codes(found) & {"intrinsics.apart", "intrinsics.drift"}
     # It may be as before or as after.
     assert expanded(found)[2] > 0.8 * 3.0
-
-
-@pytest.mark.slow
-def test_halves_that_differ_are_a_finding(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    odd = np.arange(24) % 2 == 1
-    other = make_views(n_views=24, of=zoomed(camera, 1.0015))
-    found = calibrated(merged(make_views(n_views=24), other, odd))
-
-    assert [each.code for each in found.remarks] == ["intrinsics.halves"]
 
 
 @pytest.mark.slow
@@ -161,68 +122,41 @@ def test_an_unchanged_camera_is_not_said_to_have_changed(make_views: MakeViews) 
 
 
 @pytest.mark.slow
-def test_two_cameras_in_one_set_are_named_as_such(make_views: MakeViews) -> None:
-    odd = np.arange(20) % 3 == 1
-    mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), odd)
+@pytest.mark.parametrize("which", [np.arange(20) % 3 == 1, np.arange(20) >= 10])
+def test_two_cameras_in_one_set_are_named_as_such(
+    make_views: MakeViews, which: BoolArray
+) -> None:
+    mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), which)
 
-    with pytest.raises(CalibrationError, match="from two cameras") as caught:
+    with pytest.raises(CalibrationError) as caught:
         calibrated(mixed)
     said = str(caught.value)
-    assert "13 views (view_01.png, view_03.png, view_04.png" in said
-    assert "7 views (view_02.png, view_05.png, view_08.png" in said
+    first = tuple(np.array(mixed.names)[which])[:3]
+    assert f"{which.sum()} views ({', '.join(first)}" in said
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [3, 77])
-def test_each_image_of_two_cameras_is_named_with_its_own(seed: int) -> None:
-    board, rng = parse_board("chessboard:8x6:20"), np.random.default_rng(seed)
-    poses = simulate_board_poses(ONE, board, 20, rng)
-    points = board.points @ np.swapaxes(poses.rotations, 1, 2)
-    points += poses.translations[:, None]
-    is_other = np.arange(20) % 3 == 0
-    pixels = np.where(is_other[:, None, None], TWO.project(points), ONE.project(points))
-    pixels += rng.normal(0, 0.005, pixels.shape)
-    names = tuple(f"{v:02}" for v in range(20))
-
-    with pytest.raises(CalibrationError, match="from two cameras") as caught:
-        calibrated(Views(board, names, pixels[:, None], (ONE.image_size,)))
-    one = caught.value.message.values["one"]
-    assert isinstance(one, Message)
-    assert one.values["names"] == "00, 03, 06, 09, 12, 15 ..."
-
-
-@pytest.mark.slow
-def test_two_cameras_one_after_the_other_are_not_taken_for_a_zoom(
-    make_views: MakeViews,
-) -> None:
-    after = np.arange(20) >= 10
-    mixed = merged(make_views(n_views=20), make_views(n_views=20, of=OTHER), after)
-
-    with pytest.raises(CalibrationError, match="from two cameras") as caught:
-        calibrated(mixed)
-    assert "10 views (view_11.png, view_12.png" in str(caught.value)
-
-
-@pytest.mark.slow
-def test_two_settings_in_turns_are_not_taken_for_two_cameras(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    odd = np.arange(20) % 3 == 1
-    other = make_views(n_views=20, of=zoomed(camera, 1.02))
-
-    with pytest.raises(CalibrationError, match="two settings of zoom or focus"):
-        calibrated(merged(make_views(n_views=20), other, odd))
-
-
-@pytest.mark.slow
-def test_a_small_zoom_in_turns_is_refused(
-    make_views: MakeViews, camera: Camera
+@pytest.mark.parametrize("zoom", [1.015, 1.03])
+def test_two_settings_in_turns_are_refused(
+    make_views: MakeViews, camera: Camera, zoom: float
 ) -> None:
     odd = np.arange(24) % 2 == 1
-    other = make_views(n_views=24, of=zoomed(camera, 1.004))
+    other = make_views(n_views=24, of=zoomed(camera, zoom))
 
     with pytest.raises(CalibrationError, match="two settings of zoom or focus"):
         calibrated(merged(make_views(n_views=24), other, odd))
+
+
+@pytest.mark.slow
+def test_three_views_of_another_setting_refuse_no_set(
+    make_views: MakeViews, camera: Camera
+) -> None:
+    which = np.arange(20) < 3
+    other = make_views(n_views=20, of=zoomed(camera, 1.01))
+    found = calibrated(merged(make_views(n_views=20), other, which))
+
+    off = np.abs(found.camera.intrinsics - camera.intrinsics)
+    assert np.all(off[:4] < 1.5 * expanded(found)[:4])
 
 
 @pytest.mark.slow
@@ -230,92 +164,40 @@ def test_a_drift_is_refused(make_views: MakeViews, camera: Camera) -> None:
     shots = [make_views(n_views=20, of=zoomed(camera, 1 + by)).pixels for by in SLOWLY]
     pixels = np.stack([shot[v] for v, shot in enumerate(shots)])
 
-    with pytest.raises(CalibrationError, match="drifts during the set"):
+    with pytest.raises(CalibrationError, match="drifts during the set|changed at"):
         calibrated(replace(make_views(n_views=20), pixels=pixels))
 
 
 @pytest.mark.parametrize("uneven", [pytest.param(0.0, marks=pytest.mark.slow), 0.2])
-def test_rotated_images_are_named_also_with_uneven_squares(
+def test_three_rotated_images_are_named_and_left_out(
     make_views: MakeViews, camera: Camera, uneven: float
 ) -> None:
     off_centre = replace(camera, cx=332.0, cy=230.0)
-    views = make_views(n_views=14, of=off_centre, uneven=uneven)
-    pixels = views.pixels.copy()
-    pixels[[2, 5, 9]] = np.array([639, 479]) - pixels[[2, 5, 9]]
+    found = calibrated(
+        with_rotated(make_views(n_views=14, of=off_centre, uneven=uneven), [2, 5, 9])
+    )
 
-    with pytest.raises(CalibrationError, match="rotated by 180") as caught:
-        calibrated(replace(views, pixels=pixels))
-    names = caught.value.message.values["names"]
-    assert names == "view_03.png, view_06.png, view_10.png"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("cx", "said"),
-    [
-        (313.0, "3 of 14 images are rotated by 180"),
-        (318.0, "check that no image is rotated by 180"),  # near the middle, 319.5
-    ],
-)
-def test_a_lens_field_does_not_hide_that_images_may_be_rotated(
-    make_views: MakeViews, camera: Camera, cx: float, said: str
-) -> None:
-    off_centre = replace(camera, cx=cx, cy=cx - 81.0)
-    views = make_views(n_views=14, noise=0.015, of=off_centre)
-    field = LensField.of(640, 480, 0.15, 180.0)
-    root = np.linalg.cholesky(field.covariance + 1e-9 * np.eye(len(field.nodes)))
-    drawn = np.random.default_rng(3).normal(size=field.values.shape)
-    pixels = views.pixels + replace(field, values=root @ drawn).at(views.pixels)
-    pixels[[2, 5, 9]] = np.array([639, 479]) - pixels[[2, 5, 9]]
-
-    with pytest.raises(CalibrationError, match=said):
-        calibrated(replace(views, pixels=pixels))
+    (remark,) = (each for each in found.remarks if each.code == "intrinsics.turned")
+    assert remark.values["names"] == "view_03.png, view_06.png, view_10.png"
+    off = np.abs(found.camera.intrinsics - off_centre.intrinsics)
+    assert np.all(off[:4] < 1.5 * expanded(found)[:4])
 
 
 @pytest.mark.slow
-def test_sheared_images_are_not_taken_for_a_sheared_board(
-    make_views: MakeViews,
+def test_a_set_with_many_rotated_images_is_refused(
+    make_views: MakeViews, camera: Camera
 ) -> None:
-    with pytest.raises(CalibrationError, match="not perpendicular") as caught:
-        calibrated(sheared(make_views(n_views=20), 0.003))
-    degrees = caught.value.message.values["degrees"]
-    assert isinstance(degrees, float)
-    assert np.radians(degrees) == pytest.approx(0.003, abs=BoardTolerances().squareness)
+    off_centre = replace(camera, cx=332.0, cy=230.0)
+    views = make_views(n_views=14, of=off_centre)
+
+    with pytest.raises(CalibrationError, match="of 14 images are rotated by 180"):
+        calibrated(with_rotated(views, [1, 2, 5, 9, 12]))
 
 
-def sheared(views: Views, slope: float) -> Views:
+def with_rotated(views: Views, which: list[int]) -> Views:
     pixels = views.pixels.copy()
-    pixels[..., 0] += slope * (pixels[..., 1] - 240)
+    pixels[which] = np.array(views.image_sizes[0]) - 1.0 - pixels[which]
     return replace(views, pixels=pixels)
-
-
-def test_no_image_is_called_rotated_for_less_than_a_lens_may_do(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    views = sheared(make_views(n_views=8, noise=0.004), 0.0008)
-    fitted = fit_camera(views, BoardTolerances(), camera)
-
-    assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
-
-
-@pytest.mark.slow
-def test_a_skew_that_a_lens_may_have_is_not_blamed(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    views = sheared(make_views(n_views=16), 0.0024)
-    fitted = fit_camera(views, BoardTolerances(), camera)
-
-    assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
-
-
-def test_all_views_may_be_tried_as_rotated(
-    make_views: MakeViews, camera: Camera, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(alternatives, "ENOUGH", 1.5)  # each seems worth it
-    views = make_views(n_views=8)
-    fitted = fit_camera(views, BoardTolerances(), camera)
-
-    assert alternatives.explain(views, BoardTolerances(), fitted, None) is None
 
 
 @pytest.mark.slow
@@ -326,82 +208,42 @@ def test_a_board_in_another_unit_is_questioned(make_views: MakeViews) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bend", [(12.0, 0, 8.0), (25.0, 0, 0), (0, 25.0, 0)])
-def test_a_board_bent_as_none_is_refused(
-    make_views: MakeViews, bend: tuple[float, float, float]
+@pytest.mark.parametrize("bend", [(0.3, 0.0, 0.0), (1.0, 0.5, 0.0), (5.0, 0.0, 5.0)])
+def test_a_bowed_or_curled_board_is_calibrated_with(
+    make_views: MakeViews, camera: Camera, bend: tuple[float, float, float]
 ) -> None:
-    with pytest.raises(CalibrationError, match="bent by"):
-        calibrated(make_views(shape=np.array([0, 0, *bend])))
+    found = calibrated(make_views(shape=np.array([0, 0, *bend]), n_views=20))
+
+    off = np.abs(found.camera.intrinsics - camera.intrinsics)
+    assert np.all(off[:4] < 1.5 * expanded(found)[:4])
+    assert codes(found) <= {"intrinsics.board-bent"}
 
 
-def before_a_field(
-    seed: int, amplitude: float, other: Camera = board_trials.CAMERA
-) -> tuple[Views, BoolArray]:
-    """Return views before a lens with a field, some of another camera, and which."""
-    camera, board = board_trials.CAMERA, parse_board(board_trials.BOARD)
+def as_photographed(seed: int) -> Views:
+    """Return views by a webcam of a bowed board, with errors that each view shares.
+
+    The lens has a field beside Brown's model, three views are near and tilted.
+    """
+    camera, board = board_trials.CAMERAS["640x480"], parse_board(board_trials.BOARD)
     rng = np.random.default_rng([board_trials.STREAM, 5, seed])
-    n_views = int(rng.integers(*board_trials.N_VIEWS, endpoint=True))
+    n_views = int(rng.integers(10, 30))
     poses = simulate_board_poses(camera, board, n_views, rng)
+    poses.translations[:3, 2] *= 0.8
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(board_trials, "FIELD", (amplitude, amplitude))
+        patch.setattr(board_trials, "FIELD", (0.0, 0.3))
+        patch.setattr(board_trials, "SMOOTH", (0.0, 0.1))
+        patch.setattr(board_trials, "NOISE", (0.03, 0.15))
         field = board_trials.draw_field(rng, camera)
-    true = board.points.copy()
-    true[:, :2] += board_trials.draw_uneven(board, rng)
-    noise = int(rng.integers(1 << 30))
-    pixels = [
-        board_trials.observe_points(
-            each, board, true, poses, field, np.random.default_rng(noise)
-        )
-        for each in (camera, other)
-    ]
-    is_other = np.random.default_rng([4, seed]).permutation(n_views) < n_views // 2
-    mixed = np.where(is_other[:, None, None], pixels[1], pixels[0])
+        bend = rng.normal(0, rng.uniform(0.0, 0.7), 3)
+        true = board_points(board, np.r_[0.0, 0.0, bend])
+        true[:, :2] += board_trials.draw_uneven(board, rng)
+        pixels = board_trials.observe_points(camera, board, true, poses, field, rng)
     names = tuple(map(str, range(n_views)))
-    return Views(board, names, mixed[:, None], (camera.image_size,)), is_other
+    return Views(board, names, pixels[:, None], (camera.image_size,))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 3])
-def test_a_correct_set_before_a_lens_with_a_large_field_is_accepted(seed: int) -> None:
-    views, _ = before_a_field(seed, 0.25)
-
-    assert calibrated(views).change is None
-
-
-@pytest.mark.parametrize(
-    ("seed", "length"),
-    [pytest.param(1, (0.15, 0.5), marks=pytest.mark.slow), (3, (0.5, 0.5))],
-)
-def test_a_lens_field_alone_is_no_reason_to_search_for_alternatives(
-    monkeypatch: pytest.MonkeyPatch, seed: int, length: tuple[float, float]
-) -> None:
-    monkeypatch.setattr(board_trials, "LENGTH", length)
-    monkeypatch.setattr(board_trials, "NOISE", (0.01, 0.01))
-    monkeypatch.setattr(board_trials, "SMOOTH", (0.0, 0.0))
-    monkeypatch.setattr(calibration, "explain", lambda *_, **__: pytest.fail("slow"))
-    found = calibrated(before_a_field(seed, 0.25)[0])
-
-    assert found.effects.components.lenses[0] > 10 * found.effects.components.noise
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 12])  # taken for rotated images, and accepted
-def test_two_cameras_behind_a_lens_field_are_found(seed: int) -> None:
-    other = replace(board_trials.CAMERA, fx=575.0, fy=574.2, cx=197.3, cy=152.1)
-    views, is_other = before_a_field(seed, 0.08, other)
-
-    with pytest.raises(CalibrationError, match=r"two (cameras|settings)") as caught:
-        calibrated(views)
-    one = caught.value.message.values["one"]
-    assert isinstance(one, Message)
-    n_first = one.values["n_views"]
-    assert min(abs(n_first - n) for n in (is_other.sum(), (~is_other).sum())) <= 1
-
-
-@pytest.mark.slow
-def test_a_lens_field_beside_little_noise_is_not_blamed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(board_trials, "NOISE", (0.003, 0.008))
-
-    assert isinstance(board_trials.run_trial(8, rendered=False), board_trials.Trial)
+def test_no_set_as_photographed_is_said_to_be_of_two_settings() -> None:
+    for seed in range(6):
+        found = calibrated(as_photographed(seed))
+        assert not codes(found) & {"intrinsics.apart", "intrinsics.drift"}

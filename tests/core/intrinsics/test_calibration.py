@@ -18,11 +18,11 @@ from lightpen.intrinsics.calibration import (
 )
 from lightpen.intrinsics.coverage import cover
 from lightpen.intrinsics.distortion import PULLS, choose_distortion, fit_camera
+from lightpen.intrinsics.effects import MixedFit, fit_effects
 from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.report import measure_regions
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
-from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 
@@ -56,7 +56,7 @@ def test_five_coefficients_are_kept_where_eight_gain_nothing(
     found: CameraCalibration,
 ) -> None:
     assert found.choice.n_coefficients == 5
-    assert "5 distortion coefficients are enough" in str(found.choice.message)
+    assert "no more would predict views better" in str(found.choice.message)
 
 
 @pytest.mark.slow
@@ -69,30 +69,22 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
     )
     views, tolerances = make_views(of=lens, n_views=24), BoardTolerances()
     fitted = fit_camera(views, tolerances, start_camera(views, 5))
-    choice, *_ = choose_distortion(views, tolerances, fitted, lambda fraction: None)
+    choice, _ = choose_distortion(views, tolerances, fitted, lambda fraction: None)
 
     assert choice.n_coefficients == 8
     assert "they reduce the cross-validated error" in str(choice.message)
 
 
 @pytest.mark.slow
-def test_a_lens_that_the_views_leave_open_is_refused(make_views: MakeViews) -> None:
+def test_a_lens_that_the_views_leave_open_is_a_finding(make_views: MakeViews) -> None:
     """The corners, which no view reaches, are extrapolated by a rational function."""
     lens = Camera(
         *(640, 480, 420.0, 420.0, 320.0, 240.0),
         distortion=np.array([1.2, 0.6, 2e-3, -1e-3, 0.05, 1.6, 1.1, 0.35]),
     )
 
-    with pytest.raises(CalibrationError, match="projection is uncertain by"):
-        calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
-
-
-def test_halves_agree_within_what_their_difference_may_be(
-    found: CameraCalibration,
-) -> None:
-    assert found.halves is not None
-    ratio = found.halves.difference / found.halves.expanded_uncertainty
-    assert np.abs(ratio).max() < 2
+    found = calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
+    assert "intrinsics.uncertain" in {remark.code for remark in found.remarks}
 
 
 def test_views_left_out_are_met_nearly_as_well_as_those_fitted(
@@ -152,7 +144,7 @@ def test_too_few_views_are_refused(make_views: MakeViews) -> None:
         calibrate_camera(make_views(n_views=MIN_VIEWS - 1), BoardTolerances())
 
 
-def test_views_that_are_alike_are_refused(make_views: MakeViews) -> None:
+def test_views_that_are_alike_are_refused_or_a_finding(make_views: MakeViews) -> None:
     views = make_views(n_views=8)
     rng = np.random.default_rng(2)
     one = np.repeat(views.pixels[:1], 8, axis=0)

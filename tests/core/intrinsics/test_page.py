@@ -16,8 +16,6 @@ SCALE = 3  # px/mm
 WORDS = (
     "chessboard:8x5:20",
     "charuco:7x5:20:15:DICT_5X5_100",
-    "charuco-legacy:7x6:20:15:DICT_5X5_100",
-    "markers:4x3:30:6:DICT_4X4_50",
     "circles:7x5:20:12",
     "asymmetric-circles:4x9:15:14",
 )

@@ -8,14 +8,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import adjust_board
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.boards import parse_board
-from lightpen.intrinsics.distortion import fit_camera
-from lightpen.intrinsics.effects import design_of
 from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
-from lightpen.intrinsics.start import start_board_poses
-from lightpen.intrinsics.variance_components import MixedFit, fit_effects
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
@@ -92,7 +86,7 @@ def test_the_scale_of_the_board_is_part_of_the_baseline(camera: Camera) -> None:
 
 
 @pytest.mark.slow
-def test_views_of_the_second_camera_alone_are_used(camera: Camera) -> None:
+def test_views_of_one_camera_alone_say_nothing_of_the_place(camera: Camera) -> None:
     turn = rotation_from_vector(np.array([0.0, -1.0, 0.0]))
     middle = np.array([20.0, 0.0, 400.0])
     views = both_see(camera, turn=turn, shift=middle - turn @ middle)
@@ -103,7 +97,7 @@ def test_views_of_the_second_camera_alone_are_used(camera: Camera) -> None:
         replace(views, pixels=pixels), BoardTolerances(), NAMES, (known, known)
     )
 
-    assert (found.n_pairs, found.views.n_views) == (9, 14)
+    assert found.n_pairs == 9
     np.testing.assert_allclose(found.rig.rotations[1], turn, atol=1e-3)
     assert np.sqrt(np.nanmean(found.adjustment.view_rms**2)) < 2 * NOISE
 
@@ -152,79 +146,18 @@ def test_a_file_of_another_lens_is_refused_with_its_camera(
 
 
 @pytest.mark.slow
-def test_cameras_out_of_step_are_reported_with_what_that_costs(camera: Camera) -> None:
-    found = calibrate_pair(
-        both_see(camera, late=0.04), BoardTolerances(), NAMES, (), 500.0
-    )
-
-    assert found.lag is not None
-    assert found.lag.lag_ms == pytest.approx(20, abs=8)
-    assert "pair.late-by" in [remark.code for remark in found.remarks]
-
-
-@pytest.mark.slow
-def test_the_board_is_judged_by_both_cameras_together(camera: Camera) -> None:
-    found = calibrate_pair(both_see(camera, stretch=0.01), BoardTolerances(), NAMES)
-
-    (remark,) = found.remarks
-    assert str(remark).startswith("The board does not match")
-    assert remark.values["stretch"] == pytest.approx(0.01, abs=1e-3)
-
-
-def adjusted_by_both(views: Views, camera: Camera) -> BoardFit:
-    """Return the joint fit without effects, from where the cameras are."""
-    state = BoardState(
-        (camera, camera),
-        np.stack([np.eye(3), TURN]),
-        np.stack([np.zeros(3), SHIFT]),
-        start_board_poses(camera, views),
-        np.zeros(N_SHAPE),
-    )
-    return adjust_board(views, state, BoardTolerances())
-
-
-def fitted_by_both(views: Views, camera: Camera) -> MixedFit:
-    return fit_effects(views, adjusted_by_both(views, camera))
-
-
-def test_a_board_turns_and_shifts_alike_in_all_directions(camera: Camera) -> None:
-    views = both_see(camera)
-    design = design_of(views, adjusted_by_both(views, camera), 200.0)
-    squares = np.diagonal(design.own_own.sum(axis=0))[design.of_errors[1]]
-    n = 2 * views.seen[:, 1].sum()
-
-    np.testing.assert_allclose(squares.reshape(2, 3).mean(axis=1), n, rtol=1e-2)
-    along_the_axis = squares[5] / squares[3]  # the same shift shows less
-    assert along_the_axis < 0.2
-
-
-@pytest.mark.slow
-def test_a_board_that_moves_between_exposures_leaves_the_intrinsics_as_certain_as_alone(
-    camera: Camera,
+def test_a_board_that_moves_between_exposures_is_in_the_uncertainty_of_the_place(
+    camera: Camera, found: PairCalibration
 ) -> None:
-    views = both_see(camera, moved=0.2)
-    both = fitted_by_both(views, camera)
-    own = views.of_camera(0)
-    alone = fit_effects(own, fit_camera(own, BoardTolerances(), camera))
+    moved = calibrate_pair(both_see(camera, moved=0.2), BoardTolerances(), NAMES)
 
-    by_both, by_one = (
-        np.sqrt(np.diag(each.adjustment.covariance)[:4]) for each in (both, alone)
-    )
-    assert both.components.noise == pytest.approx(NOISE, rel=0.1)
-    assert both.components.between > 3 * NOISE
-    assert np.all(by_both < 1.1 * by_one)
-
-
-@pytest.mark.slow
-def test_each_camera_has_its_own_noise(camera: Camera) -> None:
-    views = both_see(camera)
-    pixels = views.pixels.copy()
-    pixels[:, 1] += np.random.default_rng(3).normal(0, 0.12, pixels[:, 1].shape)
-    found = fitted_by_both(replace(views, pixels=pixels), camera)
-
-    u = np.sqrt(np.diag(found.adjustment.covariance))
-    assert found.components.noise == pytest.approx((NOISE * 0.124) ** 0.5, rel=0.1)
-    assert u[9] > 2 * u[0]  # fx of the noisy camera
+    assert np.abs(errors(moved)).max() < 3.5
+    assert moved.baseline_sigma > 2 * found.baseline_sigma
+    for one, other in zip(moved.rig.cameras, found.rig.cameras, strict=True):
+        assert one.covariance is not None
+        assert other.covariance is not None
+        ratio = np.diag(one.covariance) / np.diag(other.covariance)
+        assert np.all(ratio[:4] < 1.5)
 
 
 def test_too_few_views_of_both_are_refused(camera: Camera) -> None:

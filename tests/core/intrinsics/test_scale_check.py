@@ -18,26 +18,13 @@ def test_a_board_is_as_large_as_the_caliper_says() -> None:
     assert check.sigma == pytest.approx(0.02 / 160.8)
 
 
-def test_a_board_on_a_screen_is_scaled_by_its_pixel_pitch() -> None:
-    board = ScaleCheck(1.0, 0.2331, 0.0002).scaled(parse_board("chessboard:9x6:100"))
-
-    assert board.pitch == pytest.approx(23.31)
+def test_a_check_is_entered_as_three_numbers() -> None:
+    assert ScaleCheck.parse(" 200; 200.12 0.04") == ScaleCheck(200, 200.12, 0.04)
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("200 200.12 0.04", ScaleCheck(200, 200.12, 0.04)),
-        (" 0.2331; 0.0002 ", ScaleCheck.of_pixels(0.2331, 0.0002)),
-    ],
+    "text", ["200", "200 mm", "0.2331 0.0002", "200,12 200 1", "1 2 3 4"]
 )
-def test_a_check_is_entered_as_two_or_three_numbers(
-    text: str, expected: ScaleCheck
-) -> None:
-    assert ScaleCheck.parse(text) == expected
-
-
-@pytest.mark.parametrize("text", ["200", "200 mm", "200,12 200 1", "1 2 3 4"])
 def test_another_text_is_refused_with_what_is_needed(text: str) -> None:
     with pytest.raises(UsageError, match="such as 200"):
         ScaleCheck.parse(text)

@@ -208,6 +208,6 @@ def test_a_plain_lens_is_kept_though_a_fisheye_was_begun_with(
     views, fisheye = make_views(), convert_lens(camera, FISHEYE)
     assert fisheye is not None
     begun = fit_camera(views, BoardTolerances(), fisheye)
-    choice, _, _ = choose_distortion(views, BoardTolerances(), begun, lambda _: None)
+    choice, _ = choose_distortion(views, BoardTolerances(), begun, lambda _: None)
 
     assert choice.n_coefficients == FEW

@@ -42,8 +42,6 @@ USUAL = {
     for kind, form in (
         (BoardKind.CHESSBOARD, "11x8:20"),
         (BoardKind.CHARUCO, "12x9:20:15:DICT_5X5_100"),
-        (BoardKind.LEGACY_CHARUCO, "12x9:20:15:DICT_5X5_100"),
-        (BoardKind.MARKERS, "5x7:30:6:DICT_6X6_250"),
         (BoardKind.CIRCLES, "9x7:20:10"),
         (BoardKind.ASYMMETRIC_CIRCLES, "4x11:20:10"),
     )
@@ -100,8 +98,6 @@ def _cells(board: Board) -> tuple[np.ndarray, float]:
     columns, rows = board.columns + extra, board.rows + extra
     y, x = np.mgrid[:rows, :columns]
     lattice = np.stack([x.ravel(), y.ravel()], axis=-1).astype(np.float64)
-    if board.kind is BoardKind.MARKERS:
-        return lattice * (board.pitch + board.detail), board.pitch
     return lattice[(x + y).ravel() % 2 == 0] * board.pitch, board.pitch
 
 
@@ -213,20 +209,15 @@ class BoardForm(Translated, QWidget):
         names = {
             BoardKind.CHESSBOARD: self.tr("Chessboard"),
             BoardKind.CHARUCO: "ChArUco",
-            BoardKind.LEGACY_CHARUCO: "ChArUco (OpenCV \N{LESS-THAN OR EQUAL TO} 4.6)",
-            BoardKind.MARKERS: self.tr("Markers"),
             BoardKind.CIRCLES: self.tr("Circles"),
             BoardKind.ASYMMETRIC_CIRCLES: self.tr("Asymmetric circles"),
         }
         for i in range(self._kind.count()):
             self._kind.setItemText(i, names[BoardKind(self._kind.itemData(i))])
         is_chessboard = kind is BoardKind.CHESSBOARD
-        square, marker = self.tr("Square"), self.tr("Marker")
-        pitch, detail = {
-            BoardKind.MARKERS: (marker, self.tr("Gap")),
-            BoardKind.CIRCLES: (self.tr("Distance"), self.tr("Diameter")),
-            BoardKind.ASYMMETRIC_CIRCLES: (self.tr("Distance"), self.tr("Diameter")),
-        }.get(kind, (square, marker))
+        pitch, detail = self.tr("Square"), self.tr("Marker")
+        if kind.is_circles:
+            pitch, detail = self.tr("Distance"), self.tr("Diameter")
         words = (
             self.tr("Board"),
             self.tr("Dictionary"),

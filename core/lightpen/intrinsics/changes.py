@@ -1,0 +1,352 @@
+"""Views of another setting of the camera, by what they say of views left out.
+
+Views are parted into two groups whose cameras differ by zoom and principal point: at
+some view in time, gradually, or in any order. Each view is predicted by the others,
+once with one camera and once with two. A change counts as found where two cameras
+predict nearly all views better, by more than views without a change do by chance: the
+mean of the gains in the logarithm of the squares, over their root mean square, exceeds
+`IN_TIME`; or, where the groups were chosen, `IN_GROUPS`, and the error of all views is
+`MUCH` larger by one camera. No set of 1,000 without a change reaches either. All is
+linear about the fit of one camera, so it takes no other fit.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import fit_board_poses
+from lightpen.intrinsics.board_fit import BoardFit
+from lightpen.intrinsics.distortion import fit_camera
+from lightpen.intrinsics.start import start_board_poses
+from lightpen.intrinsics.uncertainty_map import moved_in_image
+from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
+from lightpen.messages import Message, message
+from lightpen.model.camera import Camera
+
+FEWEST = 4  # views of a group that a set is refused for
+LEAST_GROUP = 2
+IN_TIME, IN_GROUPS, MUCH = 0.65, 0.75, 1.1
+CLEAR = 1.03  # ratio of the errors: the set is of two settings
+USELESS = 0.001  # of the image's longer side, by which a change moves the image
+MAX_ROUNDS = 10
+N_WAYS = 3  # zoom and shift of the principal point along x and y
+RIDGE = 1e-10  # of a normal matrix scaled to ones
+ROTATED, UPRIGHT = 0.6, 1.2  # residuals of a rotated view over those as it is
+SUSPECT = 0.45  # of the median of these: a view that may be rotated
+
+
+@dataclass(frozen=True, eq=False)
+class CameraChange:
+    """A camera that changed while its views were taken."""
+
+    ratio: float  # cross-validated error by one camera over that by two
+    # (V,), share of the change that each view has; 0 or 1 unless it is gradual.
+    share: FloatArray
+    difference: FloatArray  # (4 + n,), of the intrinsics, after less before
+    in_image: float  # difference of the projections of a point, px rms
+    settings: tuple[Camera, Camera]
+
+    @property
+    def is_gradual(self) -> bool:
+        """Whether the camera drifts."""
+        return not np.isin(self.share, (0.0, 1.0)).all()
+
+    @property
+    def is_step(self) -> bool:
+        """Whether all views of the second group come after those of the first."""
+        return not self.is_gradual and bool(np.all(np.diff(self.share) >= 0))
+
+    @property
+    def fewer(self) -> BoolArray:
+        """Mask of the views in the smaller group, (V,)."""
+        is_second = self.share > 0.5
+        return is_second if is_second.sum() <= len(self.share) / 2 else ~is_second
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether one camera cannot have taken the views."""
+        matters = self.in_image > USELESS * max(self.settings[0].image_size)
+        return self.ratio > CLEAR and matters
+
+
+def find_change(fitted: BoardFit) -> CameraChange | None:
+    """Return the change of the camera that predicts views best, if it is significant.
+
+    ``fitted`` is of one camera, the points of its board as all views have them.
+    """
+    views = _ViewEquations.of(fitted)
+    n_views = len(views.squares)
+    if n_views < 2 * FEWEST:
+        return None
+    order = np.arange(n_views)
+    steps = [(order >= k).astype(np.float64) for k in range(LEAST_GROUP, n_views - 1)]
+    in_time = [min(steps, key=lambda share: views.fitted(share)[1])]
+    in_time.append(order / (n_views - 1) - 0.5)
+    in_groups = [_settled_groups(views, start) for start in views.starts()]
+    shares = in_time + in_groups
+    limits = [IN_TIME] * len(in_time) + [IN_GROUPS] * len(in_groups)
+    alone = views.held_out(np.zeros(n_views))
+    errors = np.stack([views.held_out(share) for share in shares])
+    gains = np.log(alone / errors)
+    sizes = np.sqrt(np.mean(gains**2, axis=1))
+    is_found = gains.mean(axis=1) > np.array(limits) * np.maximum(sizes, 1e-12)
+    ratios = np.sqrt(alone.sum() / errors.sum(axis=1))
+    is_found[len(in_time) :] &= ratios[len(in_time) :] > MUCH
+    if not is_found.any():
+        return None
+    best = int(np.argmin(np.where(is_found, errors.sum(axis=1), np.inf)))
+    camera = fitted.state.cameras[0]
+    step, _ = views.fitted(shares[best])
+    n = len(camera.intrinsics)
+    common, change = step[: len(views.way)], views.way @ step[len(views.way) :]
+    before = camera.intrinsics + common[:n]
+    settings = (
+        camera.with_intrinsics(before),
+        camera.with_intrinsics(before + change[:n]),
+    )
+    moved = moved_in_image(camera, change[:n])
+    return CameraChange(float(ratios[best]), shares[best], change[:n], moved, settings)
+
+
+@dataclass(frozen=True, eq=False)
+class _ViewEquations:
+    """Normal equations of each view about all but its pose, of one camera."""
+
+    information: FloatArray  # (V, p, p)
+    scores: FloatArray  # (V, p)
+    squares: FloatArray  # (V,), px^2
+    prior: FloatArray  # (p, p), for points of 1 px noise
+    way: FloatArray  # (p, k), how zoom and shift change the unknowns
+
+    @classmethod
+    def of(cls, fitted: BoardFit) -> "_ViewEquations":
+        camera = fitted.state.cameras[0]
+        way = np.zeros((len(fitted.prior), N_WAYS))
+        way[0, 0], way[1, 0], way[2, 1], way[3, 2] = camera.fx, camera.fy, 1.0, 1.0
+        squares = np.nansum(np.square(fitted.residuals), axis=(1, 2, 3))
+        prior = fitted.sigma**2 * fitted.prior
+        return cls(fitted.information, fitted.scores, squares, prior, way)
+
+    def starts(self) -> list[FloatArray]:
+        """Return the first groups of views, (V,) each: every second, and by scores."""
+        order, scores = np.arange(len(self.squares)), self.scores @ self.way
+        known = np.einsum("pk,vpq,qk->k", self.way, self.information, self.way)
+        main = np.linalg.svd(scores / np.sqrt(known), full_matrices=False)[0]
+        groups = (order % 2 == 1, main[:, 0] > 0, main[:, 1] > 0)
+        return [group.astype(np.float64) for group in groups]
+
+    def _parted(self, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations of each view, the change being unknown, too."""
+        n_views, p = self.scores.shape
+        both = np.zeros((n_views, p, p + N_WAYS))
+        both[:, :, :p] = np.eye(p)
+        both[:, :, p:] = share[:, None, None] * self.way
+        turned = np.swapaxes(both, 1, 2)
+        scores = (turned @ self.scores[..., None])[..., 0]
+        return turned @ self.information @ both, scores
+
+    def _total(
+        self, information: FloatArray, scores: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        p = len(self.prior)
+        normal, right = information.sum(axis=0), scores.sum(axis=0)
+        normal[:p, :p] += self.prior
+        right[:p] = 0.0  # the fit of one camera is at its optimum
+        return normal, right
+
+    def fitted(self, share: FloatArray) -> tuple[FloatArray, float]:
+        """Return the step of all unknowns, (p + 3,), and the squares that it leaves."""
+        normal, right = self._total(*self._parted(share))
+        step = _solved(normal, right)
+        return step, float(self.squares.sum() - right @ step)
+
+    def of_each(self, share: FloatArray, step: FloatArray) -> FloatArray:
+        """Return the squares of the residuals of each view after a step, (V,)."""
+        information, scores = self._parted(share)
+        by_step = np.einsum("i,vij,j->v", step, information, step)
+        return np.asarray(self.squares - 2 * scores @ step + by_step)
+
+    def without_each(self) -> FloatArray:
+        """Return the step of all unknowns by all views but one, (V, p)."""
+        normal = self.information.sum(axis=0) + self.prior
+        return _solved(normal - self.information, -self.scores)
+
+    def held_out(self, share: FloatArray) -> FloatArray:
+        """Return the squares of the residuals of each view by the others, (V,)."""
+        information, scores = self._parted(share)
+        normal, right = self._total(information, scores)
+        step = _solved(normal - information, right - scores)
+        by_step = np.einsum("vi,vij,vj->v", step, information, step)
+        errors = self.squares - 2 * np.sum(scores * step, axis=1) + by_step
+        return np.asarray(np.maximum(errors, 1e-12))
+
+
+def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solution of normal equations, 0 of what they leave open."""
+    diagonal = np.einsum("...ii->...i", normal)
+    scale = 1 / np.sqrt(np.maximum(diagonal, 1e-300))
+    scale[diagonal <= 0] = 0.0
+    scaled = normal * scale[..., :, None] * scale[..., None, :]
+    scaled = scaled + RIDGE * np.eye(normal.shape[-1])
+    solved = np.linalg.solve(scaled, (scale * right)[..., None])[..., 0]
+    return np.asarray(scale * solved)
+
+
+def _settled_groups(views: _ViewEquations, share: FloatArray) -> FloatArray:
+    """Return the groups after views have moved to the one that fits them better."""
+    for _ in range(MAX_ROUNDS):
+        step, _ = views.fitted(share)
+        one, other = (
+            views.of_each(np.full(len(share), part), step) for part in (0.0, 1.0)
+        )
+        now = (other < one).astype(np.float64)
+        if np.array_equal(now, share) or not 2 <= now.sum() <= len(now) - 2:
+            break
+        share = now
+    return share
+
+
+def rotated_ratios(views: Views, fitted: BoardFit) -> FloatArray:
+    """Return the residuals of views if rotated by 180 degrees, over those as they are.
+
+    By a known camera and board, (V,); ones where the camera does not image them.
+    """
+    try:
+        turned, upright = (
+            _by_poses(each, fitted).view_rms[:, 0] for each in (_rotated(views), views)
+        )
+    except CalibrationError:
+        return np.ones(views.n_views)
+    return np.asarray(turned / upright)
+
+
+def held_out_ratios(views: Views, fitted: BoardFit) -> FloatArray:
+    """Return `rotated_ratios` of the views of a fit, each by the others alone, (V,)."""
+    steps = _ViewEquations.of(fitted).without_each()
+    ratios = []
+    for v, step in enumerate(steps):
+        camera = fitted.state.cameras[0]
+        camera = camera.with_intrinsics(
+            camera.intrinsics + step[: len(camera.intrinsics)]
+        )
+        own = replace(fitted, state=replace(fitted.state, cameras=(camera,)))
+        alone = views.chosen(np.arange(views.n_views) == v)
+        ratios.append(rotated_ratios(alone, own)[0])
+    return np.array(ratios)
+
+
+def seem_rotated(ratios: FloatArray) -> BoolArray:
+    """Return which views may be rotated, given `rotated_ratios` by all of them."""
+    return np.asarray(ratios < max(1.0, SUSPECT * float(np.median(ratios))))
+
+
+def are_rotated(ratios: FloatArray, which: BoolArray) -> bool:
+    """Return whether some views are rotated, given `rotated_ratios` by the others."""
+    usual = float(np.median(ratios[~which]))
+    return bool(np.all(ratios[which] < ROTATED)) and usual > UPRIGHT
+
+
+def _rotated(views: Views) -> Views:
+    return replace(views, pixels=np.array(views.image_sizes[0]) - 1.0 - views.pixels)
+
+
+def _by_poses(views: Views, fitted: BoardFit) -> BoardFit:
+    """Return the fit of the poses of views before a known camera and board."""
+    poses = start_board_poses(fitted.state.cameras[0], views)
+    return fit_board_poses(views, replace(fitted.state, poses=poses))
+
+
+def settled_change(
+    views: Views, tolerances: BoardTolerances, change: CameraChange
+) -> CameraChange:
+    """Return a change after views have moved to the camera that fits them better."""
+    share, cameras = change.share, change.settings
+    for _ in range(MAX_ROUNDS):
+        fits = [
+            fit_camera(views.chosen(share == part), tolerances, camera)
+            for part, camera in zip((0.0, 1.0), cameras, strict=True)
+        ]
+        one, other = (_by_poses(views, fit).view_rms[:, 0] for fit in fits)
+        cameras = fits[0].state.cameras[0], fits[1].state.cameras[0]
+        now = (other < one).astype(np.float64)
+        if np.array_equal(now, share) or not FEWEST <= now.sum() <= len(now) - FEWEST:
+            break
+        share = now
+    return replace(change, share=share, settings=cameras)
+
+
+def change_error(change: CameraChange, names: tuple[str, ...]) -> CalibrationError:
+    """Return the error of a change that no calibration can bridge."""
+    if change.is_gradual:
+        return CalibrationError(message_on_change(change, names))
+    is_second = change.share > 0.5
+    one, other = change.settings
+    before, after = (
+        _setting(names, which, camera)
+        for which, camera in ((~is_second, one), (is_second, other))
+    )
+    if change.is_step:
+        name = names[int(np.argmax(is_second))]
+        return CalibrationError(
+            "intrinsics.changed", name=name, before=before, after=after
+        )
+    return CalibrationError("intrinsics.two-settings", one=before, other=after)
+
+
+def rotated_message(names: tuple[str, ...], which: BoolArray) -> Message:
+    """Return the message on images that are rotated by 180 degrees."""
+    named = _named(names, which)
+    return message(
+        "intrinsics.turned",
+        names=listed_names(named),
+        n_named=len(named),
+        n_views=len(names),
+    )
+
+
+def message_on_change(change: CameraChange, names: tuple[str, ...]) -> Message:
+    """Return the message on a change that does not make the set useless."""
+    fx, _, cx, cy, *_ = change.difference.tolist()
+    if change.is_gradual:
+        return message("intrinsics.drift", px=change.in_image, fx=fx, cx=cx, cy=cy)
+    return message(
+        "intrinsics.apart",
+        names=listed_names(_named(names, change.fewer)),
+        n_named=int(change.fewer.sum()),
+        n_views=len(names),
+        px=change.in_image,
+        fx=fx,
+        cx=cx,
+        cy=cy,
+    )
+
+
+def changed_camera(camera: Camera, change: CameraChange) -> Camera:
+    """Return a camera whose covariance includes the change."""
+    added = np.outer(change.difference, change.difference) / 4
+    field, covariance = camera.lens_field, camera.covariance
+    if field is not None and field.intrinsics_covariance is not None:
+        beside = field.intrinsics_covariance + added
+        field = replace(field, intrinsics_covariance=beside)
+    if covariance is not None:
+        covariance = covariance + added
+    return replace(camera, covariance=covariance, lens_field=field)
+
+
+def _setting(names: tuple[str, ...], which: BoolArray, camera: Camera) -> Message:
+    """Return the intrinsics of some of the views, and the views' names."""
+    named = _named(names, which)
+    return message(
+        "intrinsics.setting",
+        fx=camera.fx,
+        cx=camera.cx,
+        cy=camera.cy,
+        n_views=len(named),
+        names=listed_names(named),
+    )
+
+
+def _named(names: tuple[str, ...], which: BoolArray) -> tuple[str, ...]:
+    return tuple(name for name, own in zip(names, which, strict=True) if own)
