@@ -18,6 +18,7 @@ from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.changes import (
     FEWEST,
+    ROTATED,
     UPRIGHT,
     CameraChange,
     are_rotated,
@@ -205,21 +206,29 @@ def _without_rotated(
     report: Callable[[float], None],
 ) -> _Found:
     """Return the camera without rotated images, which are a finding if they are few."""
-    ratios, again = rotated_ratios(views, found.effects.adjustment), found
-    if np.median(ratios) < UPRIGHT or not seem_rotated(ratios).any():
-        return found
+    fit = found.effects.adjustment
+    ratios, again = rotated_ratios(views, fit), found
+    members = np.isin(views.names, found.views.names)
     away = np.zeros(views.n_views, dtype=np.bool_)
     for _ in range(MAX_ROUNDS):
+        if np.median(ratios) < UPRIGHT:
+            return found
+        doubted = (seem_rotated(ratios) | away.any())[members]
+        if doubted.any():
+            ratios[np.flatnonzero(members)[doubted]] = held_out_ratios(
+                again.views, fit, doubted
+            )
         before, away = away, seem_rotated(ratios)
-        if (~away).sum() < MIN_VIEWS:
+        if ratios.min() > ROTATED or (~away).sum() < MIN_VIEWS:
             return found
         if np.array_equal(before, away):
             break
-        near = again.effects.adjustment
-        again = _calibrated(views.chosen(~away), tolerances, near, report)
+        again, members = (
+            _calibrated(views.chosen(~away), tolerances, fit, report),
+            ~away,
+        )
         fit = again.effects.adjustment
         ratios = rotated_ratios(views, fit)
-        ratios[~away] = held_out_ratios(again.views, fit)
     if not are_rotated(ratios, away):
         return found
     remark = rotated_message(views.names, away)

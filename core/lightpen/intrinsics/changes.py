@@ -222,16 +222,14 @@ def rotated_ratios(views: Views, fitted: BoardFit) -> FloatArray:
     return np.asarray(turned / upright)
 
 
-def held_out_ratios(views: Views, fitted: BoardFit) -> FloatArray:
-    """Return `rotated_ratios` of the views of a fit, each by the others alone, (V,)."""
-    steps = _ViewEquations.of(fitted).without_each()
+def held_out_ratios(views: Views, fitted: BoardFit, which: BoolArray) -> FloatArray:
+    """Return `rotated_ratios` of some views of a fit, each by the others alone."""
+    steps, camera = _ViewEquations.of(fitted).without_each(), fitted.state.cameras[0]
     ratios = []
-    for v, step in enumerate(steps):
-        camera = fitted.state.cameras[0]
-        camera = camera.with_intrinsics(
-            camera.intrinsics + step[: len(camera.intrinsics)]
-        )
-        own = replace(fitted, state=replace(fitted.state, cameras=(camera,)))
+    for v in np.flatnonzero(which):
+        step = steps[v, : len(camera.intrinsics)]
+        cameras = (camera.with_intrinsics(camera.intrinsics + step),)
+        own = replace(fitted, state=replace(fitted.state, cameras=cameras))
         alone = views.chosen(np.arange(views.n_views) == v)
         ratios.append(rotated_ratios(alone, own)[0])
     return np.array(ratios)

@@ -159,7 +159,7 @@ def choose_distortion(
     tried = {best.n_coefficients: best.camera}
     is_off = is_wide(first.camera, views.pixels[:, 0])
     others = []
-    if is_plain and (is_off or _promises_more(views, first.fitted, errors)):
+    if is_plain and _promises_more(views, first.fitted, errors):
         others.append(MANY)
     if not is_plain:
         others += [FEW, MANY]

@@ -212,12 +212,12 @@ def _design_of(views: Views, fitted: BoardFit) -> _Design:
     state = fitted.state
     pull[:n] = fitted.prior @ np.r_[state.cameras[0].intrinsics, state.shape]
     camera, depths = fitted.state.cameras[0], fitted.state.poses.translations[:, 2]
-    normal, right = _normal_equations(blocks, left)
+    flat = blocks.reshape(-1, blocks.shape[-1])
     return _Design(
         blocks,
         left,
-        normal,
-        right,
+        flat.T @ flat,
+        flat.T @ left.ravel(),
         float(np.sum(left**2)),
         2 * int(views.seen.sum()) - N_POSE * n_views,
         projector,
@@ -240,23 +240,16 @@ def _with_field(
     both[..., 0, :, 0] = both[..., 1, :, 1] = weights
     columns = both.reshape(*plain.left.shape, -1)
     columns = _without_poses(plain.projector, columns)
-    blocks = np.concatenate([plain.blocks, columns], axis=-1)
-    normal, right = _normal_equations(blocks, plain.left)
+    flat = columns.reshape(-1, columns.shape[-1])
+    cross = plain.blocks.reshape(len(flat), -1).T @ flat
     return plain._replace(
-        blocks=blocks,
-        normal=normal,
-        right=right,
+        blocks=np.concatenate([plain.blocks, columns], axis=-1),
+        normal=np.block([[plain.normal, cross], [cross.T, flat.T @ flat]]),
+        right=np.r_[plain.right, flat.T @ plain.left.ravel()],
         pull=np.pad(plain.pull, (0, columns.shape[-1])),
         field=field,
         node_prior=np.asarray(np.kron(field.node_information, np.eye(2)), np.float64),
     )
-
-
-def _normal_equations(
-    blocks: FloatArray, left: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    flat = blocks.reshape(-1, blocks.shape[-1])
-    return flat.T @ flat, flat.T @ left.ravel()
 
 
 def _without_poses(projector: FloatArray, columns: FloatArray) -> FloatArray:
