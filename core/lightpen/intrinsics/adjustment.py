@@ -38,7 +38,6 @@ from lightpen.intrinsics.start import BoardPoses
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_centroids
-from lightpen.model.information import inverse
 from lightpen.model.rigid import rotation_from_vector, skew
 
 MAX_STEPS = 100
@@ -47,7 +46,6 @@ FIRST_DAMPING = 1e-3
 CONVERGED = 1e-6  # of the sum of squares: a thousandth of a standard uncertainty
 FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
 NOISE_ROUNDS = 3
-ROUNDING = 1e-9  # of a variance; a standard deviation for 0
 VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
 
 
@@ -369,13 +367,6 @@ def _prior(
     sigmas = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
     information[places.stop :, places.stop :] = np.diag(sigmas**-2.0)
     return information
-
-
-def stated_information(covariance: FloatArray) -> FloatArray:
-    """Return the information of intrinsics with this covariance, (4 + n, 4 + n)."""
-    variances = np.diag(covariance)
-    floor = np.where(variances > 0, ROUNDING * variances, ROUNDING**2)
-    return inverse(covariance + np.diag(floor))
 
 
 def _inverse(information: FloatArray) -> FloatArray:
