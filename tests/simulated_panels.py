@@ -18,6 +18,8 @@ FULL_WELL = 10_000.0  # electrons
 READ_NOISE = 7.0  # electrons
 COLUMNS, ROWS = 7, 5
 MOST_TURN = 0.2  # rad, of the panel in the image
+HALO_PLACE = 0.5  # standard deviation, in widths from the LED
+HALO = (0.6, 1.4)  # standard deviations, least and most, in widths of an LED
 PLACE = (0.42, 0.55)  # of a reflection, in pitches below its LED
 REFLECTION = (0.35, 0.2)  # standard deviations, in widths of an LED
 
@@ -46,6 +48,11 @@ class Panel:
         Of the JPEG; None for an image that is not packed.
     pitch : float
         In widths.
+    halos : tuple of float
+        Least and most brightness of the wide, smooth light about an LED, by its lens
+        and the board, over that of its LED; each has a place and a shape of its own.
+    gamma : float
+        Of the camera; 1 is linear.
     """
 
     width: float
@@ -57,6 +64,8 @@ class Panel:
     background: float = 0.03
     quality: int | None = 92
     pitch: float = 2.5
+    halos: tuple[float, float] = (0.0, 0.0)
+    gamma: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +89,8 @@ def panel_image(panel: Panel, rng: np.random.Generator) -> PanelImage:
         _add_reflection(
             light, there, panel.width, gain * rng.uniform(*panel.reflections)
         )
+        if panel.halos[1] > 0:
+            _add_halo(light, center, panel, gain, rng)
     size = (width, height)
     blurred = cv2.GaussianBlur(light, (0, 0), panel.psf * FINE)
     pixels = cv2.resize(blurred, size, interpolation=cv2.INTER_AREA)
@@ -88,7 +99,8 @@ def panel_image(panel: Panel, rng: np.random.Generator) -> PanelImage:
     y, x = np.mgrid[:height, :width]
     pixels = pixels + panel.background * (1 + 0.5 * x / width + 0.3 * y / height)
     charges = rng.poisson(FULL_WELL * pixels) + rng.normal(0, READ_NOISE, pixels.shape)
-    digits = np.rint(charges * (FULL_SCALE / FULL_WELL))
+    shares = np.maximum(charges / FULL_WELL, 0) ** (1 / panel.gamma)
+    digits = np.rint(FULL_SCALE * shares)
     image = np.clip(digits, 0, FULL_SCALE).astype(np.uint8)
     return PanelImage(_packed(image, panel.quality), centers)
 
@@ -144,6 +156,23 @@ def _add_reflection(
     window, x, y = _sub_pixels(light, center, 2 * width)
     across, down = (width * share for share in REFLECTION)
     light[window] += gain * np.exp(-0.5 * ((x / across) ** 2 + (y / down) ** 2))
+
+
+def _add_halo(
+    light: npt.NDArray[np.float32],
+    center: FloatArray,
+    panel: Panel,
+    gain: float,
+    rng: np.random.Generator,
+) -> None:
+    there = center + panel.width * rng.normal(0, HALO_PLACE, 2)
+    window, x, y = _sub_pixels(light, there, 4 * panel.width)
+    angle = rng.uniform(0, np.pi)
+    u = x * np.cos(angle) + y * np.sin(angle)
+    v = y * np.cos(angle) - x * np.sin(angle)
+    long, wide = panel.width * rng.uniform(*HALO, 2)
+    height = gain * rng.uniform(*panel.halos)
+    light[window] += height * np.exp(-0.5 * ((u / long) ** 2 + (v / wide) ** 2))
 
 
 def _packed(image: Image, quality: int | None) -> Image:

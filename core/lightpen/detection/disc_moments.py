@@ -6,9 +6,9 @@ so its noise is gone, and the background zero; only the rim is grey. The centroi
 is then as precise as a fit of the rim, at the cost of one pass over a small window.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from math import hypot, pi, sqrt
+from math import pi, sqrt
 from typing import NamedTuple
 
 import cv2
@@ -24,6 +24,7 @@ from lightpen.detection.region_moments import (
     LOW,
     MIN_AREA,
     DiscMoments,
+    Value,
     is_ellipse,
     moments_of_region,
     moments_of_rim,
@@ -86,11 +87,11 @@ class Disc(NamedTuple):
     levels: Levels
     cut_level: float
     box: PixelBox
-    leaves_image: bool
-    leaves_window: bool
     is_whole: bool
-    others: tuple[PixelBox, ...]
     is_even: bool = True
+    leaves_image: bool = False
+    leaves_window: bool = False
+    others: tuple[PixelBox, ...] = ()
     rim: EdgeStart | None = None
     filled: Callable[[], DiscMoments | None] | None = None
 
@@ -133,7 +134,7 @@ def _measure_window(
 ) -> Disc | None:
     frame = box.grown(margin, image.shape)
     window = image[frame.top : frame.bottom, frame.left : frame.right]
-    levels = _window_levels(window, level)
+    levels = window_levels(window, level)
     contrast = levels.contrast
     if contrast < MIN_SIGMAS * noise:
         return None
@@ -148,43 +149,58 @@ def _measure_window(
     regions, soft = _separate(soft, box, frame)
     if not regions:
         return None
+    ramp = (high - low) / contrast
     region, *others = regions
     # Beside its region soft is 0; half as many pixels take half the time.
     near = region.moved(-frame.left, -frame.top).grown(1, soft.shape)
     soft = soft[near.top : near.bottom, near.left : near.right]
     window = window[near.top : near.bottom, near.left : near.right]
-    around = near.moved(frame.left, frame.top)
-    moments = moments_of_region(soft, around, (high - low) / contrast)
+    moments = moments_of_region(soft, near.moved(frame.left, frame.top), ramp)
     if moments is None:
         return None
-    moments = _unshaded(moments, window, soft, around, levels)
+    _, inner = cv2.threshold(cv2.erode(soft, BESIDE), 254, 1, cv2.THRESH_BINARY)
+    background = round(levels.background)
+    light = np.maximum(window, background) - background
+    moments, is_whole, is_even = assessed(
+        moments,
+        cv2.moments(inner),
+        cv2.moments(cv2.copyTo(window, inner)),
+        cv2.moments(cv2.copyTo(light, soft)),
+        near.moved(frame.left, frame.top),
+        levels,
+        noise / contrast,
+    )
     sides = zip(region, frame, (0, 0, *image.shape[::-1]), strict=True)
     reached = [there == of_image for here, there, of_image in sides if here == there]
-    leaves_image, leaves_window = any(reached), not all(reached)
-    relative_noise = noise / contrast
-    is_whole = not reached and is_ellipse(moments, relative_noise)
-    is_even = is_whole and _is_even(
-        moments, window, soft, around, levels, relative_noise
-    )
-    rim, filled = None, None
-    if not reached and not (is_even and moments.edge_width < WIDE_EDGE):
-        rim = _rim_start(soft, around)
-        if not is_whole and _has_dark_middle(moments, soft, around):
-            ramp = (high - low) / contrast
-            filled = partial(_filled, moments, soft, around, ramp, relative_noise)
-    return Disc(
-        moments,
+    disc = Disc(
+        DiscMoments(*map(float, moments)),
         levels,
         float(low),
         region,
-        leaves_image,
-        leaves_window,
-        is_whole,
-        tuple(others),
-        is_even,
-        rim,
-        filled,
+        is_whole=bool(is_whole) and not reached,
+        is_even=bool(is_whole & is_even) and not reached,
+        leaves_image=any(reached),
+        leaves_window=not all(reached),
+        others=tuple(others),
     )
+    around = near.moved(frame.left, frame.top)
+    return disc if reached else with_start(disc, soft, around, ramp, noise)
+
+
+def with_start(
+    disc: Disc, soft: MatLike, frame: PixelBox, ramp: float, noise: float
+) -> Disc:
+    """Return a disc with what `with_rims` needs, if its outline does not show it.
+
+    ``soft`` is its soft-thresholded window within ``frame``.
+    """
+    if disc.is_even and disc.moments.edge_width < WIDE_EDGE:
+        return disc
+    filled = None
+    if not disc.is_whole and _has_dark_middle(disc.moments, soft, frame):
+        relative_noise = noise / disc.levels.contrast
+        filled = partial(_filled, disc.moments, soft, frame, ramp, relative_noise)
+    return disc._replace(rim=_rim_start(soft, frame), filled=filled)
 
 
 def with_rims(
@@ -244,32 +260,51 @@ def _separate(
     return [first, *others], cv2.bitwise_and(soft, alone)
 
 
-def _is_even(
+def assessed(
     moments: DiscMoments,
-    window: Image,
-    soft: MatLike,
+    inner: Mapping[str, Value],
+    weighted: Mapping[str, Value],
+    light: Mapping[str, Value],
     frame: PixelBox,
     levels: Levels,
-    relative_noise: float,
-) -> bool:
-    """Tell whether the light of a disc has the centroid and the amount of its area."""
-    background = round(levels.background)
-    light = cv2.moments(cv2.copyTo(np.maximum(window, background) - background, soft))
-    amount = light["m00"] / (moments.area * levels.contrast)
-    x = frame.left + light["m10"] / light["m00"] - moments.x
-    y = frame.top + light["m01"] / light["m00"] - moments.y
-    if abs(amount - 1) > UNEVEN_AMOUNT and moments.rim_width < FLAT * moments.radius:
-        return False
+    relative_noise: Value,
+) -> tuple[DiscMoments, Value, Value]:
+    """Return moments without shading; whether discs are whole, and evenly lit.
+
+    An LED is less bright seen from the side, so one side of a leaning disc is brighter
+    than the other. If the brightness rises by the share g from the centre to the rim,
+    the outline lies further out there by g / 2 times the width of the rim, the mean of
+    all levels; the centroid of the inner pixels shows g. A whole disc is an ellipse,
+    and the light of an even one has the centroid and the amount of its area.
+
+    Sums are over windows at ``frame``: of the inside without pixels beside the rim,
+    of its light, and of the light of the region above the background.
+    """
+    radius, reach = moments.radius, moments.rim_width * moments.radius
+    area = inner["m00"]
+    is_flat = radius >= LEAST_SHADED * moments.rim_width  # shows its shading
+    is_shown = is_flat & (area >= LEAST_INNER * moments.area)
+    factor = 2.0 * pi * reach / np.maximum(area, 1.0)
+    factor = np.where(is_shown, factor * levels.plateau / levels.contrast, 0.0)
+    weight, place = (np.maximum(each["m00"], 1.0) for each in (weighted, inner))
+    x = moments.x - factor * (weighted["m10"] / weight - inner["m10"] / place)
+    y = moments.y - factor * (weighted["m01"] / weight - inner["m01"] / place)
+    moments = moments._replace(x=x, y=y)
+
+    total = np.maximum(light["m00"], 1.0)
+    amount = total / (moments.area * levels.contrast)
+    off = np.hypot(
+        frame.left + light["m10"] / total - x, frame.top + light["m01"] / total - y
+    )
     # Where the brightness rises by the share g from the centre to the rim, the light's
     # centroid is g / 4 radii off, the outline g / 2 times the width of the rim.
-    allowed = CORRECTED_CENTER if _corrects_shading(moments) else UNEVEN_CENTER
-    allowed += NOISE_SIGMAS * relative_noise / (2.0 * sqrt(moments.area))
-    return hypot(x, y) < allowed * moments.radius
-
-
-def _corrects_shading(moments: DiscMoments) -> bool:
-    """Return whether the inside of a disc is large enough to measure its shading."""
-    return moments.radius >= LEAST_SHADED * moments.rim_width
+    allowed = np.where(is_flat, CORRECTED_CENTER, UNEVEN_CENTER)
+    allowed = allowed + NOISE_SIGMAS * relative_noise / (2.0 * np.sqrt(moments.area))
+    is_even = (np.abs(amount - 1) <= UNEVEN_AMOUNT) | (
+        moments.rim_width >= FLAT * radius
+    )
+    is_whole = is_ellipse(moments, relative_noise)
+    return moments, is_whole, is_even & (off < allowed * radius)
 
 
 def _has_dark_middle(moments: DiscMoments, soft: MatLike, frame: PixelBox) -> bool:
@@ -300,7 +335,7 @@ def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
     """Return the start of the edge fit of a region, if it is like an ellipse."""
     contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     m = cv2.moments(contours[0])
-    if m["m00"] < MIN_AREA:
+    if len(contours) > 1 or m["m00"] < MIN_AREA:
         return None
     xx, xy, yy = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
     determinant = xx * yy - xy**2
@@ -312,7 +347,7 @@ def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
     return EdgeStart(center, np.array([[xx, xy], [xy, yy]]))
 
 
-def _window_levels(window: Image, level: float) -> Levels:
+def window_levels(window: Image, level: float) -> Levels:
     """Split the intensities in two classes and return their medians."""
     step = max(1, min(window.shape) // SAMPLES)
     samples = np.sort(window[::step, ::step], axis=None)
@@ -326,30 +361,3 @@ def _window_levels(window: Image, level: float) -> Levels:
         split = (background + plateau) // 2
     top = int(samples[min((n_dark + 9 * n) // 10, n - 1)])
     return Levels(background, plateau, top)
-
-
-def _unshaded(
-    moments: DiscMoments, window: Image, soft: MatLike, frame: PixelBox, levels: Levels
-) -> DiscMoments:
-    """Return the moments with the centre that the disc has without shading.
-
-    An LED is less bright seen from the side, so one side of a leaning disc is brighter
-    than the other. If the brightness rises by the share g from the centre to the rim,
-    the outline lies further out there by g / 2 times the width of the rim, the mean of
-    all levels; the centroid of the inner pixels shows g.
-    """
-    if not _corrects_shading(moments):
-        return moments
-    _, inner = cv2.threshold(cv2.erode(soft, BESIDE), 254, 255, cv2.THRESH_BINARY)
-    place = cv2.moments(inner)
-    weighted = cv2.moments(cv2.copyTo(window, inner))
-    area = place["m00"] / 255.0
-    if area < LEAST_INNER * moments.area:
-        return moments
-    reach = moments.rim_width * moments.radius
-    factor = 2.0 * pi * reach / area * levels.plateau / levels.contrast
-    x, y = (
-        factor * (weighted[m] / weighted["m00"] - place[m] / place["m00"])
-        for m in ("m10", "m01")
-    )
-    return moments._replace(x=moments.x - x, y=moments.y - y)

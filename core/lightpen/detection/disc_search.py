@@ -17,6 +17,7 @@ from cv2.typing import MatLike
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.disc_moments import Disc, measure_disc, with_rims
+from lightpen.detection.disc_stack import measure_alone
 from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pixel_box import PixelBox, bounding_box
 from lightpen.model.quantiles import normal_quantile
@@ -139,8 +140,11 @@ def find_discs(
 
     measured: list[Disc] = []
     unclear: list[tuple[PixelBox, Disc | None]] = []
-    for box in boxes:
-        if _is_too_large(scene, box):
+    alone = measure_alone(scene.image, boxes, level, scene.noise)
+    for box, disc in zip(boxes, alone, strict=True):
+        if disc is not None and _stands_out(scene, disc):
+            measured.append(disc)
+        elif _is_too_large(scene, box):
             unclear.append((box, None))
         else:
             found = list(_measured(scene, box, level, 0.0, budget))
@@ -255,12 +259,18 @@ def _measured(
         ]
         boxes += new
         seen |= {disc.box, *new}
-        height = disc.levels.plateau - scene.background
-        if disc.levels.contrast > MIN_RELATIVE_CONTRAST * height:
+        if _stands_out(scene, disc):
             yield disc
+
+
+def _stands_out(scene: Survey, disc: Disc) -> bool:
+    """Return whether a disc is more than the texture of something bright."""
+    height = disc.levels.plateau - scene.background
+    return bool(disc.levels.contrast > MIN_RELATIVE_CONTRAST * height)
 
 
 def _resembles_disc(disc: Disc) -> bool:
     """Return whether a region may be a cut or merged LED."""
     major, minor = disc.moments.axes
-    return disc.moments.roundness > MIN_ROUNDNESS and major < MAX_AXIS_RATIO * minor
+    is_round = disc.moments.roundness > MIN_ROUNDNESS
+    return bool(is_round and major < MAX_AXIS_RATIO * minor)

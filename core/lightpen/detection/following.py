@@ -14,7 +14,8 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.labels import Labels, LabelStatus
 from lightpen.detection.labelling.spot_arrays import UNWHOLE
-from lightpen.detection.pose import Poses, fit_poses
+from lightpen.detection.pose import Poses
+from lightpen.detection.single_pose import fit_pose
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -22,7 +23,6 @@ from lightpen.model.pen import Pen
 
 UNAMBIGUOUS = 0.4  # of the distance of two LEDs, that one may have moved
 MAX_TURN = 0.25  # rad, from image to image
-TOLERANCE = 1e-5  # of Newton's last step, which leaves its square
 MAX_SIGMA = 0.3  # px
 LEAST_WEIGHT = 0.5  # of an LED: residuals of four standard deviations
 MAX_GROWTH = 1.5  # of an area from image to image
@@ -80,12 +80,7 @@ def follow_spots(
     seen = centers_from_centroids(camera, seen[None], shapes[None])[0]
     pixels = np.where(whole[:, None], seen, np.nan)
     sigmas = np.where(whole, spots.sigmas[spot], np.nan)
-    poses = fit_poses(
-        *(camera, pen, pixels[None], rotation[None], translation[None]),
-        sigmas=sigmas[None],
-        is_near=True,
-        tolerance=TOLERANCE,
-    )
+    poses = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
     turned = np.sum(poses.rotations[0] * rotation) < 1 + 2 * np.cos(MAX_TURN)
     is_poor = poses.sigma > MAX_SIGMA or (poses.weights[0, whole] < LEAST_WEIGHT).any()
     if turned or is_poor:

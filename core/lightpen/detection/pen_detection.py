@@ -22,8 +22,9 @@ from lightpen.detection.labelling.labels import (
     track_spots,
 )
 from lightpen.detection.pixel_box import PixelBox
-from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
+from lightpen.detection.pose import MIN_POSE_LEDS, Poses
 from lightpen.detection.reasons import UNFORESEEN, Reason
+from lightpen.detection.single_pose import fit_pose
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -172,12 +173,12 @@ def detect_pen(
             )
             if np.count_nonzero(labels.whole) >= certain_leds(pen):
                 detection = detections_of([spots], [labels], camera)[0]
-                return _fitted(detection, camera, pen, is_near=True)
+                return _fitted(detection, camera, pen)
         seen = None if before is None else before.spots
         spots = detect_spots(image, mask, full_scale=full_scale, before=seen)
         labels = _label(spots, camera, pen, before)
         detection = detections_of([spots], [labels], camera)[0]
-        return _fitted(detection, camera, pen, is_near=True)
+        return _fitted(detection, camera, pen)
     except UNFORESEEN:
         return unseen(pen, Reason.UNHANDLED)
 
@@ -237,7 +238,7 @@ def detect_from_centers(
 ) -> PenDetection:
     """Return the detection by labelled centres (L, 2), px, from a rough pose."""
     detection = detection_of_centers(pixels, rotation, translation)
-    return _fitted(detection, camera, pen, is_near=False)
+    return _fitted(detection, camera, pen)
 
 
 def unseen(pen: Pen, reason: Reason) -> PenDetection:
@@ -302,20 +303,13 @@ def _n_seen(pixels: FloatArray) -> int:
     return int(np.isfinite(pixels[:, 0]).sum())
 
 
-def _fitted(
-    detection: PenDetection, camera: Camera, pen: Pen, *, is_near: bool
-) -> PenDetection:
+def _fitted(detection: PenDetection, camera: Camera, pen: Pen) -> PenDetection:
     """Return a detection with its pose, if it has one, fitted to the LEDs."""
     if not detection.has_pose:
         return detection
-    poses = fit_poses(
-        camera,
-        pen,
-        detection.pixels[None],
-        detection.rotation[None],
-        detection.translation[None],
-        sigmas=detection.sigmas[None],
-        is_near=is_near,
+    poses = fit_pose(
+        *(camera, pen, detection.pixels),
+        *(detection.rotation, detection.translation, detection.sigmas),
     )
     return _posed(detection, poses)
 

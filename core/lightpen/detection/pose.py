@@ -105,7 +105,6 @@ def fit_poses(
     *,
     sigmas: FloatArray | None = None,
     is_near: bool = False,
-    tolerance: float = ROBUST_TOLERANCE,
 ) -> Poses:
     """Fit poses by maximum likelihood on ellipse centres.
 
@@ -123,8 +122,6 @@ def fit_poses(
         How exact the centres are compared with each other, px; all alike if not given.
     is_near : bool
         Whether that is by least squares on most of these LEDs already.
-    tolerance : float
-        Of the last step: its angle, rad, and its translation over the distance.
     """
     problem: Reprojection = CameraReprojection(
         camera, pen.leds, pen.normals, pen.diameter / 2, pixels
@@ -132,9 +129,7 @@ def fit_poses(
     scales = None if sigmas is None else relative_sigmas(sigmas)
     if scales is not None:
         problem = _Scaled(problem, scales)
-    poses = fit_reprojection(
-        problem, rotations, translations, is_near=is_near, tolerance=tolerance
-    )
+    poses = fit_reprojection(problem, rotations, translations, is_near=is_near)
     if scales is None:
         return poses
     return replace(poses, residuals=poses.residuals * scales[..., None])
@@ -175,15 +170,14 @@ def fit_reprojection(
     translations: FloatArray,
     *,
     is_near: bool = False,
-    tolerance: float = ROBUST_TOLERANCE,
 ) -> Poses:
     """Fit poses to the reprojection errors of any cameras, as `fit_poses`."""
     _require_seen(problem.pixels)
     R, t = rotations, translations
     if not is_near:
         R, t = _descend(problem, R, t, robust=False, max_steps=3, tolerance=ROUGHLY)
-    R, t = _descend(problem, R, t, robust=True, tolerance=tolerance)
-    return _poses_at(problem, R, t, robust=True)
+    R, t = _descend(problem, R, t, robust=True, tolerance=ROBUST_TOLERANCE)
+    return poses_at(R, t, *problem.residuals_with_jacobian(R, t), robust=True)
 
 
 def fit_paper_poses(
@@ -217,7 +211,7 @@ def fit_paper_poses(
     undistorted = ideal.pixels(normalised)
     problem = CameraReprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
     R, t = _descend(problem, R, t, robust=False)
-    return _poses_at(problem, R, t, robust=False)
+    return poses_at(R, t, *problem.residuals_with_jacobian(R, t), robust=False)
 
 
 def start_poses(
@@ -332,11 +326,11 @@ def _descend(
     return R, t
 
 
-def _poses_at(
-    problem: Reprojection, R: FloatArray, t: FloatArray, *, robust: bool
+def poses_at(
+    R: FloatArray, t: FloatArray, residuals: FloatArray, J: FloatArray, *, robust: bool
 ) -> Poses:
-    seen = np.isfinite(problem.pixels[..., 0])
-    residuals, J = problem.residuals_with_jacobian(R, t)
+    """Return fitted poses with covariances, by residuals (N, L, 2) and derivatives."""
+    seen = np.isfinite(residuals[..., 0])
     sigma = robust_sigma(residuals, 6)
     weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
     H, _ = normal_equations(J, residuals, weights)

@@ -4,10 +4,12 @@ The moments up to the third order show whether the region is a whole ellipse; it
 rim shows its blur, whose effect on area and variances is taken out.
 """
 
-from math import hypot, pi, sqrt
-from typing import NamedTuple
+from collections.abc import Mapping
+from math import pi
+from typing import Any, NamedTuple, TypeAlias
 
 import cv2
+import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.detection.edge_fit import EdgeFit
@@ -35,10 +37,14 @@ ROUNDNESS_LOSS_BY_BLUR = 0.1
 SKEWNESS = 0.004
 SKEWNESS_BY_SAMPLING = 0.1
 SKEWNESS_BY_NOISE = 25.0
+TINY = 1e-9  # px^2
+
+
+Value: TypeAlias = Any  # a float, or of several regions an array (N,)
 
 
 class DiscMoments(NamedTuple):
-    """Area, centroid and central moments of a region, px.
+    """Area, centroid and central moments of a region, px, or arrays of several.
 
     `roundness` is the area over that of the ellipse with the same second moments: 1 for
     an ellipse, less for all else. `skewness` is the norm of the third moments of the
@@ -46,36 +52,42 @@ class DiscMoments(NamedTuple):
     fraction e of its area, makes it 2 e.
     """
 
-    area: float
-    x: float
-    y: float
-    var_x: float
-    cov_xy: float
-    var_y: float
-    roundness: float
-    skewness: float
-    edge_width: float
+    area: Value
+    x: Value
+    y: Value
+    var_x: Value
+    cov_xy: Value
+    var_y: Value
+    roundness: Value
+    skewness: Value
+    edge_width: Value
 
     @property
-    def radius(self) -> float:
+    def are_enough(self) -> Value:
+        """Whether the region is neither a hot pixel nor a streak."""
+        narrow = np.minimum(self.var_x, self.var_y) < MIN_VARIANCE
+        return (self.area >= MIN_AREA) & ~narrow
+
+    @property
+    def radius(self) -> Value:
         """Of the circle of the same area, px."""
-        return sqrt(self.area / pi)
+        return np.sqrt(self.area / pi)
 
     @property
-    def rim_width(self) -> float:
+    def rim_width(self) -> Value:
         """Width of the rim over its whole height, px."""
         return self.edge_width / (HIGH - LOW)
 
     @property
-    def axes(self) -> tuple[float, float]:
+    def axes(self) -> tuple[Value, Value]:
         """Semi-axes of the ellipse with the same second moments, the longer first."""
         half_trace = (self.var_x + self.var_y) / 2.0
-        half_span = hypot((self.var_x - self.var_y) / 2.0, self.cov_xy)
-        shorter = max(half_trace - half_span, 0.05)
-        return 2.0 * sqrt(half_trace + half_span), 2.0 * sqrt(shorter)
+        half_span = np.hypot((self.var_x - self.var_y) / 2.0, self.cov_xy)
+        shorter = np.maximum(half_trace - half_span, 0.05)
+        return 2.0 * np.sqrt(half_trace + half_span), 2.0 * np.sqrt(shorter)
 
 
-def is_ellipse(moments: DiscMoments, relative_noise: float) -> bool:
+def is_ellipse(moments: DiscMoments, relative_noise: Value) -> Value:
     """Return whether sampling, blur and noise explain the deviation from an ellipse."""
     radius = moments.radius
     _, minor = moments.axes
@@ -85,13 +97,13 @@ def is_ellipse(moments: DiscMoments, relative_noise: float) -> bool:
         + SKEWNESS_BY_SAMPLING / radius
         + SKEWNESS_BY_NOISE * relative_noise / radius**1.5
     )
-    return moments.roundness > 1.0 - loss and moments.skewness < skewness
+    return (moments.roundness > 1.0 - loss) & (moments.skewness < skewness)
 
 
 def moments_of_rim(rim: EdgeFit) -> DiscMoments:
     """Return the moments of the ellipse within a fitted rim."""
     (var_x, cov_xy), (_, var_y) = rim.shape.tolist()
-    area = 4.0 * pi * sqrt(var_x * var_y - cov_xy**2)
+    area = 4.0 * pi * np.sqrt(var_x * var_y - cov_xy**2)
     x, y = rim.center.tolist()
     edge_width = GAUSSIAN_RISE * rim.sigma
     return DiscMoments(area, x, y, var_x, cov_xy, var_y, 1.0, 0.0, edge_width)
@@ -101,46 +113,58 @@ def moments_of_region(
     soft: MatLike, frame: PixelBox, ramp: float
 ) -> DiscMoments | None:
     """Return the moments of a soft-thresholded region; None if small or narrow."""
-    m = cv2.moments(soft)
-    area = m["m00"] / 255.0
-    if area < MIN_AREA:
+    sums = cv2.moments(soft)
+    if sums["m00"] < 255.0:
         return None
-    var_x, cov_xy, var_y = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
-    if min(var_x, var_y) < MIN_VARIANCE:
-        return None
+    squares = cv2.norm(soft, cv2.NORM_L2SQR)
+    found = moments_by_sums(sums, squares, frame.left, frame.top, ramp)
+    return found if found.are_enough else None
 
-    grey = area - cv2.norm(soft, cv2.NORM_L2SQR) / 255.0**2
-    perimeter = 2.0 * pi * sqrt(2.0 * (var_x + var_y))
+
+def moments_by_sums(
+    m: Mapping[str, Value], squares: Value, left: Value, top: Value, ramp: Value
+) -> DiscMoments:
+    """Return the moments of regions by the sums over their pixels.
+
+    Sums ``m``, above 0, are named as `cv2.moments` names them, ``squares`` are those of
+    squared pixels; ``left`` and ``top`` are the corners of the windows, px.
+    """
+    area = m["m00"] / 255.0
+    var_x, cov_xy, var_y = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
+    narrower = np.maximum(np.minimum(var_x, var_y), TINY)
+    grey = area - squares / 255.0**2
+    perimeter = 2.0 * pi * np.sqrt(2.0 * np.maximum(var_x + var_y, TINY))
     sigma = grey / (perimeter * GAUSSIAN_GREY) * (HIGH - LOW) / ramp
     # Blur must not make a small disc vanish.
-    spread = min(VARIANCE_GAIN * sigma**2, 0.2 * min(var_x, var_y))
+    spread = np.minimum(VARIANCE_GAIN * sigma**2, 0.2 * narrower)
     var_x, var_y = var_x - spread, var_y - spread
-    area += min(AREA_LOSS * pi * sigma**2, 0.2 * area)
+    area = area + np.minimum(AREA_LOSS * pi * sigma**2, 0.2 * area)
 
-    determinant = max(var_x * var_y - cov_xy**2, 1e-9 * var_x * var_y)
+    both = np.maximum(var_x, TINY) * np.maximum(var_y, TINY)
+    determinant = np.maximum(var_x * var_y - cov_xy**2, 1e-9 * both)
     return DiscMoments(
         area,
-        frame.left + m["m10"] / m["m00"],
-        frame.top + m["m01"] / m["m00"],
+        left + m["m10"] / m["m00"],
+        top + m["m01"] / m["m00"],
         var_x,
         cov_xy,
         var_y,
-        area / (4.0 * pi * sqrt(determinant)),
-        _skewness(m, var_x, cov_xy, determinant),
+        area / (4.0 * pi * np.sqrt(determinant)),
+        _skewness(m, np.maximum(var_x, TINY), cov_xy, determinant),
         GAUSSIAN_RISE * sigma,
     )
 
 
 def _skewness(
-    m: dict[str, float], var_x: float, cov_xy: float, determinant: float
-) -> float:
+    m: Mapping[str, Value], var_x: Value, cov_xy: Value, determinant: Value
+) -> Value:
     """Norm of the third moments after whitening, the root of Mardia's skewness."""
     slope = cov_xy / var_x
-    sx = sqrt(var_x)
-    sy = sqrt(determinant / var_x)
+    sx = np.sqrt(var_x)
+    sy = np.sqrt(determinant / var_x)
     m30, m21, m12, m03 = (m[k] / m["m00"] for k in ("mu30", "mu21", "mu12", "mu03"))
     w30 = m30 / sx**3
     w21 = (m21 - slope * m30) / (sx**2 * sy)
     w12 = (m12 - 2 * slope * m21 + slope**2 * m30) / (sx * sy**2)
     w03 = (m03 - 3 * slope * m12 + 3 * slope**2 * m21 - slope**3 * m30) / sy**3
-    return hypot(w30, sqrt(3) * w21, sqrt(3) * w12, w03)
+    return np.sqrt(w30**2 + 3 * (w21**2 + w12**2) + w03**2)

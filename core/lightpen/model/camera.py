@@ -23,8 +23,10 @@ References
 from dataclasses import dataclass, field, replace
 from datetime import date
 from enum import StrEnum
+from functools import cached_property
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image
@@ -33,6 +35,8 @@ from lightpen.model import fisheye
 from lightpen.model.lens_field import LensField
 from lightpen.model.self_calibration import FoundCamera, are_shared
 
+FEW = 200  # coordinates, up to which OpenCV is faster than numpy
+NOWHERE = np.zeros(3)
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
 # less than 1e-8 px at any sensible focal length.
@@ -146,6 +150,8 @@ class Camera:
 
     def pixels(self, normalised: FloatArray) -> FloatArray:
         """Return the pixels of undistorted normalised points, both (..., 2)."""
+        if self._is_for_opencv(normalised):
+            return self._by_opencv(normalised).points
         r2 = np.einsum("...i,...i->...", normalised, normalised)
         factor = self._gain(r2) + normalised @ self._slopes
         return self._distorted_pixels(normalised, r2, factor)
@@ -156,6 +162,8 @@ class Camera:
         With n the point, r its distance from the axis and p = (p2, p1), Brown's model
         is ``n (gain(r^2) + 2 p n) + r^2 p``.
         """
+        if self._is_for_opencv(normalised):
+            return self._by_opencv(normalised)
         slopes = self._slopes
         r2 = np.einsum("...i,...i->...", normalised, normalised)
         gain = self._gain(r2)
@@ -168,6 +176,24 @@ class Camera:
         J[..., 1, 1] += factor
         J *= np.array([[self.fx], [self.fy]])
         return PointMap(self._distorted_pixels(normalised, r2, factor), J)
+
+    def _is_for_opencv(self, normalised: FloatArray) -> bool:
+        return self.lens is LensModel.BROWN and 0 < normalised.size <= FEW
+
+    @cached_property
+    def _opencv(self) -> tuple[FloatArray, FloatArray]:
+        return self.matrix, np.asarray(self.distortion, dtype=np.float64)
+
+    def _by_opencv(self, normalised: FloatArray) -> PointMap:
+        """Return `pixels_with_jacobian` of a few points, a quarter of its time."""
+        points = np.ones((normalised.size // 2, 3))
+        points[:, :2] = normalised.reshape(-1, 2)
+        pixels, J = cv2.projectPoints(points, NOWHERE, NOWHERE, *self._opencv)
+        by_point = np.asarray(J, dtype=np.float64)[:, 3:5]  # by a shift of the camera
+        return PointMap(
+            np.asarray(pixels, dtype=np.float64).reshape(normalised.shape),
+            by_point.reshape(*normalised.shape, 2),
+        )
 
     @property
     def _slopes(self) -> FloatArray:
@@ -252,6 +278,9 @@ class Camera:
         normalised = (pixels - np.array([self.cx, self.cy])) / focal
         if self.lens is LensModel.KANNALA_BRANDT:
             return self._unproject_fisheye(normalised)
+        if self._is_for_opencv(pixels):
+            near = cv2.undistortPoints(pixels.reshape(-1, 1, 2), *self._opencv)
+            normalised = np.asarray(near, dtype=np.float64).reshape(pixels.shape)
         missing = np.isnan(pixels)
         with np.errstate(all="ignore"):  # what diverges is refused below
             for _ in range(UNDISTORT_STEPS):

@@ -178,7 +178,10 @@ def test_centres_found_live_are_those_found_in_the_record(wizard: Wizard) -> Non
     found = source(open_record(wizard.folder))
     seen = observe_images(found.images, found.camera, found.pen)
 
-    np.testing.assert_array_equal(seen.pixels, wizard.state.kept.pixels[:, 0])
+    # Lens distortion of one image is computed by OpenCV, of many images by numpy, which
+    # differ in the last digit of a double.
+    kept = wizard.state.kept.pixels[:, 0]
+    np.testing.assert_allclose(seen.pixels, kept, rtol=0, atol=1e-11)
 
 
 @pytest.mark.slow
