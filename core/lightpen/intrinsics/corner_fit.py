@@ -26,7 +26,8 @@ import numpy.typing as npt
 
 from lightpen.arrays import FloatArray, Image
 
-ROUNDS = 8
+ROUNDS, ROUGH, THINNED = 8, 2, 3  # the first of them by every third of many pixels
+MANY = 150  # pixels
 FIRST_BLUR, LEAST_BLUR = 1.0, 0.3  # px, standard deviations
 LONGEST, LARGEST_TURN = 1.0, 0.2  # px and rad, in one round
 FARTHEST = 1.0  # px from the start
@@ -67,11 +68,12 @@ def fit_corners(
     found, fits = start.copy(), np.zeros(len(start), dtype=np.bool_)
     left = np.arange(len(start))  # numbers of the corners that still move
     for n_done in range(1, ROUNDS + 1):
-        columns = _columns(u, v, at[left], turns[left], blurs[left])
+        some = slice(None, None, THINNED if n_done <= ROUGH and len(x) > MANY else None)
+        columns = _columns(u[some], v[some], at[left], turns[left], blurs[left])
         if n_done == 1:
-            levels = _least_squares(columns[:, -N_LEVELS:], light)
+            levels = _least_squares(columns[:, -N_LEVELS:], light[:, some])
         shades = levels[:, None].astype(np.float32)
-        residuals = light - (shades @ columns[:, -N_LEVELS:])[:, 0]
+        residuals = light[:, some] - (shades @ columns[:, -N_LEVELS:])[:, 0]
         columns[:, :6] *= shades[..., 3:] @ columns[:, 6:9]
         moved = _least_squares(columns, residuals)
         levels = levels + moved[:, 6:]
@@ -82,7 +84,7 @@ def fit_corners(
         widened = own + np.clip(moved[:, 4:6], -0.5 * own, 0.5 * own)
         blurs[left] = np.clip(widened, LEAST_BLUR, 0.5 * half)
         size = np.abs(step).max(axis=1)
-        ends = (size < SETTLED) | (n_done == ROUNDS)
+        ends = (n_done > ROUGH) & (size < SETTLED) | (n_done == ROUNDS)
         rms = np.sqrt(np.mean(np.square(residuals), axis=1))
         is_near = np.linalg.norm(base[left] + at[left] - start[left], axis=1) < FARTHEST
         is_corner = np.abs(levels[:, 3]) > CONTRAST * rms
