@@ -6,7 +6,7 @@ once with one camera and once with two. A change counts as found where two camer
 predict nearly all views better, by more than views without a change do by chance: the
 mean of the gains in the logarithm of the squares, over their root mean square, exceeds
 `IN_TIME`; or, where the groups were chosen, `IN_GROUPS`, and the error of all views is
-`MUCH` larger by one camera. No set of 1,000 without a change reaches either. All is
+`MUCH` larger by one camera. Of 975 sets without a change none reaches either. All is
 linear about the fit of one camera, so it takes no other fit.
 """
 
