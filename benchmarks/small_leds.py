@@ -29,6 +29,16 @@ LOOKS = {
     "on a shining board": Panel(
         6.0, reflections=(0.1, 0.5), bloom=0.3, background=0.08, quality=80
     ),
+    "with halos of their own": Panel(
+        6.0,
+        reflections=(0.05, 0.2),
+        bloom=0.15,
+        background=0.05,
+        quality=None,
+        pitch=4.0,
+        halos=(0.1, 0.4),
+        variety=0.3,
+    ),
     "clipped, on a board": replace(_lit, gains=(2.0, 6.0)),
 }
 

@@ -53,6 +53,9 @@ class Panel:
         and the board, over that of its LED; each has a place and a shape of its own.
     gamma : float
         Of the camera; 1 is linear.
+    variety : float
+        Most by which one LED is narrower than another in a direction of its own, as
+        lenses and soldering make them, share of the width.
     """
 
     width: float
@@ -66,6 +69,7 @@ class Panel:
     pitch: float = 2.5
     halos: tuple[float, float] = (0.0, 0.0)
     gamma: float = 1.0
+    variety: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +87,8 @@ def panel_image(panel: Panel, rng: np.random.Generator) -> PanelImage:
     tilt, direction = rng.uniform(0.8, 1.0), rng.uniform(0, np.pi)
     for center in centers:
         gain = rng.uniform(*panel.gains)
+        if panel.variety > 0:
+            tilt, direction = rng.uniform(1 - panel.variety, 1), rng.uniform(0, np.pi)
         _add_led(light, center, panel, gain, tilt, direction)
         place = np.array([rng.normal(0, 0.1), rng.uniform(*PLACE)])
         there = center + panel.pitch * panel.width * place

@@ -53,6 +53,8 @@ LEAST_NOISE = 0.7  # digital numbers
 DARK, LIT = 0.25, 0.5  # of the height: pixels that show the noise, and its growth
 MOST_GROWTH = 0.1  # digital numbers, as 8 bits of 2500 electrons have
 FEWEST_PIXELS = 12
+MISSHAPEN = 0.1  # more stretched than usual, of an LED that is not whole, and
+MANY_SPREADS = 2.0  # times the usual stretch: of normal ones one in 500 has thrice it
 USUAL_NOISE = 3.0  # digital numbers, where fewer show it
 EVIDENT_SLOPE = 1.5  # times the squares of slopes that noise alone makes
 NO_SLOPE = 1e-2  # digital numbers per px
@@ -73,8 +75,8 @@ class DiscFits(NamedTuple):
     # (N,), standard deviation of one coordinate, px, larger for discs whose shape
     # differs from the others.
     sigmas: FloatArray
-    # (N,), by how much more than usual each shape differs from the median.
-    misshapen: FloatArray
+    # (N,), whether each shape differs from the median more than shapes usually do.
+    are_outliers: BoolArray
     noises: FloatArray  # (N,), standard deviation of a dark pixel, digital numbers
 
 
@@ -140,9 +142,14 @@ def fit_discs(
     field = np.zeros((len(light), 2, light[0].size))
     np.put_along_axis(field, chosen[:, None], pulls, axis=2)
     squares = squares * _correlated(field.reshape(-1, *light.shape[1:]))
-    misshapen = _misshapen(values)
+    off = _misshapen(values)
+    usual = np.median(off)
+    misshapen = np.maximum(off - usual, 0.0)
     sigmas = np.sqrt(squares + (misshapen * radii) ** 2)
-    return DiscFits(values[:, CENTER], sigmas, misshapen, noises)
+    # Halos and lenses of their own give all LEDs shapes of their own; an edge or a
+    # second light shows beyond their spread.
+    are_outliers = misshapen >= np.maximum(MISSHAPEN, MANY_SPREADS * usual)
+    return DiscFits(values[:, CENTER], sigmas, np.asarray(are_outliers), noises)
 
 
 def _fitted(
@@ -234,15 +241,15 @@ def _correlated(pulls: FloatArray) -> float:
 
 
 def _misshapen(values: FloatArray) -> FloatArray:
-    """Return the distance of each shape from the median beyond the usual, (N,).
+    """Return the distance of each shape from the median, (N,).
 
     Light beside a disc distorts its shape and shifts its centre by about as much.
     """
     m11, m12, m22 = values[:, [M11, M12, M22]].T
     sizes = np.maximum(np.abs(m11 + m22), TINY)
     stretches = np.stack([m11 - m22, 2 * m12]) / sizes
-    off = np.hypot(*(stretches - np.median(stretches, axis=1, keepdims=True)))
-    return np.asarray(np.maximum(off - np.median(off), 0.0))
+    off = stretches - np.median(stretches, axis=1, keepdims=True)
+    return np.asarray(np.hypot(*off))
 
 
 def _diagonal(matrices: _Reals) -> _Reals:

@@ -51,7 +51,6 @@ MIN_WIDTH = 4.0  # px, at half level; less shows no centre
 LEAST_TINY = 1.2  # px; smaller ones are hot pixels
 LARGEST_TINY = 12  # px, of the box at the foot
 MAX_TINY = 4000  # contours examined
-MISSHAPEN = 0.1  # more stretched than the others, of an LED that is not whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +121,7 @@ def measure_small(
         peaks=windows.tops,
         sigmas=sigmas,
         noises=fits.noises,
-        are_whole=is_near & (fits.misshapen < MISSHAPEN),
+        are_whole=is_near & (~fits.are_outliers),
         saturated=saturated,
         alone=_are_alone(windows, narrow),
     )

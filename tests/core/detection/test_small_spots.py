@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import pytest
+from benchmarks.peers import grey_centroids_at
 from tests.simulated_panels import Panel, panel_image
 
 from lightpen.arrays import FloatArray, IntArray
@@ -19,6 +20,18 @@ EASY = Panel(6.0)
 HARD = Panel(
     6.0, reflections=(0.1, 0.5), bloom=0.3, background=0.08, quality=80
 )  # as photographs of boards are
+HALOS = Panel(
+    6.0,
+    gains=(0.4, 4.0),
+    reflections=(0.05, 0.2),
+    bloom=0.15,
+    psf=0.7,
+    background=0.05,
+    quality=None,
+    pitch=4.0,
+    halos=(0.1, 0.4),
+    variety=0.3,
+)  # each LED with light and a shape of its own
 CLIPPED = Panel(5.0, gains=(1.2, 6.0), reflections=(0.05, 0.2), bloom=0.1)
 CLEAN = Panel(6.0, reflections=(0.0, 0.0), bloom=0.0, quality=None)
 
@@ -62,6 +75,25 @@ def test_at_most_one_in_ten_small_leds_on_a_reflecting_board_is_flagged(
     flaws = found.flaws[(found.flaws & SpotFlaw.SATURATED) == 0]
     assert len(found.flaws) > 0.98 * found.n_leds
     assert np.mean(flaws > 0) <= 0.1
+
+
+def test_leds_that_all_differ_by_halo_and_lens_are_not_flagged_for_it() -> None:
+    # A fixed limit of their difference flags a quarter.
+    unlike = replace(HALOS, width=7.0, gains=(0.35, 0.95), variety=0.7)
+    assert np.mean(found_on(unlike, 4).flaws > 0) <= 0.1
+
+
+def test_halos_move_centers_less_than_a_plain_centroid() -> None:
+    panel = replace(HALOS, gains=(0.35, 0.95))
+    rng = np.random.default_rng(1)
+    errors = []
+    for _ in range(3):
+        shown = panel_image(panel, rng)
+        starts = shown.centers + rng.normal(0, 0.2, shown.centers.shape)
+        plain = grey_centroids_at(shown.image, starts, panel.width)
+        errors.append(np.linalg.norm(plain - shown.centers, axis=1))
+    of_ours = np.linalg.norm(found_on(panel).errors, axis=1)
+    assert np.median(of_ours) < 0.5 * np.median(np.concatenate(errors))
 
 
 @pytest.mark.parametrize(
