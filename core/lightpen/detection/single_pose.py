@@ -20,7 +20,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 
 LEAST_WEIGHT = 0.6  # of an LED: residuals up to three standard deviations
-WEIGHTINGS = 2  # of LEDs by residuals, which change little
+WEIGHTINGS = 4  # of LEDs by residuals; each leaves some sixteenth
 SMALL = 1e-3  # of an angle in rad and of a translation over its length
 
 
