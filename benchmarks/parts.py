@@ -1,7 +1,8 @@
 """Measured parts (``./run bench measure``): coverage of U, speed, and other fits.
 
-Each part is the simulated plate (holes, cylinder, cone, sphere, slot), measured by its
-plan at a station of its own, see `benchmarks.touches`.
+Each part is the simulated plate (holes, cylinder, cone, sphere, line, point), measured
+by its plan at a station of its own, see `benchmarks.touches`. The ball comes at an
+angle to each surface, as a hand brings it.
 """
 
 import random
@@ -37,6 +38,7 @@ CAMERAS = 1, 2
 N_PARTS, N_CHUNKS = 1000, 50
 BALL = 10.0  # mm
 SHAPE = 0.01  # mm, standard deviation of a part's surface from its features
+ASKEW = np.radians(10.0)  # rms angle of an approach to the normal, about each axis
 SHARE_LIMITS = 0.93, 0.97
 FIXED = 1e-9  # mm, U of what a feature or the alignment fixes
 N_TOUCHES, LONGEST, N_TIMED = 50, 0.020, 30  # a feature, s
@@ -78,13 +80,10 @@ class CoveredPart:
         Share of the values of a feature (place, axis, sizes) that U holds.
     holds : mapping of str to bool
         Of each characteristic.
-    distances : mapping of str to (float, float)
-        U, and U if the touches shared nothing, mm.
     """
 
     features: dict[str, float]
     holds: dict[str, bool]
-    distances: dict[str, tuple[float, float]]
 
 
 def part_rows(workers: Workers) -> list[Row]:
@@ -129,16 +128,6 @@ def coverage_rows(found: Sequence[Sequence[CoveredPart]]) -> list[Row]:
     for name in found[0][0].holds:
         share = [float(np.mean([p.holds[name] for p in ps])) for ps in found]
         rows.append(row(f"- {name}", share, is_bound=name in bounds))
-    for name in found[0][0].distances:
-        u = [np.mean([p.distances[name] for p in ps], axis=0) for ps in found]
-        shared, alone = UM * np.array(u).T
-        rows.append(
-            Row(
-                f"U of the {name}: by all that touches share, one and two cameras; "
-                "if they shared nothing",
-                f"{numbers(shared, 0)} µm; {numbers(alone, 0)} µm",
-            )
-        )
     return rows
 
 
@@ -172,6 +161,8 @@ def _covered_part(n_cameras: int, rng: np.random.Generator) -> CoveredPart:
     names, places, approaches = _probed()
     of_form = SHAPE * rng.standard_normal((len(places), 1))
     places = station.placed(places + of_form * approaches)
+    approaches = approaches + np.tan(ASKEW) * rng.standard_normal(approaches.shape)
+    approaches /= np.linalg.norm(approaches, axis=1)[:, None]
     held = station.touched(places, rng)
     points = [
         replace(point, approach_cam=station.rotation @ way)
@@ -183,18 +174,16 @@ def _covered_part(n_cameras: int, rng: np.random.Generator) -> CoveredPart:
     conditions = Conditions(station.instrument, ball_diameter=BALL)
     part = PART.measure(runs, conditions, PartOptions(_plan(), 0.0)).part
     exact = measure_part(_plan(), replace(part.touches, points_cam=places))
-    features, holds, distances = {}, {}, {}
+    features, holds = {}, {}
     for name, one in part.features.items():
         u = part.uncertainty(name)
         is_known = np.abs(one.in_part.values - exact.features[name].in_part.values) <= u
         features[name] = float(np.mean(is_known[u > FIXED]))
     for result, true in zip(part.results, exact.results, strict=True):
-        label, u_alone = result.planned.label, result.independent_uncertainty
+        label = result.planned.label
         error = result.value.value - true.value.value
         holds[label] = abs(error) <= result.value.uncertainty
-        if result.planned.quantity is DISTANCE and u_alone is not None:
-            distances[label] = result.value.uncertainty, u_alone
-    return CoveredPart(features, holds, distances)
+    return CoveredPart(features, holds)
 
 
 # Speed, and other programs
@@ -249,9 +238,6 @@ def _shape(kind: FeatureKind, rng: np.random.Generator) -> FloatArray:
             return np.asarray(15 * np.sqrt(1 - rise**2) * round_ + rise * up)
         case FeatureKind.CONE:
             return np.asarray((15 + z[:, None] * np.tan(0.4)) * round_ + height)
-        case FeatureKind.SLOT:
-            ends = np.sign(round_[:, :1]) * np.array([20.0, 0.0, 0.0])
-            return np.asarray(8 * round_ + ends)
         case _:
             return 15 * round_ + height
 

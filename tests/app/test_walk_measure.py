@@ -61,7 +61,7 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     walker.until_says("Part measured")
 
     assert walker.n_inputs == n_inputs
-    assert walker.tells("guard band")
+    assert walker.tells("simple acceptance")
     folder = walker.workbench.folder / SIMULATED / VERIFICATIONS
     records = [json.loads(each.read_bytes()) for each in sorted(folder.glob("*.json"))]
     assert [each["verification"] for each in records] == [PART.kind, CONCLUSION]
@@ -88,4 +88,4 @@ def test_without_a_plan_the_step_says_what_to_do(
     walker.until_tells("No measuring plan is chosen.")
     assert walker.says("Choose a plan")
     walker.click("Without a plan")
-    walker.until_tells("Probe the feature F1: 0 of 8 points.")
+    walker.until_tells("Probe F1: 0 of 8 points.")

@@ -44,7 +44,6 @@ def part_blocks(record: Mapping[str, Any]) -> Iterator[Block]:
     yield heading(translate("paper", "Features / mm, degrees"))
     yield from _features(record["features"])
     yield from _alignment(record["alignment"])
-    yield from _refinement(record["refinement"])
     yield heading(translate("paper", "Points"))
     yield from _points(record["touches"], record["positions"])
     yield heading(translate("paper", "Measuring plan"))
@@ -68,7 +67,6 @@ def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
         translate("paper", "Actual"),
         translate("paper", "Deviation"),
         translate("paper", "U (k = 2)"),
-        translate("paper", "U alone"),
         translate("paper", "P"),
     )
     columns.append(Column(translate("paper", "Decision"), 1.2))
@@ -82,7 +80,6 @@ def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
                     for name in (
                         *("nominal", "lower_limit", "upper_limit", "actual"),
                         *("deviation", "expanded_uncertainty"),
-                        *("independent_expanded_uncertainty",),
                         *("probability_of_conformity",),
                     )
                 ),
@@ -94,12 +91,7 @@ def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
         size=PrintSize.SMALL,
     )
     yield paragraph(
-        translate(
-            "paper",
-            "U alone: U (k = 2) if the points shared no error. P: probability of "
-            "conformity (JCGM 106).",
-        ),
-        PrintSize.SMALL,
+        translate("paper", "P: probability of conformity (JCGM 106)."), PrintSize.SMALL
     )
 
 
@@ -146,10 +138,7 @@ def _kind(feature: Mapping[str, Any]) -> str:
 
 def _sizes(sizes: Mapping[str, float]) -> Iterator[tuple[str, float]]:
     """Yield the sizes of a feature as a plan states them, mm and degrees."""
-    if "length" in sizes:
-        yield "width", 2 * sizes["radius"]
-        yield "length", sizes["length"] + 2 * sizes["radius"]
-    elif "radius" in sizes:
+    if "radius" in sizes:
         yield "diameter", 2 * sizes["radius"]
     if "half_angle" in sizes:
         yield "angle", 2 * float(np.rad2deg(sizes["half_angle"]))
@@ -170,33 +159,6 @@ def _alignment(alignment: dict[str, Any] | None) -> Iterator[Block]:
     ]
     columns = [Column("", 0.3), *_numbers("u", "v", "w", translate("paper", "Shift"))]
     yield from table(columns, rows, size=PrintSize.SMALL)
-
-
-def _refinement(refinement: dict[str, Any] | None) -> Iterator[Block]:
-    if refinement is None:
-        return
-    before, after = (
-        _text(max(refinement[f"tip_expanded_uncertainty_{when}_mm"]))
-        for when in ("before", "after")
-    )
-    text = translate(
-        "paper",
-        "Features of known form: {0}. Refinement of points and tip: {1}. Shift of the "
-        "tip {2} mm; U (k = 2) {3} mm before, {4} mm after; chi-square {5} with {6} "
-        "degrees of freedom.",
-    )
-    is_used = refinement["is_used"]
-    yield paragraph(
-        text.format(
-            ", ".join(refinement["features"]),
-            translate("paper", "used") if is_used else translate("paper", "not used"),
-            ", ".join(map(_text, refinement["tip_shift_pen_mm"])),
-            before,
-            after,
-            number_text(refinement["chi_square"], 1),
-            refinement["degrees_of_freedom"],
-        )
-    )
 
 
 def _points(

@@ -18,7 +18,8 @@ from lightpen.errors import FileError, UsageError
 from lightpen.formats.file_format import FileFormat
 from lightpen.formats.files import write_whole
 from lightpen.measuring.exports import EXPORTS
-from lightpen.measuring.plan import Plan, read_plan
+from lightpen.measuring.plan import Plan
+from lightpen.measuring.plan_checks import read_plan
 from lightpen.verification.probing.drift_reference import judged_with
 from lightpen.verification.reports.summaries import found_text
 from lightpen.verification.tasks.part import PART

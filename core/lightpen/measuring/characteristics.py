@@ -12,7 +12,7 @@ References
 .. [2] ISO 5459:2011, "Datums and datum systems".
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -24,39 +24,50 @@ from lightpen.measuring import constructions
 from lightpen.measuring.compensation import TouchedSurface
 from lightpen.measuring.features import AXIS, PLACE, Feature
 from lightpen.measuring.plan import CharacteristicKind as Of
-from lightpen.measuring.plan import Nominal, PlannedCharacteristic
+from lightpen.measuring.plan import Nominal, PlannedCharacteristic, Side
 from lightpen.measuring.quantities import Quantity, derive
-from lightpen.measuring.surfaces import RADIAL, FeatureKind
+from lightpen.measuring.surfaces import AXIAL, CENTRED, FLAT, RADIAL, FeatureKind
+from lightpen.measuring.touches import PartTouches
 from lightpen.measuring.zones import Criterion, fit_zone
 from lightpen.model.expanded_uncertainty import COVERAGE
 
 N_DRAWS = 4000
 PARALLEL = 5.0  # degrees, between axes that are meant to be parallel
 COORDINATES = {Of.X: 0, Of.Y: 1, Of.Z: 2}
-AXIAL = {FeatureKind.LINE, FeatureKind.CYLINDER, FeatureKind.CONE}
-FLAT = {FeatureKind.PLANE}
-CENTRED = {FeatureKind.POINT, FeatureKind.CIRCLE, FeatureKind.SLOT, FeatureKind.SPHERE}
 FORMS = {
     Of.STRAIGHTNESS: {FeatureKind.LINE},
     Of.FLATNESS: {FeatureKind.PLANE},
     Of.ROUNDNESS: {FeatureKind.CIRCLE, FeatureKind.SPHERE},
     Of.CYLINDRICITY: {FeatureKind.CYLINDER},
-    Of.FORM: set(FeatureKind) - {FeatureKind.POINT, FeatureKind.SLOT},
+    Of.FORM: set(FeatureKind) - {FeatureKind.POINT},
 }
-SIZES = {
+NEEDS_DATUM = {Of.PARALLELISM, Of.PERPENDICULARITY, Of.CONCENTRICITY}
+DEVIATIONS = {*FORMS, *NEEDS_DATUM, Of.POSITION}
+OF_TWO = {Of.DISTANCE, Of.ANGLE, Of.LENGTH}
+# The kinds of its features, and of its datum; others are defined for all.
+KINDS: dict[Of, set[FeatureKind]] = {
+    **FORMS,
     Of.DIAMETER: RADIAL,
     Of.RADIUS: RADIAL,
-    Of.WIDTH: {FeatureKind.SLOT},
-    Of.LENGTH: {FeatureKind.SLOT},
     Of.CONE_ANGLE: {FeatureKind.CONE},
+    Of.LENGTH: {FeatureKind.POINT},
+    Of.ANGLE: set(FeatureKind) - {FeatureKind.POINT, FeatureKind.SPHERE},
+    Of.PARALLELISM: FLAT | AXIAL,
+    Of.PERPENDICULARITY: FLAT | AXIAL,
+    Of.CONCENTRICITY: CENTRED | AXIAL,
 }
-DEVIATIONS = {
-    *FORMS,
-    Of.POSITION,
-    Of.PARALLELISM,
-    Of.PERPENDICULARITY,
-    Of.CONCENTRICITY,
-}
+ENDS = {Side.INSIDE: 1.0, Side.OUTSIDE: -1.0, Side.CENTRE: 0.0}
+
+
+def is_defined(
+    quantity: Of, kinds: Sequence[FeatureKind | None], datum: FeatureKind | None = None
+) -> bool:
+    """Return whether a characteristic is defined for kinds; None is not known yet."""
+    if len(kinds) != (2 if quantity in OF_TWO else 1):
+        return False
+    allowed = KINDS.get(quantity, set(FeatureKind))
+    used = [*kinds, datum] if quantity in NEEDS_DATUM else kinds
+    return all(each is None or each in allowed for each in used)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,48 +95,50 @@ class Value:
 
 
 def evaluate(
-    planned: PlannedCharacteristic, of: Mapping[str, Measured], inputs: FloatArray
+    planned: PlannedCharacteristic, of: Mapping[str, Measured], touches: PartTouches
 ) -> tuple[Value, Quantity | None]:
     """Return a characteristic, and its quantity if it is a smooth one.
 
-    ``inputs`` is the covariance (P, P) of all inputs of the part. Raises
-    `CalibrationError` if the characteristic is not defined for features of these kinds.
+    Raises `CalibrationError` if the characteristic is not defined for features of these
+    kinds.
     """
     found = [of[name] for name in planned.of]
+    datum = of[planned.datum] if planned.datum else None
+    kinds = [each.kind for each in found]
+    if not is_defined(planned.quantity, kinds, None if datum is None else datum.kind):
+        raise _refused(planned)
     if planned.quantity in DEVIATIONS:
-        datum = of[planned.datum] if planned.datum else None
-        return _deviation(planned, found, datum, inputs), None
-    quantity = _smooth(planned, found)
-    value, uncertainty = quantity.values[0], quantity.uncertainty(inputs)[0]
-    return Value(float(value), float(uncertainty)), quantity
+        return _deviation(planned, found[0], datum, touches.inputs), None
+    quantity = _smooth(planned.quantity, found, touches.ball)
+    uncertainty = quantity.uncertainty(touches.inputs)[0]
+    return Value(float(quantity.values[0]), float(uncertainty)), quantity
 
 
 def _refused(planned: PlannedCharacteristic) -> CalibrationError:
     return CalibrationError("measuring.no-characteristic", name=planned.label)
 
 
-def _smooth(planned: PlannedCharacteristic, found: list[Measured]) -> Quantity:
-    quantity = planned.quantity
-    match found:
-        case [one] if quantity in COORDINATES:
-            axis = COORDINATES[quantity]
-            return derive(lambda values: values[axis], one.in_part)
-        case [one] if one.kind in SIZES.get(quantity, ()):
-            return derive(_SIZES[quantity], one.surface.quantity)
-        case [one, two] if quantity is Of.DISTANCE:
-            return _distance(planned, one, two)
-        case [one, two] if quantity is Of.ANGLE:
-            if {one.kind, two.kind} & {FeatureKind.POINT, FeatureKind.SPHERE}:
-                raise _refused(planned)
-            return _angle(one.surface.quantity, two.surface.quantity)
-    raise _refused(planned)
+def _smooth(quantity: Of, found: list[Measured], ball: Quantity) -> Quantity:
+    if quantity in COORDINATES:
+        axis = COORDINATES[quantity]
+        return derive(lambda values: values[axis], found[0].in_part)
+    if quantity in _SIZES:
+        return derive(_SIZES[quantity], found[0].surface.quantity)
+    one, two = found
+    if quantity is Of.ANGLE:
+        return _angle(one.surface.quantity, two.surface.quantity)
+    if quantity is Of.DISTANCE:
+        return _distance(one, two)
+    out = sum(ENDS[each.surface.side] for each in found)
+    return derive(
+        lambda a, b, radius: constructions.distance(a, b) + out * radius[0],
+        *(one.surface.quantity, two.surface.quantity, ball),
+    )
 
 
 _SIZES: dict[Of, Callable[[FloatArray], float]] = {
     Of.DIAMETER: lambda values: 2 * float(values[6]),
     Of.RADIUS: lambda values: float(values[6]),
-    Of.WIDTH: lambda values: 2 * float(values[6]),
-    Of.LENGTH: lambda values: float(values[7] + 2 * values[6]),
     Of.CONE_ANGLE: lambda values: 2 * float(np.rad2deg(values[7])),
 }
 
@@ -141,7 +154,7 @@ def _angle(first: Quantity, second: Quantity) -> Quantity:
     return derive(angle, first, second)
 
 
-def _distance(planned: PlannedCharacteristic, one: Measured, two: Measured) -> Quantity:
+def _distance(one: Measured, two: Measured) -> Quantity:
     """Return the distance of two features as their kinds define it, mm."""
     if one.kind in FLAT and two.kind not in FLAT:
         one, two = two, one
@@ -160,36 +173,31 @@ def _distance(planned: PlannedCharacteristic, one: Measured, two: Measured) -> Q
         one, two, first, second = two, one, second, first
     if two.kind in AXIAL:
         return derive(constructions.distance_to_line, first, second)
-    if one.kind in CENTRED and two.kind in CENTRED:
-        return derive(constructions.distance, first, second)
-    raise _refused(planned)
+    return derive(constructions.distance, first, second)
 
 
 def _deviation(
     planned: PlannedCharacteristic,
-    found: list[Measured],
+    one: Measured,
     datum: Measured | None,
     inputs: FloatArray,
 ) -> Value:
-    if len(found) != 1:
-        raise _refused(planned)
-    one, quantity = found[0], planned.quantity
+    quantity = planned.quantity
     if quantity in FORMS:
         return _form(planned, one, inputs)
     if quantity is Of.POSITION:
         return _position(planned, one, inputs)
     if datum is None:
-        raise CalibrationError("measuring.no-datum", name=planned.label)
+        raise _refused(planned)
     if quantity is Of.CONCENTRICITY:
-        return _concentricity(planned, one, datum, inputs)
+        return _concentricity(one, datum, inputs)
     return _orientation(planned, one, datum, inputs)
 
 
 def _form(planned: PlannedCharacteristic, one: Measured, inputs: FloatArray) -> Value:
     """Return the form error by the minimum zone, with U by its residuals."""
-    if one.kind not in FORMS[planned.quantity] or one.feature is None:
+    if one.feature is None or one.points is None:
         raise _refused(planned)
-    assert one.points is not None
     points = one.points.values.reshape(-1, 3)
     *_, width = fit_zone(one.kind, points, Criterion.MINIMUM_ZONE)
     n_points, n_distances = one.feature.distances.shape
@@ -228,7 +236,7 @@ def _orientation(
     planned: PlannedCharacteristic, one: Measured, datum: Measured, inputs: FloatArray
 ) -> Value:
     """Return parallelism or perpendicularity to a datum."""
-    if one.points is None or datum.kind not in FLAT | AXIAL:
+    if one.points is None:
         raise _refused(planned)
     # A plane that is parallel to an axis contains it, so that roles change with kinds.
     along = (planned.quantity is Of.PARALLELISM) == (datum.kind in FLAT)
@@ -247,8 +255,6 @@ def _orientation(
             derive(heights, one.surface.quantity, datum.surface.quantity, one.points),
             inputs,
         )
-    if one.kind not in AXIAL:
-        raise _refused(planned)
     length = _extent(one)
 
     def tilt(own: FloatArray, other: FloatArray) -> FloatArray:
@@ -273,12 +279,12 @@ def _position(
     """Return the diameter of the zone about the nominal place that holds the feature.
 
     Twice the distance of a plane's touches from the nominal plane, of an axis' ends
-    from the nominal axis, of other centres from the nominal centre; of circle and slot
-    in their plane.
+    from the nominal axis, of other centres from the nominal centre; of a circle in its
+    plane.
     """
     nominal = one.nominal
     if nominal is None or nominal.origin is None:
-        raise CalibrationError("measuring.no-nominal", name=planned.label)
+        raise _refused(planned)
     place = np.array(nominal.origin)
     if one.kind in {FeatureKind.POINT, FeatureKind.SPHERE}:
         return _length(
@@ -317,13 +323,9 @@ def _at_ends(
     return max(ends, key=lambda end: end.value)
 
 
-def _concentricity(
-    planned: PlannedCharacteristic, one: Measured, datum: Measured, inputs: FloatArray
-) -> Value:
+def _concentricity(one: Measured, datum: Measured, inputs: FloatArray) -> Value:
     """Return the diameter of the zone about a datum axis or centre."""
-    if one.kind not in CENTRED | AXIAL or datum.kind not in CENTRED | AXIAL:
-        raise _refused(planned)
-    is_about_axis = datum.kind in AXIAL | {FeatureKind.CIRCLE, FeatureKind.SLOT}
+    is_about_axis = datum.kind in AXIAL | {FeatureKind.CIRCLE}
 
     def offset(own: FloatArray, other: FloatArray, shift: float) -> FloatArray:
         way = own[PLACE] + shift * own[AXIS] - other[PLACE]

@@ -3,8 +3,11 @@
 The surface is parallel to the feature of the centres, so that a least-squares feature
 moves by the ball radius along its normal: radii change by it, a plane is shifted, and a
 cone of half angle ``a`` changes by ``r / cos a`` in radius [1]_. The side is given by
-the plan, by a point in air, by the approach of the ball, or by the stylus, which leaves
-the surface.
+the plan, by the approach of the ball, or by the stylus, which leaves the surface.
+
+A point or a line does not show its normal, and an approach that is off it by an angle
+``a`` puts it off by ``2 r sin(a / 2)``. So the normal is that of a plane on which it
+lies, or a vector of the plan; without one they are refused.
 
 References
 ----------
@@ -17,33 +20,34 @@ from enum import StrEnum
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.measuring.features import AXIS, PLACE, Feature
 from lightpen.measuring.plan import PlannedFeature, Side
-from lightpen.measuring.quantities import Quantity, derive, quantity_of
-from lightpen.measuring.surfaces import SURFACES, FeatureKind
+from lightpen.measuring.quantities import Quantity, derive
+from lightpen.measuring.surfaces import NAMES, ROUND, SURFACES, FeatureKind
 from lightpen.measuring.touches import PartTouches
 
 CLEAR = 0.2  # cosine from which a direction decides the side
 MIXED = 0.25  # share of touches on the other side from which they contradict
-ROUND = {
-    FeatureKind.CIRCLE,
-    FeatureKind.SLOT,
-    FeatureKind.SPHERE,
-    FeatureKind.CYLINDER,
-    FeatureKind.CONE,
-}
 
 
 class Evidence(StrEnum):
-    """Origin of the choice of the side."""
+    """Origin of the choice of the side, or of the normal of a point or line."""
 
-    NONE = "no ball"
+    NONE = "ball centre"
     PLAN = "plan"
-    AIR = "point in air"
+    PLANE = "plane"
     APPROACH = "approach"
     STYLUS = "stylus"
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """The normal of the surface at a point or line, out of the material."""
+
+    direction: Quantity  # (3,), of length 1
+    evidence: Evidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,62 +58,92 @@ class TouchedSurface:
     # Origin, axis and sizes. The axis of a plane points out of the material, that of
     # line and cylinder from the first touch to the last.
     quantity: Quantity
-    side: Side  # inside or outside; outside of planes, lines and points
+    side: Side
     evidence: Evidence
 
 
+@dataclass(frozen=True, eq=False)
+class ProbedFeature:
+    """A feature of ball centres, and the touches that it is fitted to."""
+
+    planned: PlannedFeature
+    fit: Feature
+    at: IntArray  # touches
+    quantity: Quantity  # of the fit, in the position that all results refer to
+    points: Quantity  # (3 n,), ball centres, likewise
+
+    @property
+    def kind(self) -> FeatureKind:
+        """Its kind."""
+        return self.fit.kind
+
+    @property
+    def needs_normal(self) -> bool:
+        """Whether the ball is compensated along a normal that it does not show."""
+        is_thin = self.kind in {FeatureKind.POINT, FeatureKind.LINE}
+        return is_thin and self.planned.side is Side.AUTO
+
+
 def surface_of(
-    planned: PlannedFeature, feature: Feature, touches: PartTouches
+    probed: ProbedFeature, touches: PartTouches, normal: Normal | None = None
 ) -> TouchedSurface:
     """Return the surface that was touched.
 
-    Raises `CalibrationError` if the side is unknown, or touches are on both sides.
+    Raises `CalibrationError` if the side or the normal is unknown, or touches are on
+    both sides.
     """
-    at = touches.of(planned.name)
-    assert planned.kind is not None
-    quantity = quantity_of(feature, 3 * at, touches.n_inputs)
-    if planned.kind in {FeatureKind.LINE, FeatureKind.CYLINDER}:
-        quantity = _along_touches(quantity, touches.points_cam[at])
-    if planned.kind is not FeatureKind.PLANE and not touches.ball_radius:
-        return TouchedSurface(planned.kind, quantity, Side.OUTSIDE, Evidence.NONE)
-    if planned.kind in ROUND:
-        side, evidence = _side(planned, feature, touches)
+    planned, kind, quantity = probed.planned, probed.kind, probed.quantity
+    if kind is FeatureKind.PLANE:
+        return _plane(probed, touches)
+    is_centre = not touches.ball_radius or planned.side is Side.CENTRE
+    if is_centre:
+        return TouchedSurface(kind, quantity, Side.CENTRE, Evidence.NONE)
+    if kind in ROUND:
+        side, evidence = _side(probed, touches)
         sign = 1.0 if side is Side.INSIDE else -1.0
 
         def resized(values: FloatArray, ball: FloatArray) -> FloatArray:
             moved = values.copy()
-            slope = 1 / np.cos(values[7]) if planned.kind is FeatureKind.CONE else 1.0
+            slope = 1 / np.cos(values[7]) if kind is FeatureKind.CONE else 1.0
             moved[6] += sign * ball[0] * slope
             return moved
 
         moved = derive(resized, quantity, touches.ball)
         if moved.values[6] <= 0:
             raise CalibrationError("measuring.ball-too-large", name=planned.name)
-        return TouchedSurface(planned.kind, moved, side, evidence)
-    outwards, evidence = _outwards(planned, feature, touches)
-    if planned.kind is FeatureKind.PLANE:
-        sign = 1.0 if feature.axis @ outwards > 0 else -1.0
+        return TouchedSurface(kind, moved, side, evidence)
+    if not probed.needs_normal:  # an end of a length, which knows its direction
+        return TouchedSurface(kind, quantity, planned.side, Evidence.PLAN)
+    if normal is None:
+        raise CalibrationError(
+            "measuring.no-normal", name=planned.name, kind=NAMES[kind]
+        )
 
-        def shifted(values: FloatArray, ball: FloatArray) -> FloatArray:
-            normal = sign * values[AXIS]
-            return np.concatenate([values[PLACE] - ball[0] * normal, normal])
-
-        moved = derive(shifted, quantity, touches.ball)
-        return TouchedSurface(planned.kind, moved, Side.OUTSIDE, evidence)
-
-    def offset(values: FloatArray, ball: FloatArray) -> FloatArray:
-        way = outwards
-        if planned.kind is FeatureKind.LINE:
+    def offset(values: FloatArray, ball: FloatArray, way: FloatArray) -> FloatArray:
+        if kind is FeatureKind.LINE:
             way = way - (way @ values[AXIS]) * values[AXIS]
         moved = values.copy()
         moved[PLACE] -= ball[0] * way / np.linalg.norm(way)
         return moved
 
-    moved = derive(offset, quantity, touches.ball)
-    return TouchedSurface(planned.kind, moved, Side.OUTSIDE, evidence)
+    moved = derive(offset, quantity, touches.ball, normal.direction)
+    return TouchedSurface(kind, moved, Side.OUTSIDE, normal.evidence)
 
 
-def _along_touches(axis: Quantity, points: FloatArray) -> Quantity:
+def _plane(probed: ProbedFeature, touches: PartTouches) -> TouchedSurface:
+    outwards, evidence = _outwards(probed, touches)
+    sign = 1.0 if probed.fit.axis @ outwards > 0 else -1.0
+    shift = 0.0 if probed.planned.side is Side.CENTRE else 1.0
+
+    def shifted(values: FloatArray, ball: FloatArray) -> FloatArray:
+        normal = sign * values[AXIS]
+        return np.concatenate([values[PLACE] - shift * ball[0] * normal, normal])
+
+    moved = derive(shifted, probed.quantity, touches.ball)
+    return TouchedSurface(FeatureKind.PLANE, moved, Side.OUTSIDE, evidence)
+
+
+def along_touches(axis: Quantity, points: FloatArray) -> Quantity:
     """Return an axis that points from the first touch to the last."""
     if (points[-1] - points[0]) @ axis.values[AXIS] >= 0:
         return axis
@@ -118,21 +152,12 @@ def _along_touches(axis: Quantity, points: FloatArray) -> Quantity:
     return Quantity(turned * axis.values, turned[:, None] * axis.by_inputs)
 
 
-def _side(
-    planned: PlannedFeature, feature: Feature, touches: PartTouches
-) -> tuple[Side, Evidence]:
+def _side(probed: ProbedFeature, touches: PartTouches) -> tuple[Side, Evidence]:
     """Return on which side of a round surface the ball was."""
+    planned, feature, at = probed.planned, probed.fit, probed.at
     if planned.side is not Side.AUTO:
         return planned.side, Evidence.PLAN
-    if planned.kind is FeatureKind.SLOT:
-        return Side.INSIDE, Evidence.PLAN
-    assert planned.kind is not None
-    surface = SURFACES[planned.kind]
-    if planned.air is not None:
-        q = (np.array(planned.air) - feature.origin) @ feature.axes
-        distance = float(surface.distances(q[None], feature.sizes).values[0, 0])
-        return (Side.INSIDE if distance < 0 else Side.OUTSIDE), Evidence.AIR
-    at = touches.of(planned.name)
+    surface = SURFACES[feature.kind]
     q = (touches.points_cam[at] - feature.origin) @ feature.axes
     outwards = surface.distances(q, feature.sizes).by_point[:, 0] @ feature.axes.T
     approach = np.einsum("ni,ni->n", touches.approaches_cam[at], outwards)
@@ -156,20 +181,14 @@ def _by_cosines(planned: PlannedFeature, cosines: FloatArray, positive: Side) ->
 
 
 def _outwards(
-    planned: PlannedFeature, feature: Feature, touches: PartTouches
+    probed: ProbedFeature, touches: PartTouches
 ) -> tuple[FloatArray, Evidence]:
-    """Return the direction out of the material, (3,), by the mean of the touches."""
-    if planned.air is not None:
-        return np.array(planned.air) - feature.origin, Evidence.AIR
-    at = touches.of(planned.name)
-    approaches = touches.approaches_cam[at]
-    known = np.isfinite(approaches).all(axis=1)
-    if planned.kind is FeatureKind.PLANE:  # not along the surface
-        known &= np.abs(np.nan_to_num(approaches) @ feature.axis) > CLEAR
-    found, evidence = touches.styli_cam[at], Evidence.STYLUS
+    """Return a direction out of the material of a plane, (3,), by its touches."""
+    axis = probed.fit.axis
+    approaches = touches.approaches_cam[probed.at]
+    known = np.abs(np.nan_to_num(approaches) @ axis) > CLEAR  # not along the surface
+    found, evidence = touches.styli_cam[probed.at], Evidence.STYLUS
     if known.any():
         found, evidence = -approaches[known], Evidence.APPROACH
-    if planned.kind is FeatureKind.PLANE:
-        _by_cosines(planned, found @ feature.axis, Side.OUTSIDE)
-    mean = found.mean(axis=0)
-    return mean / np.linalg.norm(mean), evidence
+    _by_cosines(probed.planned, found @ axis, Side.OUTSIDE)
+    return np.asarray(found.mean(axis=0)), evidence

@@ -4,10 +4,15 @@ Each takes the values of features, origin (3) and axis (3) first, and is a funct
 `quantities.derive`.
 """
 
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.measuring.features import AXIS, PLACE
+from lightpen.measuring.plan import Construction
+from lightpen.measuring.surfaces import AXIAL, FLAT, FeatureKind
 
 
 def _unit(vector: FloatArray) -> FloatArray:
@@ -92,3 +97,41 @@ def apex(cone: FloatArray) -> FloatArray:
     """Return the tip of a cone, (3,)."""
     radius, half_angle = cone[6:]
     return np.asarray(cone[PLACE] - radius / np.tan(half_angle) * _unit(cone[AXIS]))
+
+
+class Constructor(NamedTuple):
+    """Kind of a constructed feature, and how it follows from the values of others."""
+
+    kind: FeatureKind
+    made_from: Callable[..., FloatArray]
+    order: tuple[int, ...]  # of the others among its arguments
+
+
+def constructor(
+    construct: Construction, kinds: Sequence[FeatureKind | None]
+) -> Constructor | None:
+    """Return how a feature is constructed from others of some kinds; None if not.
+
+    A kind that is not known yet is taken for one that fits.
+    """
+    flat = [each is None or each in FLAT for each in kinds]
+    axial = [each is None or each in AXIAL for each in kinds]
+    point = FeatureKind.POINT
+    match construct, len(kinds):
+        case Construction.MIDPOINT, 2:
+            return Constructor(point, midpoint, (0, 1))
+        case Construction.PROJECTION, 2 if flat[1]:
+            return Constructor(point, projection_on_plane, (0, 1))
+        case Construction.PROJECTION, 2 if axial[1]:
+            return Constructor(point, projection_on_line, (0, 1))
+        case Construction.INTERSECTION, 2 if all(flat):
+            return Constructor(FeatureKind.LINE, intersection_of_planes, (0, 1))
+        case Construction.INTERSECTION, 2 if axial[0] and flat[1]:
+            return Constructor(point, intersection_of_line_and_plane, (0, 1))
+        case Construction.INTERSECTION, 2 if flat[0] and axial[1]:
+            return Constructor(point, intersection_of_line_and_plane, (1, 0))
+        case Construction.INTERSECTION, 3 if all(flat):
+            return Constructor(point, intersection_of_three_planes, (0, 1, 2))
+        case Construction.APEX, 1 if kinds[0] in {None, FeatureKind.CONE}:
+            return Constructor(point, apex, (0,))
+    return None

@@ -1,4 +1,4 @@
-"""Measured features as lines in space, for the window, the report and DXF."""
+"""Measured features as lines in space, for the window."""
 
 import numpy as np
 
@@ -16,9 +16,9 @@ MARK = 1.0  # mm, half size of the cross of a point, and of an untouched feature
 CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
 
 
-def outline_of(one: Measured, *, in_part: bool = False) -> list[FloatArray]:
-    """Return the lines (M, 3) of a feature, mm, in the frame of camera or part."""
-    values = (one.in_part if in_part else one.surface.quantity).values
+def outline_of(one: Measured) -> list[FloatArray]:
+    """Return the lines (M, 3) of a feature, mm, in the frame of the camera."""
+    values = one.surface.quantity.values
     origin, axis, sizes = values[PLACE], values[AXIS], values[6:]
     frame = frame_about(axis)
     reach = _reach(one)
@@ -32,8 +32,6 @@ def outline_of(one: Measured, *, in_part: bool = False) -> list[FloatArray]:
             return [origin + reach * np.array(CORNERS) @ frame[:, :2].T]
         case FeatureKind.CIRCLE:
             return [_ring(origin, frame, sizes[0])]
-        case FeatureKind.SLOT:
-            return [_ring(origin, frame, sizes[0] + sizes[1] / 2)]
         case FeatureKind.SPHERE:
             turned = (np.roll(np.eye(3), k, axis=0) for k in range(3))
             return [_ring(origin, each, sizes[0]) for each in turned]

@@ -44,11 +44,11 @@ class Feature:
     """A fitted feature."""
 
     kind: FeatureKind
-    # (3,), mm: centre of point, circle, slot, sphere; of line, plane, cylinder and cone
+    # (3,), mm: centre of point, circle, sphere; of line, plane, cylinder and cone
     # the point nearest to the mean of the points
     origin: FloatArray
     # (3, 3), of its frame, as columns; z is the axis of cylinder and cone, direction of
-    # a line, normal of plane, circle and slot; x the direction of a slot
+    # a line, normal of plane and circle
     axes: FloatArray
     sizes: FloatArray  # (S,), see `FeatureModel.sizes`; radius of a cone at its origin
     distances: FloatArray  # (N, K), of the points from it, mm

@@ -74,11 +74,7 @@ def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
     length = nominal.length or USUAL_LENGTH
     width = nominal.width or length
     radius = (nominal.diameter or 0.0) / 2
-    named = {
-        "radius": radius,
-        "length": length - 2 * radius,
-        "half_angle": np.radians((nominal.angle or 90.0) / 2),
-    }
+    named = {"radius": radius, "half_angle": np.radians((nominal.angle or 90.0) / 2)}
     names = SURFACES[kind].sizes
     if names and not radius:
         return None
@@ -164,15 +160,6 @@ def _places(area: ProbedArea) -> FloatArray:
             return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
         case FeatureKind.CIRCLE:
             return np.asarray(area.sizes[0] * round_)
-        case FeatureKind.SLOT:
-            radius, length = area.sizes
-            ends = radius * round_ + np.sign(round_[:, :1]) * [length / 2, 0.0, 0.0]
-            x = np.linspace(-length / 2, length / 2, N_GRID)
-            sides = [
-                np.column_stack([x, np.full(N_GRID, y), np.zeros(N_GRID)])
-                for y in (radius, -radius)
-            ]
-            return np.concatenate([ends, *sides])
         case FeatureKind.SPHERE:
             tilt = np.linspace(0.0, HALF_ANGLE, N_ALONG)
             caps = [

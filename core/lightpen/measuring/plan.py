@@ -9,33 +9,22 @@ characteristics:
   - {quantity: diameter, of: [hole], nominal: 16, tolerance: 0.05}
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from enum import StrEnum
 from math import inf
-from pathlib import Path
 from typing import Annotated, TypeAlias
 
-import msgspec
-import numpy as np
 from msgspec import Meta, Struct, structs
 
-from lightpen.errors import FileError
-from lightpen.formats.documents import parse_document
-from lightpen.formats.files import read_text, write_whole
-from lightpen.measuring.surfaces import RADIAL, SURFACES, FeatureKind
-from lightpen.measuring.zones import Criterion
-from lightpen.messages import Message, message, printable
+from lightpen.measuring.surfaces import SURFACES, FeatureKind
+from lightpen.messages import Message, message
 from lightpen.model.decision_rules import DecisionRule
 
-PLAN = message("measuring.plan")
-MAX_SIZE = 1_000_000  # bytes
-MAX_FEATURES = 1000
 MAX_FREE = 50  # features of a part without a plan
 NEVER = "least squares"
 FARTHEST = 1e6  # mm or degrees, of what a plan states
 REDUNDANT = 2  # times as many points as determine a feature
 UNKNOWN_TOUCHES = 8  # of a feature to be recognised
-KNOWN_FORMS = "a plane, or a circle, sphere or cylinder with its nominal diameter"
 NEEDS_FRAME = ("x", "y", "z", "position")
 
 Coordinate: TypeAlias = Annotated[float, Meta(ge=-FARTHEST, le=FARTHEST)]
@@ -48,8 +37,9 @@ class Side(StrEnum):
     """On which side of a surface the ball was."""
 
     AUTO = "auto"  # decided from the touches
-    INSIDE = "inside"  # of a bore, or within a slot
-    OUTSIDE = "outside"  # of a boss or a ball
+    INSIDE = "inside"  # of a bore, or of the inner faces of a length
+    OUTSIDE = "outside"  # of a boss, a ball, or the outer faces of a length
+    CENTRE = "centre"  # the centre of the ball is meant, as in a cone or a groove
 
 
 class Construction(StrEnum):
@@ -69,8 +59,7 @@ class CharacteristicKind(StrEnum):
     Z = "z"
     DIAMETER = "diameter"
     RADIUS = "radius"
-    WIDTH = "width"
-    LENGTH = "length"
+    LENGTH = "length"  # from one probed end to the other
     CONE_ANGLE = "cone angle"
     DISTANCE = "distance"
     ANGLE = "angle"
@@ -89,7 +78,6 @@ IS_ANGLE = {CharacteristicKind.ANGLE, CharacteristicKind.CONE_ANGLE}
 QUANTITIES = {  # the others are letters
     CharacteristicKind.DIAMETER: message("measuring.diameter"),
     CharacteristicKind.RADIUS: message("measuring.radius"),
-    CharacteristicKind.WIDTH: message("measuring.width"),
     CharacteristicKind.LENGTH: message("measuring.length"),
     CharacteristicKind.CONE_ANGLE: message("measuring.cone-angle"),
     CharacteristicKind.DISTANCE: message("measuring.distance"),
@@ -116,10 +104,8 @@ class Nominal(_Entry, frozen=True):
 
     origin: Vector | None = None
     axis: Vector | None = None  # axis or normal; its length does not matter
-    # Of circle, sphere, cylinder and cone (at its origin); of a slot its width.
-    diameter: Positive | None = None
-    # Extent of a line, plane, cylinder or cone; overall length of a slot.
-    length: Positive | None = None
+    diameter: Positive | None = None  # of a cone at its origin
+    length: Positive | None = None  # extent of a line, plane, cylinder or cone
     width: Positive | None = None
     # Of a cone, from side to side, degrees.
     angle: Annotated[float, Meta(gt=0, lt=180)] | None = None
@@ -135,10 +121,11 @@ class PlannedFeature(_Entry, frozen=True):
     side: Side = Side.AUTO
     criterion: str = NEVER
     nominal: Nominal | None = None
-    air: Vector | None = None  # ball centre beside the surface, camera frame, mm
-    # U (k = 2) of the nominal diameter, mm, of a feature of known form, whose touches
-    # refine the tip; None to measure the feature.
-    known: Annotated[float, Meta(ge=0)] | None = None
+    # Of a point or line, the normal of the surface that was touched: that of a plane
+    # of the plan, or a vector out of the material, frame of the part. Without them a
+    # plane that the points lie on.
+    surface: str = ""
+    normal: Vector | None = None
     scan: bool = False  # whether the pen slides along the surface after its first touch
 
     @property
@@ -185,6 +172,9 @@ class PlannedCharacteristic(_Entry, frozen=True):
     # Upper limit of a geometrical deviation; else plus and minus, or lower and upper
     # deviation from nominal. None to report the value alone.
     tolerance: float | tuple[float, float] | None = None
+    # U (k = 2) of a nominal that is the certified value of an artefact, mm or degrees.
+    # Without a tolerance the limits of the station judge the error.
+    certified: Annotated[float, Meta(ge=0, le=FARTHEST)] | None = None
 
     @property
     def label(self) -> str:
@@ -231,7 +221,7 @@ class Plan(_Entry, frozen=True):
     constructions: tuple[PlannedConstruction, ...] = ()
     alignment: PlannedAlignment | None = None
     characteristics: tuple[PlannedCharacteristic, ...] = ()
-    rule: DecisionRule = DecisionRule.GUARD_BAND  # for values and their limits
+    rule: DecisionRule | None = None  # None: that of the station
 
     @property
     def words(self) -> Message:
@@ -278,102 +268,3 @@ def free_plan(name: str, touches: int = UNKNOWN_TOUCHES) -> Plan:
     """Return a plan of features that are recognised from their touches."""
     names = (f"F{i}" for i in range(1, MAX_FREE + 1))
     return Plan(name, tuple(PlannedFeature(each, touches=touches) for each in names))
-
-
-def read_plan(path: Path) -> Plan:
-    """Read a plan; raise `FileError` for unknown or contradictory entries."""
-    return parse_plan(read_text(path, PLAN, MAX_SIZE), printable(path.name))
-
-
-def parse_plan(text: str, name: str) -> Plan:
-    """Return the plan that a YAML text holds; see `read_plan`."""
-    tree = parse_document(text, name)
-    try:
-        plan = msgspec.convert(tree, Plan, strict=False)
-    except msgspec.ValidationError as error:
-        raise FileError("measuring.bad-plan", name=name, found=str(error)) from error
-    for problem in _problems(plan):
-        raise FileError("measuring.bad-plan", name=name, found=problem)
-    return plan
-
-
-def write_plan(plan: Plan, path: Path) -> None:
-    """Write a plan as YAML."""
-    import yaml
-
-    entries = msgspec.to_builtins(plan)
-    text = yaml.safe_dump(entries, sort_keys=False, allow_unicode=True)
-    write_whole(path, text.encode())
-
-
-def _problems(plan: Plan) -> Iterator[str]:
-    """Yield the contradictions of a plan, in English as the rest of the format."""
-    names = [each.name for each in plan.features]
-    names += [each.name for each in plan.constructions]
-    for name in names:
-        if names.count(name) > 1:
-            yield f"{name!r} is defined twice"
-    if len(names) > MAX_FEATURES:
-        yield f"more than {MAX_FEATURES} features"
-    for each in plan.features:
-        needed = 1 if each.kind is None else SURFACES[each.kind].min_points
-        if each.kind is not None and (each.touches or needed) < needed:
-            yield f"a {each.kind.value} needs {needed} touches - at {each.name!r}"
-        if "@" in each.name:
-            yield f"'@' in the name {each.name!r}"
-        if each.nominal is not None and each.nominal.axis == (0, 0, 0):
-            yield f"an axis of length 0 - at {each.name!r}"
-        if each.known is not None and not _has_known_form(each):
-            yield f"a known form needs {KNOWN_FORMS} - at {each.name!r}"
-        if each.criterion not in {NEVER, *(known.value for known in Criterion)}:
-            yield f"unknown criterion {each.criterion!r} - at {each.name!r}"
-    known = {each.name for each in plan.features}
-    for construction in plan.constructions:
-        yield from _unknown(construction.name, construction.of, known)
-        known.add(construction.name)
-    if plan.alignment is not None:
-        yield from _alignment_problems(plan, plan.alignment, known)
-    for characteristic in plan.characteristics:
-        yield from _unknown(characteristic.label, characteristic.features, known)
-        # WORKAROUND for msgspec 0.22: bounds of a number in a union with a tuple fail.
-        stated = characteristic.tolerance
-        ends = np.atleast_1d(0.0 if stated is None else stated)
-        if not (np.abs(ends) <= FARTHEST).all() or ends[0] > ends[-1]:
-            yield f"the tolerance {stated} - at {characteristic.label!r}"
-
-
-def _alignment_problems(
-    plan: Plan, alignment: PlannedAlignment, known: set[str]
-) -> Iterator[str]:
-    used = [alignment.plane, alignment.line, alignment.point]
-    if alignment.points:
-        if any(used):
-            yield "the alignment has either plane, line and point, or points"
-        yield from _unknown("alignment", alignment.points, known)
-        nominal = {
-            each.name
-            for each in plan.features
-            if each.nominal is not None and each.nominal.origin is not None
-        }
-        for name in alignment.points:
-            if name not in nominal:
-                yield f"the alignment needs a nominal origin of {name!r}"
-    elif not all(used):
-        yield "the alignment needs plane, line and point, or points"
-    else:
-        yield from _unknown("alignment", used, known)
-
-
-def _has_known_form(feature: PlannedFeature) -> bool:
-    if feature.kind is FeatureKind.PLANE:
-        return True
-    has_size = feature.nominal is not None and feature.nominal.diameter is not None
-    return feature.kind in RADIAL and has_size
-
-
-def _unknown(
-    where: str, used: tuple[str, ...] | list[str], known: set[str]
-) -> Iterator[str]:
-    for name in used:
-        if name not in known:
-            yield f"unknown feature {name!r} - at {where!r}"

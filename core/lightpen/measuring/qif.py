@@ -17,7 +17,6 @@ from lightpen.arrays import FloatArray
 from lightpen.measuring.characteristics import Measured
 from lightpen.measuring.features import AXIS, PLACE
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
-from lightpen.measuring.quantities import derive
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.model.decision_rules import Decision
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -26,7 +25,6 @@ NAMESPACE = "http://qifstandards.org/xsd/qif3"
 VERSION = "3.0.0"
 PARTS = ("Definition", "Nominal", "Item", "Measurement")  # of a characteristic
 N_DECIMALS = 12
-NAMES = {FeatureKind.SLOT: "ElongatedCircle"}  # that are other words in QIF
 STATUS = {
     Decision.ACCEPTED: "PASS",
     Decision.REJECTED: "FAIL",
@@ -125,7 +123,7 @@ def _add_characteristic(
         for parent, part, id_ in zip(parents, PARTS, ids, strict=True)
     )
     _text(definition, "Name", planned.label)
-    lower, upper = planned.limits
+    lower, upper = result.lower, result.upper
     if np.isinf([lower, upper]).all():
         _text(definition, "NonTolerance", "MEASURED")
     else:
@@ -174,7 +172,7 @@ def _add_feature(
     parent: ET.Element, name: str, one: Measured, part: MeasuredPart, id_: str
 ) -> None:
     """Add place, direction, size and form of a feature in the frame of the part."""
-    kind = NAMES.get(one.kind, one.kind.value.capitalize())
+    kind = one.kind.value.capitalize()
     element = ET.SubElement(parent, f"{kind}FeatureMeasurement", {"id": id_})
     _text(element, "FeatureName", name)
     values, spread = one.in_part.values, part.uncertainty(name)
@@ -192,19 +190,6 @@ def _add_feature(
             if one.kind is FeatureKind.CONE:
                 angle, u = 2 * np.rad2deg([values[7], spread[7]])
                 _value(element, "FullAngle", angle, u)
-        case FeatureKind.SLOT:
-            assert one.feature is not None
-            along, length = one.feature.axes[:, 0], values[7] + 2 * values[6]
-            if part.alignment is not None:
-                along = part.alignment.rotation @ along
-            add_diameter()
-            line = ET.SubElement(element, "CenterLine")
-            _vector(line, "StartPoint", place, spread[PLACE])
-            _vector(line, "Vector", along)
-            _vector(element, "Normal", axis)
-            by_sizes = derive(lambda v: v[7] + 2 * v[6], one.in_part)
-            u_length = by_sizes.uncertainty(part.touches.inputs)[0]
-            _value(element, "Length", length, u_length)
         case _:
             _vector(element, "Location", place, spread[PLACE])
             if one.kind is FeatureKind.LINE:

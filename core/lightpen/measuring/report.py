@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 
 from lightpen.measuring.characteristics import Measured
-from lightpen.measuring.compensation import ROUND, Evidence
+from lightpen.measuring.compensation import Evidence
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart
-from lightpen.measuring.plan import PlannedCharacteristic, Side
-from lightpen.measuring.surfaces import NAMES, SURFACES, FeatureKind
+from lightpen.measuring.plan import Side
+from lightpen.measuring.surfaces import NAMES, ROUND, SURFACES, FeatureKind
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
 
@@ -25,9 +25,11 @@ DECISIONS: dict[Decision | None, Message | str] = {
 SIDES = {
     Side.INSIDE: message("measuring.inside"),
     Side.OUTSIDE: message("measuring.outside"),
+    Side.CENTRE: message("measuring.centre"),
 }
 EVIDENCES = {
-    Evidence.AIR: message("measuring.by-air"),
+    Evidence.PLAN: message("measuring.by-plan"),
+    Evidence.PLANE: message("measuring.by-plane"),
     Evidence.APPROACH: message("measuring.by-approach"),
     Evidence.STYLUS: message("measuring.by-stylus"),
 }
@@ -45,7 +47,7 @@ class PartRow:
 def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
     """Yield x, y, z with the largest U, size with U, form error, and kind.
 
-    A size is a diameter, the width of a slot, or the angle of a cone in degrees.
+    A size is a diameter, or the angle of a cone in degrees.
     """
     for name, one in part.features.items():
         values, spread = one.in_part.values, part.uncertainty(name)
@@ -65,40 +67,42 @@ def feature_rows(part: MeasuredPart) -> Iterator[PartRow]:
 def _kind_and_side(one: Measured) -> Message:
     """Return the kind of a feature, the side of the ball, and what decided it.
 
-    What the plan states needs no evidence.
+    What the plan states of a side needs no evidence.
     """
     kind, side, evidence = NAMES[one.kind], one.surface.side, one.surface.evidence
     if evidence is Evidence.NONE:
-        return kind
+        if one.feature is None:
+            return kind
+        return message("measuring.sided", kind=kind, side=SIDES[Side.CENTRE])
+    if one.kind not in ROUND:  # it is outside of the material
+        return message("measuring.decided-by", kind=kind, by=EVIDENCES[evidence])
     if evidence is Evidence.PLAN:
         return message("measuring.sided", kind=kind, side=SIDES[side])
     by = EVIDENCES[evidence]
-    if one.kind not in ROUND:  # it is outside of the material
-        return message("measuring.decided-by", kind=kind, by=by)
     return message("measuring.sided-by", kind=kind, side=SIDES[side], by=by)
 
 
 def characteristic_rows(part: MeasuredPart) -> Iterator[PartRow]:
-    """Yield nominal, tolerance, actual, deviation, U, U alone, P and decision."""
+    """Yield nominal, tolerance, actual, deviation, U, P and decision."""
     for result in part.results:
         yield PartRow(
             result.planned.words,
             (
                 result.planned.nominal,
-                _tolerance(result.planned),
+                _tolerance(result),
                 result.value.value,
                 result.deviation,
                 result.value.uncertainty,
-                result.independent_uncertainty,
                 result.probability,
             ),
             DECISIONS[result.decision],
         )
 
 
-def _tolerance(planned: PlannedCharacteristic) -> str:
+def _tolerance(result: CharacteristicResult) -> str:
     """Return the limits of a geometrical deviation, else of the deviation."""
-    lower, upper = (limit - (planned.nominal or 0.0) for limit in planned.limits)
+    nominal = result.planned.nominal or 0.0
+    lower, upper = result.lower - nominal, result.upper - nominal
     if np.isinf(upper):
         return ""
     if np.isinf(lower):
@@ -164,8 +168,7 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
 
 
 def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
-    planned = result.planned
-    lower, upper = planned.limits
+    planned, lower, upper = result.planned, result.lower, result.upper
     return {
         "name": planned.label,
         "quantity": planned.quantity.value,
@@ -177,7 +180,7 @@ def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
         "lower_limit": None if np.isinf(lower) else lower,
         "upper_limit": None if np.isinf(upper) else upper,
         "expanded_uncertainty": result.value.uncertainty,
-        "independent_expanded_uncertainty": result.independent_uncertainty,
+        "certified_expanded_uncertainty": planned.certified,
         "decision": None if result.decision is None else result.decision.value,
         "probability_of_conformity": result.probability,
     }

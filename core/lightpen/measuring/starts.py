@@ -2,7 +2,9 @@
 
 Cylinder and cone are quadrics about an axis along z, ``x^2 + y^2 = 2 a x + 2 b y + c
 + d z + e z^2``, linear in the unknowns once the direction of the axis is given.
-Directions over a half sphere are tried, and each of the best few starts a fit.
+Directions over a half sphere are tried, and each of the best few starts a fit. With few
+points each direction goes some steps first, all of them together, as the best at first
+may lead to a false minimum.
 """
 
 from collections.abc import Iterator
@@ -12,11 +14,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.measuring.surfaces import FeatureKind
+from lightpen.model.rigid import rotation_from_vector
 
 N_DIRECTIONS = 200  # over the half sphere: some 10 degrees apart
 N_NEAR = 15  # directions about a principal axis
 RIDGE = 1e-12
+FEW = 16  # points, which hardly tell false minima apart
 N_STARTS = 4  # fits that begin at the best of them
+N_STEPS, DAMPING = 6, 1e-3  # of all directions, before the best of few points are taken
 N_TRIED = 24  # points, drawn from more, that directions are tried with
 APART = 0.995  # cosine between two starts
 LEAST_ANGLE = 1e-3  # rad, of a cone at its start
@@ -51,14 +56,6 @@ def starts(kind: FeatureKind, points: FloatArray) -> Iterator[Start]:
             frame = frame_about(axes[2])
             center, radius = _algebraic((points - middle) @ frame[:, :2])
             yield middle + frame[:, :2] @ center, frame, np.array([radius])
-        case FeatureKind.SLOT:
-            along, normal = axes[0], axes[2]
-            frame = np.column_stack([along, np.cross(normal, along), normal])
-            local = (points - middle) @ frame
-            half = np.ptp(local, axis=0) / 2
-            center = middle + frame @ (local.min(axis=0) + half)
-            length = max(2 * (half[0] - half[1]), half[1] / 2)
-            yield center, frame, np.array([half[1], length])
         case FeatureKind.CYLINDER | FeatureKind.CONE:
             few = np.random.default_rng(0).permutation(len(points))[:N_TRIED]
             found = _by_direction(kind, points[few] - middle, middle, axes)
@@ -113,8 +110,12 @@ def _by_direction(
         own = z - z.mean(axis=1, keepdims=True)
         slope = np.sum(own * rho, axis=1) / (np.sum(own**2, axis=1) + TINY)
         radius = radius - slope * z.mean(axis=1)
-    distances = rho - radius[:, None] - slope[:, None] * z
-    misfits = np.sum(distances**2, axis=1) / (1 + slope**2)
+    unknowns = np.column_stack([a, b, radius, slope])
+    if len(points) <= FEW:
+        frames, unknowns = _some_steps(kind, points, frames, unknowns)
+        directions = frames[..., 2]
+    a, b, radius, slope = unknowns.T
+    misfits = np.sum(_residuals(points @ frames, unknowns) ** 2, axis=1)
     taken: list[FloatArray] = []
     for i in np.argsort(misfits).tolist():
         if any(abs(directions[i] @ other) > APART for other in taken):
@@ -128,3 +129,45 @@ def _by_direction(
         if abs(angle) < LEAST_ANGLE:
             angle = LEAST_ANGLE
         yield origin, frames[i], np.array([radius[i], angle])
+
+
+def _residuals(q: FloatArray, unknowns: FloatArray) -> FloatArray:
+    """Return distances (D, N) of points (D, N, 3) from cones about z."""
+    a, b, radius, slope = unknowns.T[..., None]
+    rho = np.hypot(q[..., 0] - a, q[..., 1] - b)
+    return np.asarray((rho - radius - slope * q[..., 2]) / np.sqrt(1 + slope**2))
+
+
+def _some_steps(
+    kind: FeatureKind, points: FloatArray, frames: FloatArray, unknowns: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return frames (D, 3, 3) and place, radius, slope (D, 4) after damped steps.
+
+    A frame turns about its x and y axes; a step that makes a fit worse is not taken.
+    """
+    n_free = 6 if kind is FeatureKind.CONE else 5  # the slope comes last
+    before = _residuals(points @ frames, unknowns)
+    for _ in range(N_STEPS):
+        x, y, z = np.moveaxis(points @ frames, -1, 0)
+        a, b, _, slope = unknowns.T[..., None]
+        rho = np.hypot(x - a, y - b) + TINY
+        cos, sin = (x - a) / rho, (y - b) / rho
+        ones = np.ones_like(x)
+        columns = [-cos, -sin, -ones, sin * z + slope * y, -cos * z - slope * x, -z]
+        J = np.stack(columns[:n_free], axis=2) / np.sqrt(1 + slope**2)[..., None]
+        normal = np.swapaxes(J, 1, 2) @ J
+        scale = np.einsum("dcc->dc", normal) + TINY
+        normal = normal + DAMPING * scale[..., None] * np.eye(n_free)
+        right = -np.swapaxes(J, 1, 2) @ before[..., None]
+        step = np.linalg.solve(normal, right)[..., 0]
+        moved = unknowns.copy()
+        moved[:, :3] += step[:, :3]
+        moved[:, 3] += step[:, 5] if n_free == 6 else 0.0
+        turn = np.column_stack([step[:, 3:5], np.zeros(len(step))])
+        turned = frames @ rotation_from_vector(turn)
+        after = _residuals(points @ turned, moved)
+        is_better = np.sum(after**2, axis=1) < np.sum(before**2, axis=1)
+        frames = np.where(is_better[:, None, None], turned, frames)
+        unknowns = np.where(is_better[:, None], moved, unknowns)
+        before = np.where(is_better[:, None], after, before)
+    return frames, unknowns

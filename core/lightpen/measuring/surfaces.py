@@ -27,7 +27,6 @@ class FeatureKind(Enum):
     LINE = "line"
     PLANE = "plane"
     CIRCLE = "circle"
-    SLOT = "slot"
     SPHERE = "sphere"
     CYLINDER = "cylinder"
     CONE = "cone"
@@ -134,34 +133,15 @@ def _cone(q: FloatArray, sizes: FloatArray) -> Distances:
     )
 
 
-def _with_height(in_plane: Distances, q: FloatArray) -> Distances:
-    """Return distances from a flat outline, with those from its plane."""
-    n, _, n_sizes = in_plane.by_sizes.shape
-    return Distances(
-        np.column_stack([in_plane.values, q[:, 2]]),
-        np.concatenate(
-            [in_plane.by_point, np.broadcast_to(np.eye(3)[2:], (n, 1, 3))], axis=1
-        ),
-        np.concatenate([in_plane.by_sizes, np.zeros((n, 1, n_sizes))], axis=1),
-    )
-
-
 def _circle(q: FloatArray, sizes: FloatArray) -> Distances:
-    return _with_height(_cylinder(q, sizes), q)
-
-
-def _slot(q: FloatArray, sizes: FloatArray) -> Distances:
-    """Of the outline of two half circles, along x, and the lines between them."""
-    radius, length = sizes
-    end = np.clip(q[:, 0], -length / 2, length / 2)
-    lengths, outwards = _radial(np.column_stack([q[:, 0] - end, q[:, 1]]))
-    gradient = np.column_stack([outwards, np.zeros(len(q))])
-    beyond = np.sign(q[:, 0]) * (np.abs(q[:, 0]) >= length / 2)
-    by_sizes = np.stack([np.full(len(q), -1.0), -beyond * outwards[:, 0] / 2], axis=1)
-    in_plane = Distances(
-        (lengths - radius)[:, None], gradient[:, None], by_sizes[:, None]
+    """Return distances from a circle: from the cylinder through it and its plane."""
+    round_, height = _cylinder(q, sizes), _plane(q, sizes[:0])
+    of_sizes = np.concatenate([round_.by_sizes, np.zeros((len(q), 1, 1))], axis=1)
+    return Distances(
+        np.column_stack([round_.values, height.values]),
+        np.concatenate([round_.by_point, height.by_point], axis=1),
+        of_sizes,
     )
-    return _with_height(in_plane, q)
 
 
 SURFACES = {
@@ -169,19 +149,21 @@ SURFACES = {
     FeatureKind.LINE: FeatureModel(_line, (0, 1, 3, 4)),
     FeatureKind.PLANE: FeatureModel(_plane, (2, 3, 4)),
     FeatureKind.CIRCLE: FeatureModel(_circle, (0, 1, 2, 3, 4), ("radius",)),
-    FeatureKind.SLOT: FeatureModel(_slot, (0, 1, 2, 3, 4, 5), ("radius", "length")),
     FeatureKind.SPHERE: FeatureModel(_sphere, (0, 1, 2), ("radius",)),
     FeatureKind.CYLINDER: FeatureModel(_cylinder, (0, 1, 3, 4), ("radius",)),
     FeatureKind.CONE: FeatureModel(_cone, (0, 1, 3, 4), ("radius", "half_angle")),
 }
 
+FLAT = {FeatureKind.PLANE}
+AXIAL = {FeatureKind.LINE, FeatureKind.CYLINDER, FeatureKind.CONE}
+CENTRED = {FeatureKind.POINT, FeatureKind.CIRCLE, FeatureKind.SPHERE}
 RADIAL = {FeatureKind.CIRCLE, FeatureKind.SPHERE, FeatureKind.CYLINDER}  # of one size
+ROUND = RADIAL | {FeatureKind.CONE}
 NAMES = {
     FeatureKind.POINT: message("measuring.point"),
     FeatureKind.LINE: message("measuring.line"),
     FeatureKind.PLANE: message("measuring.plane"),
     FeatureKind.CIRCLE: message("measuring.circle"),
-    FeatureKind.SLOT: message("measuring.slot"),
     FeatureKind.SPHERE: message("measuring.sphere"),
     FeatureKind.CYLINDER: message("measuring.cylinder"),
     FeatureKind.CONE: message("measuring.cone"),

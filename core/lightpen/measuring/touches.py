@@ -26,8 +26,6 @@ class PartTouches:
     owners: tuple[str, ...]  # feature of each touch, see `at_position`
     ball_radius: float = 0.0  # mm; 0 to measure at the centre of the tip
     ball_uncertainty: float = 0.0  # U (k = 2) of the radius, mm
-    # (P, P), covariance of all inputs, if the ball is correlated with the touches, mm^2
-    joint: FloatArray | None = None
 
     @property
     def positions(self) -> tuple[int, ...]:
@@ -44,20 +42,10 @@ class PartTouches:
     @property
     def inputs(self) -> FloatArray:
         """Covariance of all inputs, (P, P), mm^2."""
-        if self.joint is not None:
-            return self.joint.copy()
         covariance = np.zeros((self.n_inputs, self.n_inputs))
         covariance[:-1, :-1] = self.covariance
         covariance[-1, -1] = (self.ball_uncertainty / 2) ** 2
         return covariance
-
-    @property
-    def independent_inputs(self) -> FloatArray:
-        """The same with independent errors of the touches, for comparison."""
-        blocks = np.kron(np.eye(len(self.points_cam)), np.ones((3, 3)))
-        inputs = self.inputs
-        inputs[:-1, :-1] *= blocks
-        return inputs
 
     @property
     def ball(self) -> Quantity:

@@ -6,14 +6,15 @@ the camera and z up. `verification.tasks.part` states where it lies.
 
 from functools import cache
 
-from lightpen.measuring.plan import Plan, parse_plan
+from lightpen.measuring.plan import Plan
+from lightpen.measuring.plan_checks import parse_plan
 
 PLATE = """
 name: Simulated plate
 features:
   - {name: top, kind: plane, touches: 6,
      nominal: {origin: [0, 0, 0], axis: [0, 0, 1], length: 120, width: 60}}
-  - {name: front, kind: line, touches: 3,
+  - {name: front, kind: line, touches: 3, normal: [0, -1, 0],
      nominal: {origin: [0, -35, -5], axis: [1, 0, 0], length: 100}}
   - {name: hole 1, kind: circle, side: inside, touches: 4,
      nominal: {origin: [-50, -20, -4], axis: [0, 0, 1], diameter: 24}}
@@ -30,8 +31,8 @@ features:
   - {name: countersink, kind: cone, side: inside, touches: 8,
      nominal:
        {origin: [25, 0, -5], axis: [0, 0, 1], diameter: 24, angle: 90, length: 8}}
-  - {name: slot, kind: slot, side: inside, touches: 7,
-     nominal: {origin: [0, 22, -4], axis: [0, 0, 1], diameter: 18, length: 44}}
+  - {name: pad, kind: point, surface: top,
+     nominal: {origin: [0, 24, 0], axis: [0, 0, 1]}}
 alignment: {plane: top, line: front, point: bore}
 characteristics:
   - {quantity: flatness, of: [top], tolerance: 0.2}
@@ -39,7 +40,8 @@ characteristics:
   - {quantity: diameter, of: [bore], nominal: 30, tolerance: 0.2}
   - {quantity: diameter, of: [dome], nominal: 20, tolerance: 0.2}
   - {quantity: cone angle, of: [countersink], nominal: 90, tolerance: 2}
-  - {quantity: width, of: [slot], nominal: 18, tolerance: 0.2}
+  - {quantity: y, of: [front], nominal: -35, tolerance: 0.2}
+  - {quantity: z, of: [pad], nominal: 0, tolerance: 0.2}
   - {quantity: distance, of: [hole 1, hole 2], nominal: 100, tolerance: 0.2}
   - {quantity: distance, of: [hole 1, hole 4], nominal: 40, tolerance: 0.2}
   - {quantity: position, of: [hole 3], tolerance: 0.4}

@@ -5860,10 +5860,6 @@ mm</translation>
         <translation>其他工位对测头库的更改中，主管尚未签署的有 {n} 项。</translation>
     </message>
     <message>
-        <source>Check nominal diameter, ball diameter and cleanliness; then verify the tip.</source>
-        <translation>请检查标称直径、测球直径和清洁情况，然后验证测头。</translation>
-    </message>
-    <message>
         <source>Check the part, its clamping and its cleanliness; then measure it again.</source>
         <translation>检查工件、装夹和清洁度，然后重新测量。</translation>
     </message>
@@ -5898,10 +5894,6 @@ mm</translation>
     <message>
         <source>Current tip: average</source>
         <translation>当前测头：平均值</translation>
-    </message>
-    <message>
-        <source>DXF, the measured geometry</source>
-        <translation>DXF，测得的几何</translation>
     </message>
     <message>
         <source>Decision</source>
@@ -6364,6 +6356,10 @@ mm</translation>
         <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
     </message>
     <message>
+        <source>Position {position} shares {n_shared} datum points (points, circles, spheres) with the positions before; at least {needed} are needed. Probe more of them again.</source>
+        <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、球）；至少需要 {needed} 个。请再触测几个。</translation>
+    </message>
+    <message>
         <source>Postures</source>
         <translation>姿态</translation>
     </message>
@@ -6450,6 +6446,10 @@ mm</translation>
     <message>
         <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
         <translation>触测{kind} {name}：{n_points} / {needed} 个点。</translation>
+    </message>
+    <message>
+        <source>Probe {name}: {n_points} of {needed} points.</source>
+        <translation>触测 {name}：{n_points} / {needed} 个点。</translation>
     </message>
     <message>
         <source>Probed points in the camera frame / mm</source>
@@ -6558,6 +6558,10 @@ mm</translation>
     <message>
         <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file, the intrinsics file or the ball diameter may be wrong.</source>
         <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件、内参文件或球径可能有误。</translation>
+    </message>
+    <message>
+        <source>Slide along {name}: {n_points} of {needed} points.</source>
+        <translation>沿 {name} 滑动：{n_points} / {needed} 点。</translation>
     </message>
     <message>
         <source>Sphere</source>
@@ -6740,6 +6744,10 @@ mm</translation>
         <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
     </message>
     <message>
+        <source>The {kind} {name} does not show the normal of its surface, along which the ball is compensated. In the plan name the plane it lies on (&apos;surface: NAME&apos;), give the normal out of the material (&apos;normal: [x, y, z]&apos; in the part&apos;s frame), probe that plane too, or state &apos;side: centre&apos; for the ball centre itself.</source>
+        <translation>{kind} {name} 未显示其表面法线，无法沿法线补偿测球。请在方案中指定其所在平面（‘surface: NAME’），给出指向材料外的法线（‘normal: [x, y, z]’，零件坐标系），或再触测该平面，或用 ‘side: centre’ 表示测球中心本身。</translation>
+    </message>
+    <message>
         <source>The {what} of this camera cannot be set. Use the aperture of the lens.</source>
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
@@ -6848,6 +6856,10 @@ mm</translation>
         <translation>每幅图像一行的表格</translation>
     </message>
     <message>
+        <source>ball centre</source>
+        <translation>球心</translation>
+    </message>
+    <message>
         <source>bottom left</source>
         <translation>左下</translation>
     </message>
@@ -6926,6 +6938,10 @@ mm</translation>
     <message>
         <source>outer faces</source>
         <translation>外侧面</translation>
+    </message>
+    <message>
+        <source>plan</source>
+        <translation>方案</translation>
     </message>
     <message>
         <source>pypylon is not installed. It drives Basler cameras: {python} -m pip install pypylon</source>
@@ -7014,10 +7030,6 @@ mm</translation>
     <message>
         <source>what is not simultaneous. Trigger all cameras by one signal, use a global shutter, and light all LEDs at once</source>
         <translation>不同步的影响。请用同一信号触发所有相机、使用全局快门，并同时点亮所有 LED</translation>
-    </message>
-    <message>
-        <source>width</source>
-        <translation>宽度</translation>
     </message>
     <message>
         <source>x, y, z in mm, separated by tabs</source>
@@ -7736,6 +7748,10 @@ mm</translation>
         <translation>有 {n_others} 个光点一起移动，但不随光笔移动：可能有第二支光笔或反射镜，或者变焦已改变。请将其移走或遮住，锁定变焦，然后重新摆动。</translation>
     </message>
     <message>
+        <source>{n_points} points, circles and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.</source>
+        <translation>已触测 {n_points} 个点、圆和球；联系新位置需要 {needed} 个不共线的基准点。请重新开始。</translation>
+    </message>
+    <message>
         <source>{n_poses} poses are usable; the tip needs at least {needed}. Capture more images.</source>
         <translation>可用位姿 {n_poses} 个；求测头至少需要 {needed} 个。请采集更多图像。</translation>
     </message>
@@ -8436,14 +8452,6 @@ mm</translation>
         <translation>测点 {number}</translation>
     </message>
     <message>
-        <source>Points and tip refined by the known form of {names}: tip shifted by {shift:.4f} mm, its U (k = 2) {before:.4f} mm before and {after:.4f} mm after.</source>
-        <translation>已按 {names} 的已知形状修正测点和测头：测头移动 {shift:.4f} mm，其 U (k = 2) 修正前 {before:.4f} mm，修正后 {after:.4f} mm。</translation>
-    </message>
-    <message>
-        <source>Position {position} shares {n_shared} datum points (points, circles, slots, spheres) with the positions before; at least {needed} are needed. Probe more of them again.</source>
-        <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、槽、球）；至少需要 {needed} 个。请再触测几个。</translation>
-    </message>
-    <message>
         <source>Position {position}: datum points agree with the first position within {residual:.4f} mm.</source>
         <translation>位置 {position}：基准点与第一位置的偏差不超过 {residual:.4f} mm。</translation>
     </message>
@@ -8738,14 +8746,6 @@ mm</translation>
     <message>
         <source>The characteristic {name} is not defined for features of this kind or number. Check the plan.</source>
         <translation>特性 {name} 对此类或此数量的要素没有定义。请检查计划。</translation>
-    </message>
-    <message>
-        <source>The characteristic {name} needs a datum. Name a feature as its datum in the plan.</source>
-        <translation>特性 {name} 需要基准。请在计划中指定一个要素作为其基准。</translation>
-    </message>
-    <message>
-        <source>The characteristic {name} needs the nominal origin of its feature. Add it to the plan.</source>
-        <translation>特性 {name} 需要其要素的标称原点。请将其加入计划。</translation>
     </message>
     <message>
         <source>The cone has {n_touches} usable points, at least {needed} are needed, {usual} are usual. Probe it again, each time in another posture.</source>
@@ -9348,10 +9348,6 @@ mm</translation>
         <translation>触测的长度 {length:g} mm 对应的圆盘直径为 {found:.2f} mm，而给出的是 {stated:g} mm。请检查触测的是哪个长度、其证书值以及圆盘直径。</translation>
     </message>
     <message>
-        <source>The probed points of {names} deviate from the known form by more than their U (chi-square {chi_square:.1f} with {n_free} degrees of freedom) and refine nothing.</source>
-        <translation>{names} 的测点与已知形状的偏差超过其 U（卡方 {chi_square:.1f}，自由度 {n_free}），未作修正。</translation>
-    </message>
-    <message>
         <source>The probed points of {name} come from both sides of the surface. Probe the feature again from one side.</source>
         <translation>{name} 的测点来自表面的两侧。请从一侧重新触测该要素。</translation>
     </message>
@@ -9572,14 +9568,6 @@ mm</translation>
         <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 为假定值，来自{advice}。增加图像几乎没有帮助。</translation>
     </message>
     <message>
-        <source>U alone</source>
-        <translation>单独 U</translation>
-    </message>
-    <message>
-        <source>U alone: U (k = 2) if the points shared no error. P: probability of conformity (JCGM 106).</source>
-        <translation>单独 U：各点无共同误差时的 U (k = 2)。P：合格概率 (JCGM 106)。</translation>
-    </message>
-    <message>
         <source>U(size)</source>
         <translation>U（尺寸）</translation>
     </message>
@@ -9696,10 +9684,6 @@ mm</translation>
         <translation>手动剔除</translation>
     </message>
     <message>
-        <source>feature</source>
-        <translation>要素</translation>
-    </message>
-    <message>
         <source>file of an unfinished verification</source>
         <translation>未完成验证的文件</translation>
     </message>
@@ -9804,10 +9788,6 @@ mm</translation>
         <translation>点</translation>
     </message>
     <message>
-        <source>point in air</source>
-        <translation>空中点</translation>
-    </message>
-    <message>
         <source>port out of range</source>
         <translation>端口超出范围</translation>
     </message>
@@ -9850,10 +9830,6 @@ mm</translation>
     <message>
         <source>simple acceptance (JCGM 106, 8.2)</source>
         <translation>简单接受（JCGM 106，8.2）</translation>
-    </message>
-    <message>
-        <source>slot</source>
-        <translation>键槽</translation>
     </message>
     <message>
         <source>specific risk (JCGM 106, 8.3)</source>
@@ -10006,10 +9982,6 @@ mm</translation>
     <message>
         <source>{n_points} points do not determine a {kind}; at least {needed} are needed. Probe more points.</source>
         <translation>{n_points} 个点不能确定{kind}；至少需要 {needed} 个。请触测更多点。</translation>
-    </message>
-    <message>
-        <source>{n_points} points, circles, slots and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.</source>
-        <translation>已触测 {n_points} 个点、圆、槽和球；联系新位置需要 {needed} 个不共线的基准点。请重新开始。</translation>
     </message>
     <message>
         <source>{n_tips} calibrations do not suffice for a verdict on repeatability: {needed} are needed, and ten for control limits.</source>
@@ -11264,8 +11236,8 @@ mm</translation>
         <translation>U (k = 2)</translation>
     </message>
     <message>
-        <source>U alone</source>
-        <translation>单独 U</translation>
+        <source>P: probability of conformity (JCGM 106).</source>
+        <translation>P：合格概率 (JCGM 106)。</translation>
     </message>
     <message>
         <source>P</source>
@@ -11274,10 +11246,6 @@ mm</translation>
     <message>
         <source>Decision</source>
         <translation>判定</translation>
-    </message>
-    <message>
-        <source>U alone: U (k = 2) if the points shared no error. P: probability of conformity (JCGM 106).</source>
-        <translation>单独 U：各点无共同误差时的 U (k = 2)。P：合格概率 (JCGM 106)。</translation>
     </message>
     <message>
         <source>Uncertainty budget, U (k = 2) by source</source>
@@ -11310,18 +11278,6 @@ mm</translation>
     <message>
         <source>Shift</source>
         <translation>平移</translation>
-    </message>
-    <message>
-        <source>Features of known form: {0}. Refinement of points and tip: {1}. Shift of the tip {2} mm; U (k = 2) {3} mm before, {4} mm after; chi-square {5} with {6} degrees of freedom.</source>
-        <translation>已知形状的要素：{0}。测点和测头的修正：{1}。测头移动 {2} mm；U (k = 2) 修正前 {3} mm，修正后 {4} mm；卡方 {5}，自由度 {6}。</translation>
-    </message>
-    <message>
-        <source>used</source>
-        <translation>已采用</translation>
-    </message>
-    <message>
-        <source>not used</source>
-        <translation>未采用</translation>
     </message>
     <message>
         <source>{0} points; deviations are drawn {1} times as large, at most {2} mm.</source>

@@ -11,13 +11,8 @@ from typing_extensions import override
 from lightpen.formats.file_format import FileFormat
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import MeasuredPart, taught_plan
-from lightpen.measuring.plan import (
-    Plan,
-    PlannedFeature,
-    free_plan,
-    read_plan,
-    write_plan,
-)
+from lightpen.measuring.plan import Plan, PlannedFeature, free_plan
+from lightpen.measuring.plan_checks import read_plan, write_plan
 from lightpen.measuring.surfaces import NAMES, FeatureKind
 from lightpen.record.exports.exports import save_new
 from lightpen.simulator.plate import plate_plan

@@ -15,15 +15,16 @@ from msgspec import structs
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.measuring.known_forms import Refinement, refine
 from lightpen.measuring.part import MeasuredPart, measure_part
+from lightpen.measuring.plan import Plan, Side
+from lightpen.measuring.plan_checks import missing_normal
 from lightpen.measuring.report import (
     PartRow,
     characteristic_rows,
     feature_rows,
     part_entries,
 )
-from lightpen.measuring.surfaces import NAMES
+from lightpen.measuring.surfaces import NAMES, FeatureKind
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -67,7 +68,6 @@ class Part(Found):
     part: MeasuredPart
     points: tuple[tuple[str, ProbedPoint], ...]  # feature and ball centre
     missing: tuple[str, ...]  # features that were not probed
-    refinement: Refinement | None = None  # by features of known form
 
     def deviations(self) -> list[FloatArray | None]:
         """Return the way from its feature to each point, (3,), mm; None if unknown."""
@@ -88,8 +88,6 @@ class Part(Found):
         points = [point for _, point in self.points]
         by_parameters = np.concatenate([point.sensitivity for point in points])
         covariance = instrument.covariance
-        if self.refinement is not None and self.refinement.is_used:
-            covariance = self.refinement.after
         own = np.zeros((len(by_parameters), len(by_parameters)))
         for i, point in enumerate(points):
             own[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = point.noise
@@ -131,14 +129,8 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
     plan = options.plan.limited_to(names)
     if not plan.features:
         raise CalibrationError("part.nothing-probed")
-    sensitivity = np.concatenate([point.sensitivity for _, point in found])
-    touches, refinement = refine(
-        plan,
-        touches_of_part(found, conditions, options),
-        sensitivity,
-        conditions.instrument.covariance,
-    )
-    part = measure_part(plan, touches)
+    touches = touches_of_part(found, conditions, options)
+    part = measure_part(plan, touches, conditions.limits)
     missing = tuple(
         each.name for each in options.plan.features if each.name not in names
     )
@@ -149,26 +141,25 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
             reason = message("part.datums-moved", position=position, residual=residual)
             doubt = refused(reason, message("part.probe-again"))
             assessment = worst((doubt, assessment))
-    if refinement is not None and not refinement.is_used:
-        reason = _refined(refinement, conditions.instrument)
-        assessment = worst((assessment, check(reason, message("part.check-known"))))
-    return Part(assessment, part, tuple(found), missing, refinement)
+    return Part(assessment, part, tuple(found), missing)
 
 
 def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> None:
-    """Refuse the last of some runs if it does not determine its feature."""
+    """Refuse the last of some runs if it does not determine its feature.
+
+    The normal of a point or line may come from a feature that is probed later.
+    """
     if options.plan is None:
         return
     found = _owned(runs, options)
     last = found[-1][0]
     name = base_name(last)
     own = [(name, point) for owner, point in found if owner == last]
-    plan = structs.replace(
-        options.plan.limited_to({name}), constructions=(), characteristics=()
-    )
-    measure_part(
-        structs.replace(plan, alignment=None), touches_of_part(own, conditions, options)
-    )
+    planned = options.plan.feature(name)
+    if planned.kind in {FeatureKind.POINT, FeatureKind.LINE}:
+        planned = structs.replace(planned, side=Side.CENTRE, surface="", normal=None)
+    touches = touches_of_part(own, conditions, options)
+    measure_part(Plan(options.plan.name, (planned,)), touches)
 
 
 def _owned(runs: Runs, options: PartOptions) -> list[tuple[str, ProbedPoint]]:
@@ -239,7 +230,6 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     return {
         **entries,
         "missing": list(found.missing),
-        "refinement": _refinement_entries(found.refinement, instrument),
         "touches": [
             {
                 "feature": name,
@@ -257,46 +247,6 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     }
 
 
-def _refinement_entries(
-    refinement: Refinement | None, instrument: Instrument
-) -> dict[str, Any] | None:
-    if refinement is None:
-        return None
-    tip = instrument.parameters.tip
-    before, after = (
-        COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[tip])
-        for covariance in (refinement.before, refinement.after)
-    )
-    return {
-        "features": list(refinement.names),
-        "is_used": refinement.is_used,
-        "tip_shift_pen_mm": refinement.shift[tip],
-        "tip_expanded_uncertainty_before_mm": before,
-        "tip_expanded_uncertainty_after_mm": after,
-        "chi_square": refinement.chi_square,
-        "degrees_of_freedom": refinement.n_free,
-    }
-
-
-def _refined(refinement: Refinement, instrument: Instrument) -> Message:
-    """Return the evidence on the tip by features of known form."""
-    names = ", ".join(refinement.names)
-    if not refinement.is_used:
-        return message(
-            "part.not-refined",
-            names=names,
-            chi_square=refinement.chi_square,
-            n_free=refinement.n_free,
-        )
-    tip = instrument.parameters.tip
-    before, after = (
-        COVERAGE_FACTOR * float(np.sqrt(np.diag(covariance)[tip].max()))
-        for covariance in (refinement.before, refinement.after)
-    )
-    shift = float(np.linalg.norm(refinement.shift[tip]))
-    return message("part.refined", names=names, shift=shift, before=before, after=after)
-
-
 def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
     part = found.part
     in_part = message("part.features-in-part")
@@ -310,7 +260,7 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
             message("part.kind"),
         ),
         _rows(feature_rows(part)),
-        tuple(_notes(found, conditions)),
+        tuple(_notes(part)),
     )
     characteristics = ResultTable(
         message("part.characteristics"),
@@ -320,23 +270,19 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
             message("part.actual"),
             message("part.deviation"),
             message("table.uncertainty"),
-            message("part.u-alone"),
             message("part.probability"),
             message("part.decision"),
         ),
         _rows(characteristic_rows(part)),
-        (message("part.u-alone-note"),) if part.results else (),
     )
     return tuple(each for each in (characteristics, features) if each.rows)
 
 
-def _notes(found: Part, conditions: Conditions) -> Iterator[Message]:
-    """Yield notes on datum points of a moved part and on features of known form."""
-    for position, motion in found.part.ties.items():
+def _notes(part: MeasuredPart) -> Iterator[Message]:
+    """Yield how datum points of a moved part agree."""
+    for position, motion in part.ties.items():
         residual = float(motion.residuals.max())
         yield message("part.moved", position=position, residual=residual)
-    if found.refinement is not None:
-        yield _refined(found.refinement, conditions.instrument)
 
 
 def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
@@ -381,15 +327,12 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     planned = planned_at(options, len(progress.runs))
     if planned is None:
         return message("part.no-plan")
-    kind = message("part.feature") if planned.kind is None else NAMES[planned.kind]
     name, n_points, needed = planned.name, len(progress.points), planned.n_touches
-    if planned.scan and n_points:
-        return message(
-            "part.slide", kind=kind, name=name, n_points=n_points, needed=needed
-        )
-    return message(
-        "part.instruction", kind=kind, name=name, n_points=n_points, needed=needed
-    )
+    code = "part.slide" if planned.scan and n_points else "part.instruction"
+    if planned.kind is None or planned.kind.value in name.casefold():
+        return message(f"{code}-named", name=name, n_points=n_points, needed=needed)
+    kind = NAMES[planned.kind]
+    return message(code, kind=kind, name=name, n_points=n_points, needed=needed)
 
 
 def _scans(options: PartOptions, run: int) -> bool:
@@ -398,13 +341,15 @@ def _scans(options: PartOptions, run: int) -> bool:
 
 
 def _missing(options: PartOptions, ball_diameter: float | None) -> Message | None:
-    return message("part.no-plan") if options.plan is None else None
+    if options.plan is None:
+        return message("part.no-plan")
+    return missing_normal(options.plan) if ball_diameter else None
 
 
 def _rule(options: PartOptions, limits: VerificationLimits) -> Message:
     if options.plan is None:
         return rule_in_words(limits)
-    return rule_in_words(replace(limits, rule=options.plan.rule))
+    return rule_in_words(replace(limits, rule=options.plan.rule or limits.rule))
 
 
 PART = VerificationTask(

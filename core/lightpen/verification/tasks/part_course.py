@@ -17,12 +17,11 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.alignment import MIN_POINTS, THIN
-from lightpen.measuring.characteristics import CENTRED
 from lightpen.measuring.features import Feature, fit_feature
 from lightpen.measuring.next_touch import Place, area_of, best_places, nominal_area
 from lightpen.measuring.part import kind_of
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
-from lightpen.measuring.surfaces import FeatureKind
+from lightpen.measuring.surfaces import CENTRED, FeatureKind
 from lightpen.measuring.touches import PartTouches, at_position
 from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
@@ -191,20 +190,21 @@ def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
 
     The normals point out of the material. Empty if the nominals do not tell.
     """
-    area = None
-    if planned.kind is not None and planned.nominal is not None:
-        area = nominal_area(planned.kind, planned.nominal)
+    if planned.kind is None or planned.nominal is None:
+        return ()
+    area = nominal_area(planned.kind, planned.nominal)
     if area is None:
         return ()
     places = best_places(area, planned.n_touches)
     if planned.side is Side.INSIDE:
         places = [replace(each, normal=-each.normal) for each in places]
-    if planned.kind is FeatureKind.LINE:  # at the front of the part
-        normal = np.array([0.0, -1.0, 0.0])
-        places = sorted(
-            (replace(each, normal=normal) for each in places),
-            key=lambda each: float(each.point[0]),
-        )
+    if planned.side is Side.CENTRE:
+        places = [replace(each, normal=np.zeros(3)) for each in places]
+    elif planned.kind in {FeatureKind.POINT, FeatureKind.LINE}:
+        normal = np.array(planned.normal or planned.nominal.axis or (0.0, 0.0, 1.0))
+        places = [replace(each, normal=normal) for each in places]
+    if planned.kind is FeatureKind.LINE:
+        places.sort(key=lambda each: float(each.point[0]))
     return tuple(places)
 
 

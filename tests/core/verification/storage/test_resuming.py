@@ -289,7 +289,9 @@ def test_a_moved_part_goes_on_after_a_kill_in_its_new_position(
 def test_a_scanned_feature_goes_on_after_a_kill(
     in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    edge = PlannedFeature("edge", FeatureKind.LINE, touches=8, scan=True)
+    edge = PlannedFeature(
+        "edge", FeatureKind.LINE, touches=8, scan=True, side=Side.CENTRE
+    )
     options = PartOptions(Plan("Edge", (edge,)))
     places = [Hold((3.0 * i, -30.0, 0.0), tilt=0.1) for i in range(12)]
 

@@ -3,14 +3,12 @@
 import os
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from io import StringIO
 from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from ezdxf.filemanagement import read as read_drawing
 from msgspec import structs
 from tests.accepted_tip import Hold, Holder
 
@@ -20,13 +18,12 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.file_format import FileFormat
 from lightpen.measuring.alignment import THIN
-from lightpen.measuring.characteristics import CENTRED
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import taught_plan
 from lightpen.measuring.plan import Nominal, Plan, PlannedFeature, free_plan
 from lightpen.measuring.qif import qif_text
-from lightpen.measuring.surfaces import FeatureKind
-from lightpen.messages import Message, message
+from lightpen.measuring.surfaces import CENTRED, FeatureKind
+from lightpen.messages import Message
 from lightpen.model.posture import FACING
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.plate import plate_plan
@@ -158,16 +155,6 @@ def test_ten_features_of_the_plate_are_measured_without_a_key(
     assert measured.state.assessment.grade is not Grade.REPEAT
 
 
-def test_a_distance_is_known_better_than_by_independent_points(
-    measured: Station,
-) -> None:
-    apart = measured.found.part.results[6]
-
-    assert apart.planned.quantity == "distance"
-    assert apart.independent_uncertainty is not None
-    assert apart.value.uncertainty < apart.independent_uncertainty
-
-
 def test_tables_have_a_decision_for_each_characteristic(measured: Station) -> None:
     characteristics, features = PART.tables(measured.found, measured.setup.conditions)
 
@@ -187,12 +174,7 @@ def test_every_export_names_the_characteristics(
     part = measured.found.part
     text = export.encoded(part).decode()
 
-    if export.name == "dxf":
-        drawing = read_drawing(StringIO(text))
-        assert not drawing.audit().errors
-        assert len(drawing.modelspace().query('*[layer=="BORE"]')) > 2 * 70
-    else:
-        assert all(each.planned.label in text for each in part.results)
+    assert all(each.planned.label in text for each in part.results)
 
 
 def test_qif_has_every_feature_with_its_place_and_uncertainty(
@@ -261,12 +243,15 @@ def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> No
         np.linalg.norm(point.point_cam - now.next_touch.point)
         for point in progress.points
     ]
-    assert min(away) > 10
+    assert min(away) > 9  # half a step of the grid of places
 
 
 def test_a_line_is_planned_from_left_to_right_at_the_front_of_the_part() -> None:
     edge = Nominal(origin=(10.0, 0.0, 0.0), axis=(-1.0, 0.0, 0.0), length=40.0)
-    places = planned_places(PlannedFeature("edge", FeatureKind.LINE, nominal=edge))
+    front = PlannedFeature(
+        "edge", FeatureKind.LINE, nominal=edge, normal=(0.0, -1.0, 0.0)
+    )
+    places = planned_places(front)
 
     along = [float(each.point[0]) for each in places]
     assert along == sorted(along)
@@ -331,7 +316,7 @@ def test_a_part_moved_in_between_goes_on_after_three_datum_points(
     instrument: Instrument,
 ) -> None:
     holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
-    distance = plate_plan().characteristics[7]  # of holes 1 and 4
+    distance = plate_plan().characteristics[8]  # of holes 1 and 4
     plan = Plan("Holes", (*holes,), characteristics=(distance,))
     at_it = station(instrument, plan)
     at_it.probe(10)  # three holes, and a point of the fourth
@@ -444,57 +429,6 @@ def test_a_part_is_not_moved_before_three_datum_points_are_probed(
         with_moved_part(at_it.setup, at_it.state)
 
 
-@pytest.mark.parametrize("error", [0.03, 3.0])
-def test_a_known_sphere_refines_the_tip_or_says_why_not(
-    instrument: Instrument, error: float
-) -> None:
-    dome = structs.replace(plate_plan().features[7], touches=12, known=0.002)
-    plan = Plan("Dome", (dome,), characteristics=plate_plan().characteristics[3:4])
-    rng, shift = np.random.default_rng(3), error * np.array([0.6, -0.5, 0.6])
-    ((name, points),) = probed_plate(instrument, plan)
-    off = []
-    for point in points:
-        turn = rotation_from_vector(0.5 * rng.standard_normal(3)) @ RAISED
-        sensitivity = point.sensitivity.copy()
-        sensitivity[:, instrument.parameters.tip] = turn
-        place = point.point_cam + turn @ shift
-        off.append(
-            replace(point, point_cam=place, rotation=turn, sensitivity=sensitivity)
-        )
-    loose = instrument.covariance.copy()
-    tip = instrument.parameters.tip
-    loose[tip, tip] += 0.03**2 * np.eye(3)
-    setup = station(replace(instrument, covariance=loose), plan).setup
-
-    found = PART.measure([(name, off)], setup.conditions, PartOptions(plan))
-
-    entries = PART.entries(found, setup.instrument)["refinement"]
-    assert entries["is_used"] is (error < 1)
-    note = PART.tables(found, setup.conditions)[1].notes[-1]
-    without = PartOptions(structs.replace(plan, characteristics=()))
-    reason = PART.measure([(name, off)], setup.conditions, without).assessment.reason
-    assert (reason == note) is (error > 1)
-    if error > 1:
-        assert found.assessment.grade is not Grade.PASS
-        chi_square, n_free = entries["chi_square"], entries["degrees_of_freedom"]
-        assert note == message(
-            "part.not-refined", names="dome", chi_square=chi_square, n_free=n_free
-        )
-        return
-    np.testing.assert_allclose(entries["tip_shift_pen_mm"], -shift, atol=0.01)
-    before = entries["tip_expanded_uncertainty_before_mm"]
-    after = entries["tip_expanded_uncertainty_after_mm"]
-    assert (after < before / 3).all()
-    assert note.code == "part.refined"
-    assert note.values == {
-        "names": "dome",
-        "shift": pytest.approx(np.linalg.norm(entries["tip_shift_pen_mm"])),
-        "before": pytest.approx(before.max()),
-        "after": pytest.approx(after.max()),
-    }
-    assert (np.abs(entries["tip_shift_pen_mm"] + shift) < 1.5 * after).all()
-
-
 @pytest.mark.slow
 def test_a_moved_part_is_tied_by_datum_points_probed_again(
     instrument: Instrument,
@@ -512,19 +446,19 @@ def test_a_moved_part_is_tied_by_datum_points_probed_again(
             )
             for each in points
         ]
-        if name != "slot":
+        if name != "pad":
             runs.append((name, points))
-        if name in {"slot", "dome", "hole 1", "hole 2", "hole 3"}:
+        if name in {"pad", "dome", "hole 1", "hole 2", "hole 3"}:
             runs.append((f"{name}@2", away))
 
     found = PART.measure(runs, at_it.setup.conditions, at_it.options)
 
-    slot = found.part.features["slot"].in_part
-    assert slot.values[:3] == pytest.approx([0, 22, -4], abs=0.02)
+    pad = found.part.features["pad"].in_part
+    assert pad.values[:3] == pytest.approx([0, 24, 0], abs=0.02)
     once = PART.measure(
         probed_plate(instrument, plan), at_it.setup.conditions, at_it.options
     )
-    assert found.part.uncertainty("slot")[1] > once.part.uncertainty("slot")[1]
+    assert found.part.uncertainty("pad")[1] > once.part.uncertainty("pad")[1]
     # A plane is probed elsewhere each time: it is no datum point.
     few = [each for each in runs if not each[0].startswith("hole")]
     few.append(("top@2", runs[0][1]))
