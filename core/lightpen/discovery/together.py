@@ -22,7 +22,7 @@ from lightpen.discovery.starts import any_camera, gradient_of
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.model.camera import Camera
-from lightpen.model.information import inverse, known_by
+from lightpen.model.information import inverse, known_by, symmetric_root
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 
@@ -257,9 +257,7 @@ def _parted(each: Discovery, beyond_fit: FloatArray) -> _Parts:
 
 def common_part(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the part (k, k) that two covariances have in common; each exceeds it."""
-    both = one + other
-    values, vectors = np.linalg.eigh(both)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = symmetric_root(one + other)
     white = np.linalg.pinv(root)
     shares, axes = np.linalg.eigh(white @ one @ white.T)
     spread = root @ axes

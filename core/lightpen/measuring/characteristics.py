@@ -30,6 +30,7 @@ from lightpen.measuring.surfaces import AXIAL, CENTRED, FLAT, RADIAL, FeatureKin
 from lightpen.measuring.touches import PartTouches
 from lightpen.measuring.zones import Criterion, fit_zone
 from lightpen.model.expanded_uncertainty import COVERAGE
+from lightpen.model.information import symmetric_root
 
 N_DRAWS = 4000
 PARALLEL = 5.0  # degrees, between axes that are meant to be parallel
@@ -212,11 +213,8 @@ def _form(planned: PlannedCharacteristic, one: Measured, inputs: FloatArray) -> 
 
 def _draws(errors: FloatArray, inputs: FloatArray) -> FloatArray:
     """Return draws (N_DRAWS, M) of errors (M, P) of the inputs."""
-    covariance = errors @ inputs @ errors.T
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.clip(values, 0, None))
-    rng = np.random.default_rng(0)
-    return np.asarray(rng.standard_normal((N_DRAWS, len(values))) @ root.T)
+    draws = np.random.default_rng(0).standard_normal((N_DRAWS, len(errors)))
+    return np.asarray(draws @ symmetric_root(errors @ inputs @ errors.T))
 
 
 def _range(heights: Quantity, inputs: FloatArray) -> Value:

@@ -43,7 +43,7 @@ from lightpen.estimation.bundle.noise_correlation import (
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
 from lightpen.estimation.statistics.variance_components import ALLOWED, find_component
-from lightpen.model.information import inverse
+from lightpen.model.information import inverse, symmetric_root
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
 MAX_RELEASES = 8  # rounds in which contradicted numbers are sought
@@ -297,9 +297,8 @@ def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:
         known = inverse(bundle.covariance[place, place])
         own = known - bundle.prior_information[place, place]
         right = known @ bundle.values[place]
-        values, vectors = np.linalg.eigh(cameras[c].covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        found = find_component(root.T @ own @ root, root.T @ right)
+        root = symmetric_root(cameras[c].covariance)
+        found = find_component(root @ own @ root, root @ right)
         ratio = max(found.sigma if found.exceeds(ALLOWED) else 0.0, MOST_SHRUNK)
         if ratio < 1:
             shrunk = ratio**2 * cameras[c].covariance

@@ -38,7 +38,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle.linearised import CameraView
 from lightpen.estimation.statistics.variance_components import P_NONE
 from lightpen.model.camera import Camera
-from lightpen.model.information import known_by
+from lightpen.model.information import known_by, symmetric_root
 from lightpen.model.lens_field import correlation
 from lightpen.model.quantiles import chi_square_quantile
 
@@ -136,7 +136,7 @@ class Effect:
     @cached_property
     def roots(self) -> tuple[FloatArray, ...]:
         """A square root of each shape, (k, k)."""
-        return tuple(map(_root_of, self.shapes))
+        return tuple(map(symmetric_root, self.shapes))
 
     @cached_property
     def prior_information(self) -> FloatArray:
@@ -218,14 +218,9 @@ def gain_of(
     (k,).
     """
     left = right - S @ means
-    spectrum = _Spectrum.of(S, left, _root_of(prior))
+    spectrum = _Spectrum.of(S, left, symmetric_root(prior))
     by_means = float(means @ (right + left))
     return by_means - float(spectrum.costs(np.ones(1))[0])
-
-
-def _root_of(covariance: FloatArray) -> FloatArray:
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 class _Spectrum(NamedTuple):

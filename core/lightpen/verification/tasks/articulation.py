@@ -25,6 +25,7 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
 from lightpen.model.decision_rules import Decision
 from lightpen.model.expanded_uncertainty import COVERAGE
+from lightpen.model.information import symmetric_root
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.posture import angles_between
 from lightpen.verification.tasks.assessment import (
@@ -217,9 +218,8 @@ def _by_noise(
     means = [mean_point(touches) for _, touches in postures]
     covariance = joint_covariance(means, conditions.instrument)
     covariance += np.diag(np.tile(conditions.drift**2, len(means)))
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = rng.standard_normal((N_TRIALS, len(root))) @ root.T
+    draws = rng.standard_normal((N_TRIALS, len(covariance)))
+    draws = draws @ symmetric_root(covariance)
     return smallest_diameters(draws.reshape(N_TRIALS, -1, 3))
 
 

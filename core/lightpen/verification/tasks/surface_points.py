@@ -7,6 +7,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
+from lightpen.model.information import symmetric_root
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import (
     Conditions,
@@ -46,10 +47,11 @@ def split_points(
 def simulated_ranges(root: FloatArray, n_rows: int = 1) -> FloatArray:
     """Return ranges of normal residuals, the largest of some rows, (N_TRIALS,), mm.
 
-    ``root`` (m, k) is the square root of their covariance; the rows follow each other.
+    ``root`` (k, k) is the symmetric root of their covariance; the rows follow each
+    other.
     """
     rng = np.random.default_rng(0)  # the same points give the same ranges
-    off = rng.standard_normal((N_TRIALS, root.shape[1])) @ root.T
+    off = rng.standard_normal((N_TRIALS, len(root))) @ root
     rows = off.reshape(N_TRIALS, n_rows, -1)
     return np.asarray(np.ptp(rows, axis=2).max(axis=1))
 
@@ -59,9 +61,8 @@ def form_by_noise(covariance: FloatArray, n_rows: int = 1) -> float:
 
     ``covariance`` is the covariance of its residuals, mm^2; see `simulated_ranges`.
     """
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return float(np.quantile(simulated_ranges(root, n_rows), 1 - UNUSUAL))
+    ranges = simulated_ranges(symmetric_root(covariance), n_rows)
+    return float(np.quantile(ranges, 1 - UNUSUAL))
 
 
 def away_from_cones(
