@@ -23,6 +23,7 @@ from lightpen.messages import Message
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.tip_bending import bending_of
 from lightpen.verification.history.recorded_tasks import read_drift
 from lightpen.verification.probing.current_tip import cone_before
 from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
@@ -134,6 +135,7 @@ class MeasuredRuns:
             kind,
             {
                 "camera_serials": camera_serials(self.instrument),
+                "remarks": list(self.instrument.remarks),
                 **entries,
                 "rejected": rejected_entries(self.rejected),
                 "witness": lamp_drift_entries(self.lamp_drift),
@@ -181,7 +183,11 @@ def measure_runs(
     files = tuple(file for place in found for file in place.files)
     files += tuple(centers)
     require_other_file(options.json, *files)
-    instrument = instrument_of(calibration, viewers, pen, pen_file)
+    temperature_c: float | None = getattr(options, "pen_temperature", None)
+    bending = bending_of(calibration, getattr(options, "data", None))
+    instrument = instrument_of(
+        calibration, viewers, pen, pen_file, temperature_c, bending
+    )
     with progress("Finding LEDs") as report:
         seen = _seen(centers, found, instrument, report)
     runs = _runs_of(seen, instrument, options.frames)

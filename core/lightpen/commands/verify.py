@@ -178,7 +178,8 @@ def _verify_task(given: argparse.Namespace) -> int:
         judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
     rule = rule_in_words(conditions.limits)
     tables = task.tables(found, conditions)
-    print(shown(found_text(tables, judged, measured.rejected, rule)))
+    remarks = conditions.instrument.remarks
+    print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
     _print_lamp_drift(measured, judged)
     entries = task.entries(found, measured.instrument)
     record = measured.record(given, task.kind, entries, judged, rule)
