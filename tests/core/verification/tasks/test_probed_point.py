@@ -84,7 +84,9 @@ def test_a_point_follows_the_parameters_as_its_derivative_says(
         difference = (point(*step) - point(*back)) / (2 * max(step))
         size = float(np.abs(difference).max())
         # The Jacobian is that of projected centres, and weights follow the residuals.
-        np.testing.assert_allclose(by_this, difference, atol=0.05 * size)
+        # A disc that faces the camera is seen as a circle: its diameter moves nothing.
+        tolerance = 0.05 * size + 1e-12
+        np.testing.assert_allclose(by_this, difference, atol=tolerance)
 
 
 def test_more_images_make_a_point_less_noisy(touching: Touching) -> None:
