@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 MARK = "<img src=x>"
-NAMES = Names(*(f"{MARK}{each}" for each in ("Hall", "Ann", "LP", "T", "C")), 10.0)
+HALL, OPERATOR, PEN, TIP, CONE = (f"{MARK}{each}" for each in "HALTC")
+NAMES = Names(HALL, OPERATOR, PEN, TIP, CONE, 10.0)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 
 

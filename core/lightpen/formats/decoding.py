@@ -117,7 +117,8 @@ def full_scale_of(image: Image) -> int:
     usual = (near.size - n_top) / BELOW_TOP
     if top > 255 and n_top > max(FEWEST_CLIPPED, PILE * usual):
         return top
-    return next(2**bits - 1 for bits in SENSOR_BITS if top < 2**bits)
+    levels: list[int] = [2**bits - 1 for bits in SENSOR_BITS]
+    return min(level for level in levels if top <= level)
 
 
 def encode_png(image: Image) -> bytes:

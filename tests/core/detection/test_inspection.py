@@ -182,7 +182,7 @@ def test_a_search_that_has_not_begun_finds_nothing() -> None:
 
 
 def test_clipped_leds_of_ten_bits_ask_for_less_light_and_not_for_more() -> None:
-    of_ten_bits = image(exposure=8.0, sensor=Sensor(bits=12)) >> 2
+    of_ten_bits = (image(exposure=8.0, sensor=Sensor(bits=12)) >> 2).astype(np.uint16)
     spots = detect_spots(of_ten_bits)
     exposure = inspect(spots).exposure
     assert exposure.n_saturated == len(spots) > 0

@@ -91,7 +91,9 @@ class DayControl(QObject):
         amber = self._first_amber()
         if amber is None:
             tip = shortened(self._selection.preparation.names.tip, LONGEST_NAME)
-            return MainAction(self.tr("Swing tip {0}").format(tip), self._why_not_swing())
+            return MainAction(
+                self.tr("Swing tip {0}").format(tip), self._why_not_swing()
+            )
         steps = {
             "camera": self.tr("Check the camera"),
             "leds": self.tr("Check the LEDs"),
