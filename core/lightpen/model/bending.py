@@ -54,11 +54,18 @@ class Bending:
         """Return its size and where it is from."""
         if self.measured is None:
             return message("bending.assumed", assumed=1000 * ASSUMED)
+        bending = 1000 * abs(self.measured.bending_mm)
+        uncertainty = 1000 * self.measured.expanded_uncertainty_mm
+        day = self.measured.measured.isoformat()
+        if not self.is_overdue:
+            return message(
+                "bending.measured", bending=bending, uncertainty=uncertainty, day=day
+            )
         return message(
-            "bending.overdue" if self.is_overdue else "bending.measured",
-            bending=1000 * abs(self.measured.bending_mm),
-            uncertainty=1000 * self.measured.expanded_uncertainty_mm,
-            day=self.measured.measured.isoformat(),
+            "bending.overdue",
+            bending=bending,
+            uncertainty=uncertainty,
+            day=day,
             due=self.measured.due.isoformat(),
             assumed=1000 * ASSUMED,
         )

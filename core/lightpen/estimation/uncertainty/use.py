@@ -70,5 +70,6 @@ def in_use(
 def _scale_words(sigma: float, temperature: Prior) -> Message:
     """Return what the scale adds to a length, and what would make it less."""
     added = COVERAGE_FACTOR * METRE * sigma
-    code = "use.temperature-assumed" if temperature.assumed else "use.scale"
-    return message(code, added=added)
+    if temperature.assumed:
+        return message("use.temperature-assumed", added=added)
+    return message("use.scale", added=added)

@@ -114,7 +114,8 @@ def _assessment(bending: float, uncertainty: float) -> VerificationAssessment:
         return check(message("press-test.coarse", uncertainty=uncertainty), MORE_IMAGES)
     sigma = uncertainty / COVERAGE_FACTOR
     is_bent = bending**2 > chi_square_quantile(1, BY_CHANCE) * sigma**2
-    words = {"bending": 1000 * abs(bending), "uncertainty": 1000 * uncertainty}
+    shown, u = 1000 * abs(bending), 1000 * uncertainty
     if is_bent and abs(bending) > ASSUMED:
-        return check(message("press-test.gives-way", **words), STIFFEN)
-    return accepted(message("press-test.steady", **words), KEEP)
+        said = message("press-test.gives-way", bending=shown, uncertainty=u)
+        return check(said, STIFFEN)
+    return accepted(message("press-test.steady", bending=shown, uncertainty=u), KEEP)

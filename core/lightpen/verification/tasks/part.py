@@ -329,11 +329,23 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     if planned is None:
         return message("part.no-plan")
     name, n_points, needed = planned.name, len(progress.points), planned.n_touches
-    code = "part.slide" if planned.scan and n_points else "part.instruction"
+    is_scan = bool(planned.scan and n_points)
     if planned.kind is None or planned.kind.value in name.casefold():
-        return message(f"{code}-named", name=name, n_points=n_points, needed=needed)
+        if is_scan:
+            return message(
+                "part.slide-named", name=name, n_points=n_points, needed=needed
+            )
+        return message(
+            "part.instruction-named", name=name, n_points=n_points, needed=needed
+        )
     kind = NAMES[planned.kind]
-    return message(code, kind=kind, name=name, n_points=n_points, needed=needed)
+    if is_scan:
+        return message(
+            "part.slide", kind=kind, name=name, n_points=n_points, needed=needed
+        )
+    return message(
+        "part.instruction", kind=kind, name=name, n_points=n_points, needed=needed
+    )
 
 
 def _scans(options: PartOptions, run: int) -> bool:
