@@ -16,6 +16,7 @@ from lightpen.commands.calibrate_options import (
     separation_of,
 )
 from lightpen.commands.console import (
+    centers_at,
     images_at,
     lacking,
     note,
@@ -40,7 +41,6 @@ from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
-from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
@@ -278,7 +278,7 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
     )
     if options.centers is not None:
         _require_one_each(options.centers, rig.n_cameras, in_order)
-        centers = [read_centers(file, pen.n_leds) for file in options.centers]
+        centers = [centers_at(file, pen) for file in options.centers]
         files: tuple[Path, ...] = tuple(options.centers)
         pairing = pair_images([list(map(str, c.frames)) for c in centers], rig.names)
         observations = observe_rig_centers(centers, pairing, rig, pen)
@@ -356,7 +356,7 @@ def _observe(
     if is_centers:
         path = Path(given[0])
         require_other_file(options.json, path)
-        centers = read_centers(path, pen.n_leds)
+        centers = centers_at(path, pen)
         return observe_centers(centers, camera, pen), (path,)
     source = images_at(*given).of_bits(options.bits)
     require_other_file(options.json, *source.files)

@@ -17,7 +17,9 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import A_FILE, unreadable, write_whole
 from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.json_records import record_bytes
+from lightpen.formats.observation_files import Centers, read_centers
 from lightpen.messages import Message, printable
+from lightpen.model.pen import Pen
 
 DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK = 0, 1, 2, 3, 4
 LINE_INTERVAL = 15.0  # s, of lines of progress
@@ -108,6 +110,14 @@ def images_at(*places: str) -> ImageSource:
     if remark is not None:
         note(remark)
     return source
+
+
+def centers_at(path: Path, pen: Pen) -> Centers:
+    """Read LED centres, and print how many LEDs the file lists as not seen."""
+    centers = read_centers(path, pen.n_leds)
+    if centers.remark is not None:
+        print(shown(str(centers.remark)) + "\n")
+    return centers
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from lightpen.commands.arguments import (
     finite,
 )
 from lightpen.commands.console import (
+    centers_at,
     printing,
     progress,
     require_other_file,
@@ -29,7 +30,6 @@ from lightpen.estimation.reports.methods import result_of
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
-from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.messages import printable
 from lightpen.model.limits import VerificationLimits, rule_in_words
@@ -180,7 +180,7 @@ def _from_centers(options: argparse.Namespace, tables: list[Path]) -> list[TipEs
     tips = []
     with progress("Calibrating") as report:
         for path in tables:
-            seen = observe_centers(read_centers(path, pen.n_leds), camera, pen)
+            seen = observe_centers(centers_at(path, pen), camera, pen)
             result = result_of(calibrate(camera, pen, seen), options.method)
             tips.append(
                 TipEstimate(path.name, result.tip_pen, result.expanded_uncertainty[:3])

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from lightpen.commands.arguments import add_cameras_and_pen
-from lightpen.commands.console import lacking, progress, require_other_file
+from lightpen.commands.console import centers_at, lacking, progress, require_other_file
 from lightpen.commands.entering import limits_in_force
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.json_records import file_entry
-from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.messages import Message
 from lightpen.model.origin import Origin
@@ -243,7 +242,7 @@ def _seen(
         raise UsageError("cli.centers-of-rig")
     seen = []
     for path in centers:
-        own = read_centers(path, instrument.pen.n_leds)
+        own = centers_at(path, instrument.pen)
         view = observe_centers(own, instrument.camera, instrument.pen)
         seen.append(_SeenRun(path.name, (view,)))
     for i, place in enumerate(places, start=1):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import (
     PivotFit,
@@ -64,10 +64,12 @@ def calibrate_pivot(
     covariances: FloatArray | None = None,
     *,
     robust: bool = True,
+    places: IntArray | None = None,
 ) -> PivotCalibration:
     """Find the tip from poses in the order of capture.
 
-    Parameters as of `lightpen.estimation.pivot.pivot.fit_pivot`. Raises
+    ``places`` (N,) are their numbers for messages; parameters else as of
+    `lightpen.estimation.pivot.pivot.fit_pivot`. Raises
     `CalibrationError` if the poses do not fix a tip, are in another convention or unit,
     have no tip in common, or have two without a clear majority.
     """
@@ -75,9 +77,11 @@ def calibrate_pivot(
     require_usual_reading(rotations, translations)
     agreeing = fit_pivot(rotations, translations).used
     groups = find_groups(rotations, translations, agreeing)
+    if places is None:
+        places = np.arange(len(rotations)) + 1
     left_out = np.zeros(len(rotations), dtype=bool)
     if groups is not None and robust:
-        _require_majority(groups)
+        _require_majority(groups, places)
         left_out = groups.group == 2
     fit = fit_pivot(
         rotations, translations, covariances, robust=robust, candidates=~left_out
@@ -86,14 +90,14 @@ def calibrate_pivot(
         fit=fit,
         covariance=_covariance(rotations, covariances, fit),
         groups=groups,
-        warnings=tuple(_warnings(fit, groups, left_out)),
+        warnings=tuple(_warnings(fit, groups, left_out, places)),
     )
 
 
-def _names(chosen: BoolArray, max_runs: int) -> str:
+def _names(chosen: BoolArray, max_runs: int, places: IntArray) -> str:
     """Return the chosen poses (N,) as text, by their place in the file from 1."""
-    places = np.flatnonzero(chosen) + 1
-    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    indices = np.flatnonzero(chosen)
+    runs = np.split(places[indices], np.flatnonzero(np.diff(indices) > 1) + 1)
     named = [
         f"{run[0]}" if len(run) == 1 else f"{run[0]}-{run[-1]}"
         for run in runs[:max_runs]
@@ -118,9 +122,11 @@ def _covariance(
     )
 
 
-def _require_majority(groups: PoseGroups) -> None:
+def _require_majority(groups: PoseGroups, places: IntArray) -> None:
     if groups.minor_share > LARGEST_MINORITY:
-        raise CalibrationError(_parted(groups, _CALIBRATE_EACH, len(groups.group)))
+        raise CalibrationError(
+            _parted(groups, _CALIBRATE_EACH, len(groups.group), places)
+        )
 
 
 _CALIBRATE_EACH = message("pivot.calibrate-each")
@@ -128,9 +134,11 @@ _MINORITY_LEFT_OUT = message("pivot.minority-left-out")
 _BOTH_TAKEN = message("pivot.both-taken")
 
 
-def _parted(groups: PoseGroups, consequence: Message, max_runs: int) -> Message:
+def _parted(
+    groups: PoseGroups, consequence: Message, max_runs: int, places: IntArray
+) -> Message:
     """Return the message on two groups of poses, and the consequence."""
-    first, second = (_names(groups.group == name, max_runs) for name in (1, 2))
+    first, second = (_names(groups.group == name, max_runs, places) for name in (1, 2))
     if groups.has_two_tips:
         return message(
             "pivot.two-tips",
@@ -149,12 +157,12 @@ def _parted(groups: PoseGroups, consequence: Message, max_runs: int) -> Message:
 
 
 def _warnings(
-    fit: PivotFit, groups: PoseGroups | None, left_out: BoolArray
+    fit: PivotFit, groups: PoseGroups | None, left_out: BoolArray, places: IntArray
 ) -> list[Message]:
     warnings = []
     if groups is not None:
         consequence = _MINORITY_LEFT_OUT if left_out.any() else _BOTH_TAKEN
-        warnings.append(_parted(groups, consequence, MAX_RUNS))
+        warnings.append(_parted(groups, consequence, MAX_RUNS, places))
     scattered = ~fit.used & ~left_out
     if scattered.mean() > MANY_LEFT_OUT:
         warnings.append(
@@ -162,7 +170,7 @@ def _warnings(
                 "pivot.many-left-out",
                 n_left_out=int(scattered.sum()),
                 n_poses=len(scattered),
-                poses=_names(scattered, MAX_RUNS),
+                poses=_names(scattered, MAX_RUNS, places),
             )
         )
     if is_likely_inverted(fit.tip_pen, fit.pivot_cam):

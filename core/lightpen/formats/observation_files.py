@@ -1,7 +1,9 @@
 """Tables of LED centres and poses measured by other programs.
 
 LED centres have the columns ``frame,led,x_px,y_px``; those of unknown LEDs have
-``frame,x_px,y_px``. Poses have the row-major rotation
+``frame,x_px,y_px``. A frame has a number, or a time of up to 9 decimals. LEDs that were
+not seen may be left out, or have empty cells, NaN, (0, 0) or (-1, -1). Poses have the
+row-major rotation
 ``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
 and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
 translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. A column
@@ -9,16 +11,25 @@ translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. 
 header the columns stand in this order, with the number first if there is one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, IntArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE
-from lightpen.formats.tables import Table, read_table
-from lightpen.messages import message
+from lightpen.formats.files import MEGABYTE, read_text
+from lightpen.formats.pose_files import (
+    SEQUENCE_SUFFIXES,
+    GivenPoses,
+    foreign_poses,
+    is_motive,
+    is_own,
+    motive_table,
+    read_sequence,
+)
+from lightpen.formats.tables import Table, parse_table, read_table
+from lightpen.messages import Message, message, printable
 from lightpen.model.rigid import nearest_rotation
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
@@ -31,8 +42,12 @@ ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
 SINGULAR = 1e-14  # least over largest variance of a pose, in rad and mm
 SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative
 
-_CENTERS = (("frame",), ("led",), ("x_px", "x"), ("y_px", "y"))
-_UNLABELLED = (("frame",), ("x_px", "x"), ("y_px", "y"))
+_FRAME = ("frame", "image", "frame_id", "time", "timestamp", "time_s", "t")
+_LED = ("led", "led_id", "marker", "marker_id", "id")
+_PIXEL = (("x_px", "x", "u_px", "u"), ("y_px", "y", "v_px", "v"))
+_CENTERS = (_FRAME, _LED, *_PIXEL)
+_UNLABELLED = (_FRAME, *_PIXEL)
+_NOT_SEEN = ([0.0, 0.0], [-1.0, -1.0])  # as programs write centres that they lack
 _POSE = (
     *((f"r{i}{j}",) for i in "123" for j in "123"),
     *((f"t{axis}_mm", f"t{axis}") for axis in "xyz"),
@@ -47,6 +62,7 @@ class Centers:
     frames: IntArray
     pixels: FloatArray
     path: Path
+    remark: Message | None = None  # on LEDs that the file lists as not seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +82,9 @@ class PoseTable:
     translations: FloatArray  # (N, 3), mm
     covariances: FloatArray | None  # (N, 6, 6), of w and t, rad and mm
     path: Path
+    places: IntArray  # (N,), of the poses among all in the file, from 1
+    n_lost: int = 0  # rows without a pose
+    remarks: tuple[Message, ...] = ()  # on how the file was read
 
 
 def read_centers(path: Path, n_leds: int) -> Centers:
@@ -76,53 +95,112 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     """
     table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
     columns = table.columns(_CENTERS, message("table.of-centers"))
-    frame_of_row = table.whole_numbers(columns[0])
+    frame_of_row = table.moments(columns[0])
     led_of_row = table.whole_numbers(columns[1])
-    pixels = table.numbers(columns[2:])
+    pixels = _seen_pixels(table, columns[2:])
     _check_centers(table, led_of_row, pixels, n_leds)
     frames, place = np.unique(frame_of_row, return_inverse=True)
     _check_number(table, len(frames))
     _check_no_pair_twice(table, frame_of_row, led_of_row, place * n_leds + led_of_row)
     grid = np.full((len(frames), n_leds, 2), np.nan)
     grid[place, led_of_row - 1] = pixels
-    return Centers(frames, grid, path)
+    unseen = np.isnan(pixels[:, 0])
+    remark = None
+    if unseen.any():
+        remark = message(
+            "centers.not-seen",
+            n_leds=int(unseen.sum()),
+            n_frames=len(set(frame_of_row[unseen].tolist())),
+            name=table.name,
+        )
+    return Centers(frames, grid, path, remark)
 
 
 def read_unlabelled_centers(path: Path) -> UnlabelledCenters:
     """Read centres of unknown LEDs; see the module for the layout."""
     table = read_table(path, message("file.centers"), OBSERVATION_FILE_LIMIT)
     columns = table.columns(_UNLABELLED, message("table.of-centers"))
-    frame_of_row = table.whole_numbers(columns[0])
-    pixels = table.numbers(columns[1:])
+    frame_of_row = table.moments(columns[0])
+    pixels = _seen_pixels(table, columns[1:])
     _check_inside_any(table, pixels)
-    numbers, counts = np.unique(frame_of_row, return_counts=True)
-    frames = np.arange(numbers[0], numbers[-1] + 1)
-    if len(frames) > 2 * len(numbers):  # numbered in steps, or by a clock
-        frames = numbers
+    numbers = np.unique(frame_of_row)
+    frames = numbers
+    span = int(numbers[-1]) - int(numbers[0]) + 1
+    if span <= 2 * len(numbers):  # else numbered in steps, or by a clock
+        frames = np.arange(numbers[0], numbers[-1] + 1)
     _check_number(table, len(frames))
-    order = np.argsort(frame_of_row, kind="stable")
-    parts = np.split(pixels[order], np.cumsum(counts)[:-1])
-    of_frame = dict(zip(numbers.tolist(), parts, strict=True))
-    nothing = np.zeros((0, 2))
-    centers = tuple(of_frame.get(frame, nothing) for frame in frames.tolist())
+    seen = np.isfinite(pixels[:, 0])
+    centers = tuple(pixels[seen & (frame_of_row == frame)] for frame in frames)
     return UnlabelledCenters(frames, centers, path)
 
 
-def read_poses(path: Path) -> PoseTable:
-    """Read poses; see the module for the layout.
+def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
+    """Return centres (N, 2), px; NaN where the table says that there is none."""
+    pixels = table.numbers_or_none(columns)
+    nothing = [np.all(pixels == place, axis=1) for place in _NOT_SEEN]
+    return np.where(
+        (np.any(nothing, axis=0) | np.isnan(pixels).any(axis=1))[:, None],
+        np.nan,
+        pixels,
+    )
+
+
+def read_poses(path: Path, tool: str | None = None) -> PoseTable:
+    """Read poses; see the module and `lightpen.formats.pose_columns` for the layouts.
 
     Rotations given in few digits are replaced by the nearest rotations; those that are
-    rotations to 1e-6 stay as they are. Raises `FileError`, which names the line, for
-    matrices that are no rotations or covariances, poses given twice, or cells that are
-    not numbers.
+    rotations to 1e-6 stay as they are. Rows without a pose are left out. ``tool`` is
+    the name of one of several. Raises `FileError`, which names the line, for matrices
+    that are no rotations or covariances, poses given twice, or cells that are not
+    numbers.
     """
-    table = read_table(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
+    if path.name.lower().endswith(SEQUENCE_SUFFIXES):
+        given = read_sequence(path, tool)
+        return _foreign_poses(given, path)
+    text = read_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
+    name = printable(path.name)
+    text = motive_table(text, name) if is_motive(text) else text
+    if is_own(parse_table(text, name, is_foreign=True)):
+        return _own_poses(parse_table(text, name), path)
+    return _foreign_poses(
+        foreign_poses(parse_table(text, name, is_foreign=True), tool), path
+    )
+
+
+def _foreign_poses(given: GivenPoses, path: Path) -> PoseTable:
+    far = np.abs(given.translations).max(axis=1) > LARGEST_TRANSLATION
+    if np.any(far):
+        line = int(given.places[np.argmax(far)])
+        flaw = message("poses.far", most=LARGEST_TRANSLATION / 1000)
+        raise FileError("table.line", line=line, name=printable(path.name), flaw=flaw)
+    return PoseTable(
+        nearest_rotation(given.rotations),
+        given.translations,
+        None,
+        path,
+        given.places,
+        given.n_lost,
+        given.remarks,
+    )
+
+
+def _own_poses(table: Table, path: Path) -> PoseTable:
     columns, covariance_columns = _pose_columns(table)
-    numbers = table.numbers(columns)
     if "pose" in table.header:
         _check_repeated(table, table.numbers([table.header.index("pose")])[:, 0])
     elif not table.header and columns[0] == 1:
         _check_repeated(table, table.numbers([0])[:, 0])
+    all_numbers = table.numbers_or_none(columns)
+    is_seen: BoolArray = np.asarray(np.isfinite(all_numbers).all(axis=1))
+    if not is_seen.any():
+        raise FileError("poses.all-lost", name=table.name, n_poses=len(is_seen))
+    places = np.flatnonzero(is_seen)
+    table = replace(
+        table,
+        rows=[table.rows[i] for i in places],
+        lines=[table.lines[i] for i in places],
+    )
+    numbers = all_numbers[is_seen]
     translations = numbers[:, 9:]
     far = np.abs(translations).max(axis=1) > LARGEST_TRANSLATION
     if np.any(far):
@@ -134,7 +212,8 @@ def read_poses(path: Path) -> PoseTable:
         covariances = table.numbers(covariance_columns).reshape(-1, 6, 6)
         _check_covariances(table, covariances)
     rotations = _checked_rotations(table, numbers[:, :9].reshape(-1, 3, 3))
-    return PoseTable(rotations, translations, covariances, path)
+    n_lost = int(np.count_nonzero(~is_seen))
+    return PoseTable(rotations, translations, covariances, path, places + 1, n_lost)
 
 
 def _check_centers(
@@ -150,7 +229,7 @@ def _check_centers(
 
 
 def _check_inside_any(table: Table, pixels: FloatArray) -> None:
-    far = np.abs(pixels).max(axis=1) > LARGEST_PIXEL
+    far = np.abs(pixels).max(axis=1) > LARGEST_PIXEL  # not where it is NaN
     if np.any(far):
         row = int(np.argmax(far))
         raise table.error(

@@ -3,7 +3,8 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from pathlib import Path
 from typing import NoReturn
 
@@ -18,7 +19,10 @@ MAX_LINES = 300_000  # 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters
 MAX_CELL_LENGTH = 500  # characters
 MAX_CELLS = 2_000_000
-LARGEST_WHOLE = 2**31 - 1  # of frame and LED numbers
+LARGEST_WHOLE = 2**31 - 1  # of LED numbers
+LARGEST_MOMENT = 2**63 - 1  # of frame numbers: nanoseconds have 19 digits
+DECIMALS = 9  # of times
+NOTHING = frozenset({"", "nan", "na", "n/a", "none", "null", "-", "--", "missing"})
 
 # No digit can match in two ways, so that mismatches are found without backtracking.
 _NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
@@ -107,8 +111,38 @@ class Table:
             self._refuse_numbers(columns)
         return values.reshape(len(self.rows), len(columns))
 
+    def numbers_or_none(self, columns: Sequence[int]) -> FloatArray:
+        """Return columns as `numbers`; NaN where a cell is empty or says that."""
+        rows = [[row[column] for column in columns] for row in self.rows]
+        gone = np.array([[cell.casefold() in NOTHING for cell in row] for row in rows])
+        known = [
+            ["0" if cell.casefold() in NOTHING else cell for cell in row]
+            for row in rows
+        ]
+        values = replace(self, rows=known).numbers(range(len(columns)))
+        return np.where(gone, np.nan, values)
+
+    def moments(self, column: int) -> IntArray:
+        """Return a column of numbers or times of frames, as whole numbers in order.
+
+        Times with decimals are counted in thousandths, or in thousandths of these.
+        """
+        cells = [row[column].replace(",", ".") for row in self.rows]
+        if any(map(number_flaw, cells)):
+            self.numbers([column])  # names the line
+        exact = list(map(Decimal, cells))
+        least = -min(int(value.normalize().as_tuple().exponent) for value in exact)
+        exact = [
+            value.scaleb(min(-(-max(least, 0) // 3) * 3, DECIMALS)) for value in exact
+        ]
+        for row, value in enumerate(exact):
+            if abs(value) > LARGEST_MOMENT or value % 1:
+                cell = quoted(self.rows[row][column])
+                raise self.error(row, message("table.no-moment", cell=cell))
+        return np.array(list(map(int, exact)), dtype=np.int64)
+
     def whole_numbers(self, column: int) -> IntArray:
-        """Return a column, by its index from 0, of whole numbers (frames, LEDs).
+        """Return a column, by its index from 0, of whole numbers (LEDs).
 
         Raises `FileError`, which names the line, for any other cell.
         """
@@ -155,8 +189,12 @@ def read_table(path: Path, what: Message, limit: int) -> Table:
     return parse_table(read_text(path, what, limit), printable(path.name))
 
 
-def parse_table(text: str, name: str) -> Table:
-    r"""Read a table from a text with ``\n`` at the line ends; see `read_table`."""
+def parse_table(text: str, name: str, *, is_foreign: bool = False) -> Table:
+    r"""Read a table from a text with ``\n`` at the line ends; see `read_table`.
+
+    A foreign table may have columns of the same name, short lines, and its header in a
+    comment.
+    """
     lines = _filled_lines(text, name)
     separator = _separator([line for _, line in lines])
     hint = re.fullmatch(r"sep=([;,\t|])\s*", lines[0][1])  # of Excel, to itself
@@ -170,17 +208,38 @@ def parse_table(text: str, name: str) -> Table:
     rows = [_cells(line, separator, number, name) for number, line in lines]
     if all(row[-1] == "" and len(row) > 1 for row in rows):
         rows = [row[:-1] for row in rows]
-    _check_lengths(rows, numbers, separator, name)
+    if is_foreign:
+        length = max(map(len, rows))
+        rows = [row + [""] * (length - len(row)) for row in rows]
+    else:
+        _check_lengths(rows, numbers, separator, name)
     header: tuple[str, ...] = ()
     if not any(map(_looks_numeric, rows[0])):
         header = tuple(cell.casefold() for cell in rows.pop(0))
-        _check_header(header, numbers.pop(0), name)
+        number = numbers.pop(0)
+        if not is_foreign:
+            _check_header(header, number, name)
+    elif is_foreign:
+        header = _header_in_comment(text, separator, len(rows[0]))
     if not rows:
         raise FileError("table.only-header", name=name)
     table = Table(name, header, rows, numbers)
-    if not text.endswith("\n"):
+    if not text.endswith("\n") and not is_foreign:
         _check_last_number(table)
     return table
+
+
+def _header_in_comment(
+    text: str, separator: str | None, length: int
+) -> tuple[str, ...]:
+    """Return the names of the last comment before the data, if it has as many."""
+    header: tuple[str, ...] = ()
+    for line in text.split("\n"):
+        if line.strip() and line.lstrip()[0] != "#":
+            break
+        cells = [c.strip() for c in line.strip().lstrip("# ").split(separator)]
+        header = tuple(cell.casefold() for cell in cells) if line.strip() else header
+    return header if len(header) == length else ()
 
 
 def number_flaw(text: str) -> Message | None:

@@ -6791,6 +6791,10 @@ mm</translation>
         <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
     </message>
     <message>
+        <source>The translations are about {typical:.3g} long: they are taken as metres.</source>
+        <translation>平移量约为 {typical:.3g}：按米处理。</translation>
+    </message>
+    <message>
         <source>The {kind} {name} does not show the normal of its surface, along which the ball is compensated. In the plan name the plane it lies on (&apos;surface: NAME&apos;), give the normal out of the material (&apos;normal: [x, y, z]&apos; in the part&apos;s frame), probe that plane too, or state &apos;side: centre&apos; for the ball centre itself.</source>
         <translation>{kind} {name} 未显示其表面法线，无法沿法线补偿测球。请在方案中指定其所在平面（‘surface: NAME’），给出指向材料外的法线（‘normal: [x, y, z]’，零件坐标系），或再触测该平面，或用 ‘side: centre’ 表示测球中心本身。</translation>
     </message>
@@ -7087,6 +7091,10 @@ mm</translation>
         <translation>{address} 不是本机的地址。请给出本机在客户端网络中的地址；仅限本机时用 {loopback}。</translation>
     </message>
     <message>
+        <source>{cell} is no number or time of a frame: up to 19 digits, 9 of them behind the decimal point.</source>
+        <translation>{cell} 不是帧的编号或时间：最多 19 位数字，其中小数点后 9 位。</translation>
+    </message>
+    <message>
         <source>{count}, run {run} of {n_runs}</source>
         <translation>{count}，第 {run} / {n_runs} 轮</translation>
     </message>
@@ -7109,6 +7117,14 @@ mm</translation>
     <message>
         <source>{n_found} LEDs are found; the sketch has {n_sketched}. Give a sketch with all LEDs of the pen, or none.</source>
         <translation>找到 {n_found} 个 LED；草图中有 {n_sketched} 个。请给出包含光笔全部 LED 的草图，或不给草图。</translation>
+    </message>
+    <message>
+        <source>{n_leds} LEDs in {n_frames} frames of {name} are not seen: their centres are empty, NaN, (0, 0) or (-1, -1).</source>
+        <translation>{name} 的 {n_frames} 帧中有 {n_leds} 个 LED 未检测到：其中心为空、NaN、(0, 0) 或 (-1, -1)。</translation>
+    </message>
+    <message>
+        <source>{n_lost} of {n_poses} poses are lost and left out.</source>
+        <translation>{n_poses} 个位姿中有 {n_lost} 个丢失，未使用。</translation>
     </message>
     <message>
         <source>{n_points} of {needed} points</source>
@@ -7171,6 +7187,10 @@ mm</translation>
         <translation>{name} 未注明坐标单位。请在表头中注明：led,x_mm,y_mm,z_mm。</translation>
     </message>
     <message>
+        <source>{name} has a transform of frame {frame} that is not 16 numbers. Record it again.</source>
+        <translation>{name} 中帧 {frame} 的变换不是 16 个数值。请重新记录。</translation>
+    </message>
+    <message>
         <source>{name} has more than {most:,} values. Check that this is the right file.</source>
         <translation>{name} 的值超过 {most:,} 个。请检查文件是否正确。</translation>
     </message>
@@ -7183,6 +7203,18 @@ mm</translation>
         <translation>{name} 没有列 {column}；{what} 需要列 {wanted}。其表头为 {header}。请重命名列。</translation>
     </message>
     <message>
+        <source>{name} has no columns of poses that are known. Its header is {header}. Name the columns qw,qx,qy,qz,tx_mm,ty_mm,tz_mm, or r11 to r33,tx_mm,ty_mm,tz_mm.</source>
+        <translation>{name} 没有可识别的位姿列。其表头为 {header}。请将列命名为 qw,qx,qy,qz,tx_mm,ty_mm,tz_mm，或 r11 至 r33,tx_mm,ty_mm,tz_mm。</translation>
+    </message>
+    <message>
+        <source>{name} has no pose in any of its {n_poses} rows: the tool was not seen. Choose the right tool, or repeat the recording.</source>
+        <translation>{name} 的 {n_poses} 行中都没有位姿：未检测到工具。请选择正确的工具，或重新记录。</translation>
+    </message>
+    <message>
+        <source>{name} has no transforms that move (Seq_Frame0000_StylusToTrackerTransform). Record the sequence with the transforms of the tracker.</source>
+        <translation>{name} 中没有变化的变换（Seq_Frame0000_StylusToTrackerTransform）。请连同跟踪器的变换一起记录序列。</translation>
+    </message>
+    <message>
         <source>{name} has no {entry}. Check that this is the right file and that it is complete.</source>
         <translation>{name} 没有 {entry}。请检查文件是否正确且完整。</translation>
     </message>
@@ -7191,8 +7223,20 @@ mm</translation>
         <translation>{name} 只有注释。请检查其是否完整。</translation>
     </message>
     <message>
+        <source>{name} has rotations as three angles, whose order is not certain. Export the rotations as quaternions or matrices.</source>
+        <translation>{name} 的旋转为三个角度，其顺序不确定。请将旋转导出为四元数或矩阵。</translation>
+    </message>
+    <message>
+        <source>{name} has rotations that are none: quaternions need the length 1, and the rows of matrices the length 1 at right angles. Export the poses again.</source>
+        <translation>{name} 中的旋转无效：四元数的长度须为 1，矩阵各行的长度须为 1 且相互垂直。请重新导出位姿。</translation>
+    </message>
+    <message>
         <source>{name} has the calibration_temperature {celsius:g}; degrees Celsius from {coldest:g} to {warmest:g} are needed. Correct or remove it.</source>
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
+    </message>
+    <message>
+        <source>{name} has the poses of {n_tools} tools: {tools}. State which one is the pen.</source>
+        <translation>{name} 含有 {n_tools} 个工具的位姿：{tools}。请指明哪一个是笔。</translation>
     </message>
     <message>
         <source>{name} has the same intrinsics file {file} for {one} and {other}. Give each camera its own calibration file.</source>
@@ -7851,8 +7895,8 @@ mm</translation>
         <translation>{name} 的主点位于 ({cx:g}, {cy:g}) px，远在 {width} × {height} px 的图像之外。请检查两者是否属于同一台相机和同一图像尺寸。</translation>
     </message>
     <message>
-        <source>{name} has no header and {n_columns} columns; poses need the 12 columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, with the number of the pose before them and the covariance c11 to c66 behind them if known. Put a header line with these names on top.</source>
-        <translation>{name} 没有表头，有 {n_columns} 列；位姿需要 12 列 r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm，如已知，前面是位姿编号，后面是协方差 c11 至 c66。请在最上面加一行含这些名称的表头。</translation>
+        <source>{name} has no header and {n_columns} columns. Poses have 7 (quaternion and translation), 12 or 16 (matrix), with a number or time before them. Put a header line on top: qw,qx,qy,qz,tx_mm,ty_mm,tz_mm, or r11 to r33,tx_mm,ty_mm,tz_mm.</source>
+        <translation>{name} 没有表头，有 {n_columns} 列。位姿有 7 列（四元数和平移）、12 或 16 列（矩阵），前面可有编号或时间。请在首行写表头：qw,qx,qy,qz,tx_mm,ty_mm,tz_mm，或 r11 至 r33,tx_mm,ty_mm,tz_mm。</translation>
     </message>
     <message>
         <source>{name} has no header and {n_columns}; {what} need the {n_needed} columns {wanted}. Put a header line with these names on top, and separate the columns by commas, semicolons or tabs.</source>

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpen.arrays import IntArray
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry, plain, record_heading
@@ -12,9 +13,17 @@ from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 
 
 def pivot_record(
-    calibration: PivotCalibration, poses: InputFile, least_squares: bool
+    calibration: PivotCalibration,
+    poses: InputFile,
+    least_squares: bool,
+    places: IntArray,
+    n_lost: int,
 ) -> dict[str, Any]:
-    """Return the record of a pivot calibration; README.md documents its entries."""
+    """Return the record of a pivot calibration; README.md documents its entries.
+
+    ``places`` (N,) are the numbers of the poses in the file, ``n_lost`` how many others
+    it has.
+    """
     fit, groups = calibration.fit, calibration.groups
     uncertainty = calibration.expanded_uncertainty
     group = np.ones(len(fit.used), dtype=int) if groups is None else groups.group
@@ -35,22 +44,21 @@ def pivot_record(
         },
         "rms_mm": fit.rms,
         "warnings": calibration.warnings,
-        "poses": {"total": len(fit.used), "used": int(fit.used.sum())},
+        "poses": {"total": len(fit.used), "used": int(fit.used.sum()), "lost": n_lost},
         "inputs": {"poses": file_entry(poses)},
         "frames": [
             {
-                "pose": i + 1,
+                "pose": place,
                 "used": used,
                 "group": name or None,
                 "residual_mm": residual,
             }
-            for i, (used, name, residual) in enumerate(
-                zip(
-                    fit.used.tolist(),
-                    group.tolist(),
-                    fit.residuals.tolist(),
-                    strict=True,
-                )
+            for place, used, name, residual in zip(
+                places.tolist(),
+                fit.used.tolist(),
+                group.tolist(),
+                fit.residuals.tolist(),
+                strict=True,
             )
         ],
     }

@@ -341,13 +341,15 @@ def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     noise = 0.1 * np.random.default_rng(2).standard_normal((30, 3))
     calibration = calibrate_pivot(swing.rotations, swing.translations + noise)
 
-    found = json.loads(json_bytes(pivot_record(calibration, FILE, least_squares=False)))
+    places = np.arange(30)
+    record = pivot_record(calibration, FILE, False, places, n_lost=0)
+    found = json.loads(json_bytes(record))
 
     np.testing.assert_allclose(found["tip_pen_mm"], swing.tip_pen, atol=0.5)
     uncertainty = 2 * np.sqrt(np.diag(found["covariance"]))
     np.testing.assert_allclose(found["expanded_uncertainty_mm"], uncertainty[:3])
     np.testing.assert_allclose(found["pivot_expanded_uncertainty_mm"], uncertainty[3:])
-    assert found["poses"] == {"total": 30, "used": 30}
+    assert found["poses"] == {"total": 30, "used": 30, "lost": 0}
     assert len(found["frames"]) == 30
     assert {frame["group"] for frame in found["frames"]} == {1}
     assert found["warnings"] == []
