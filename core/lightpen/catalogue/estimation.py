@@ -86,8 +86,6 @@ MESSAGES = {
     "share.diameter": "the diameter of the LED discs. State it and its uncertainty in the LED file",
     "share.camera": "the intrinsics file. Calibrate the camera, and state the covariance in its file",
     "share.lens": "the lens, beyond its distortion model. Calibrate the camera with views that fill the image; its file then states the lens field",
-    "use.scale": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured.",
-    "use.temperature-assumed": "Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured, as temperature or thermal expansion of the pen are not stated. State both.",
     "share.compliance": "the compliance of stylus, seat and stand. Use a stiffer stylus, press gently, and clamp cone and camera",
     "share.timing": "what is not simultaneous. Trigger all cameras by one signal, use a global shutter, and light all LEDs at once",
     "share.rig": "the extrinsics of the cameras. Calibrate the rig, and state the uncertainty",

@@ -178,8 +178,7 @@ def _verify_task(given: argparse.Namespace) -> int:
         judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
     rule = rule_in_words(conditions.limits)
     tables = task.tables(found, conditions)
-    remarks = conditions.instrument.remarks
-    print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
+    print(shown(found_text(tables, judged, measured.rejected, rule)))
     _print_lamp_drift(measured, judged)
     entries = task.entries(found, measured.instrument)
     record = measured.record(given, task.kind, entries, judged, rule)

@@ -457,7 +457,7 @@ def _calibration_of(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
         budget=budget,
-        instrument=adjusted_instrument(adjustment, budget, inputs.growth),
+        instrument=adjusted_instrument(adjustment, budget),
         halves=compare_halves(joint),
         leds=measure_leds(state.rig, pen, adjusted.pixels, joint),
         coverage=measure_coverage(joint.rotations),

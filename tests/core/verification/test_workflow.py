@@ -247,7 +247,7 @@ def test_a_verification_with_other_choices(
         ("fixed point", "tip.weak-power"),
         ("circle", "tip.with-power"),
         ("circle", "circle.radius-off"),
-        ("fixed point", "tip.weak-power"),
+        ("fixed point", "tip.with-power"),
         ("circle", "tip.with-power"),
         *(3 * [("conclusion", "abandoned")]),
     ]

@@ -5,7 +5,7 @@ report marks as such.
 """
 
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot
 
 import numpy as np
 
@@ -25,11 +25,6 @@ class Prior:
 
     covariance: FloatArray  # (k, k), of their deviation from what the file says
     assumed: bool  # whether the file states none
-
-    @property
-    def sigma(self) -> float:
-        """Standard uncertainty of a single unknown."""
-        return sqrt(float(self.covariance[0, 0]))
 
 
 @dataclass(frozen=True)
@@ -80,7 +75,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
         cameras=tuple(prior_of_camera(camera, assumptions) for camera in rig.cameras),
         extrinsics=extrinsics,
         scale=_stated_or(assumptions.scale, pen.scale_sigma),
-        temperature=temperature_prior(pen, assumptions),
+        temperature=_temperature(pen, assumptions),
         diameter=_stated_or(assumptions.diameter * pen.diameter, pen.diameter_sigma),
         led_sigma=pen.led_sigma,
         form_error=assumptions.form_error,
@@ -139,7 +134,7 @@ def _warmth(pen: Pen, assumptions: Assumptions) -> float:
     )
 
 
-def temperature_prior(pen: Pen, assumptions: Assumptions) -> Prior:
+def _temperature(pen: Pen, assumptions: Assumptions) -> Prior:
     """Return the prior of the thermal expansion, relative, equation (10)."""
     is_measured = assumptions.temperature_c is not None
     warmth = _warmth(pen, assumptions)

@@ -3,12 +3,9 @@
 Errors that the calibration leaves are common to every point that is measured
 afterwards, and correlated: an error of the focal length comes with one of the LEDs and
 one of the tip. So the covariance covers all parameters jointly.
-
-That is the state of the swing. `lightpen.estimation.uncertainty.use` adds what acts
-when the tip measures.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +20,6 @@ from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )
-from lightpen.messages import Message
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -56,26 +52,6 @@ def parameters_of(rig: Rig, pen: Pen) -> Parameters:
     return Parameters(tip, tuple(cameras), extrinsics, diameter, leds)
 
 
-class PenScale(NamedTuple):
-    """Relative scale s of a pen during the swing that calibrated its tip.
-
-    With the scale of the LED file, of which ``file_sigma`` is the standard uncertainty.
-    """
-
-    growth: float  # of pen and tip against the LED file
-    file_sigma: float
-    thermal_sigma: float  # standard uncertainty of the growth by temperature
-    deviation: float  # estimate of s by the swing, 0 if it does not determine it
-    variance: float  # of s by the swing
-    covariance: FloatArray  # (q,), of all parameters with s
-
-    @property
-    def lasting(self) -> float:
-        """Fraction of s that belongs to the LED file, and not to temperature."""
-        total = self.file_sigma**2 + self.thermal_sigma**2
-        return self.file_sigma**2 / total if total > 0 else 1.0
-
-
 @dataclass(frozen=True, eq=False)
 class Instrument:
     """A camera, or several of a rig, and a pen with its tip."""
@@ -86,10 +62,6 @@ class Instrument:
     # (q, q), of tip, cameras, diameter and LEDs, as `parameters` has them.
     covariance: FloatArray
     sigma: float  # noise of one image coordinate during the calibration, px
-    scale: PenScale
-    # Standard uncertainty of the bending of a touch across the pen, mm
-    bending: float = 0.0
-    remarks: tuple[Message, ...] = ()  # on scale and bending, for the user
 
     @property
     def camera(self) -> Camera:
@@ -102,14 +74,11 @@ class Instrument:
         return parameters_of(self.rig, self.pen)
 
 
-def adjusted_instrument(
-    adjustment: Adjustment, budget: Budget, growth: float = 0.0
-) -> Instrument:
-    """Return the instrument as adjusted by a swing, at the scale of the pen in it.
+def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
+    """Return the instrument as adjusted by a swing.
 
-    ``growth`` is the thermal growth of the pen that was assumed. The covariance is
-    without mechanics that are held at 0: in a measurement they act as they did in the
-    swing.
+    Its covariance is without mechanics that are held at 0: in a measurement they act
+    as they did in the swing.
     """
     bundle, unshrunk = adjustment.bundle, adjustment.unshrunk
     state = bundle.state
@@ -121,33 +90,13 @@ def adjusted_instrument(
     if of_turn is not None and state.rig.n_cameras == 1:
         spread = spread + effect_of_normals(unshrunk).covariance(of_turn)
     mixing = instrument_mixing(bundle)
-    by_scale = spread[:, bundle.layout.scale.start]
-    deviation = float(bundle.values[bundle.layout.scale.start])
-    priors = bundle.unknowns.priors
     return Instrument(
         rig=state.rig,
         pen=state.pen,
         tip_pen=state.tip_pen,
         covariance=mixing @ spread @ mixing.T,
         sigma=bundle.sigma,
-        scale=PenScale(
-            growth=(1 + growth) * (1 + deviation) - 1,
-            file_sigma=priors.scale.sigma,
-            thermal_sigma=priors.temperature.sigma,
-            deviation=deviation,
-            variance=float(by_scale[bundle.layout.scale.start]),
-            covariance=mixing @ by_scale,
-        ),
     )
-
-
-def scale_direction(instrument: Instrument) -> FloatArray:
-    """Return the derivative of the parameters by the scale of pen and tip, (q,)."""
-    at, middle = instrument.parameters, instrument.pen.leds.mean(axis=0)
-    by_scale = np.zeros(at.number)
-    by_scale[at.tip] = instrument.tip_pen - middle
-    by_scale[at.leds] = (instrument.pen.leds - middle).ravel()
-    return by_scale
 
 
 def instrument_of_files(
@@ -164,28 +113,15 @@ def instrument_of_files(
     covariance[at.tip, at.tip] = tip_covariance
     _put_cameras(covariance, at, priors)
     covariance[at.diameter, at.diameter] = priors.diameter.covariance
+    scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
     basis = led_basis(pen.leds)
     covariance[at.leds, at.leds] = (
         (pen.led_sigma or 0.0) ** 2 * basis @ basis.T
         if pen.led_covariance is None
         else pen.led_covariance
     )
-    scale = PenScale(
-        growth=0.0,
-        file_sigma=priors.scale.sigma,
-        thermal_sigma=0.0,
-        deviation=0.0,
-        variance=priors.scale.sigma**2,
-        covariance=np.zeros(at.number),
-    )
-    files = Instrument(rig, pen, tip_pen, covariance, sigma, scale)
-    by_scale = scale_direction(files)
-    crossed = scale.variance * by_scale
-    return replace(
-        files,
-        covariance=covariance + np.outer(by_scale, crossed),
-        scale=scale._replace(covariance=crossed),
-    )
+    covariance[at.leds, at.leds] += priors.scale.covariance * np.outer(scaling, scaling)
+    return Instrument(rig, pen, tip_pen, covariance, sigma)
 
 
 def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
@@ -197,12 +133,8 @@ def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
         moved[getattr(at, kind), place] = np.eye(place.stop - place.start)
     covariance = moved @ instrument.covariance @ moved.T
     _put_cameras(covariance, at, priors_of(rig, instrument.pen, USUAL))
-    by_scale = moved @ instrument.scale.covariance
-    return replace(
-        instrument,
-        rig=rig,
-        covariance=covariance,
-        scale=instrument.scale._replace(covariance=by_scale),
+    return Instrument(
+        rig, instrument.pen, instrument.tip_pen, covariance, instrument.sigma
     )
 
 

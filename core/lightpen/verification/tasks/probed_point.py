@@ -1,8 +1,8 @@
 """A touch: one point measured with the pen held still.
 
 Each image puts the tip at ``X = R tip_pen + t``. The mean over the images of a touch is
-its point. Two things make it uncertain: noise of images, seat and bending, which is
-its own, and what is not known of tip, LEDs and camera, which all touches share. The
+its point. Two things make it uncertain: the noise of the images and of the seat, which
+are its own, and what is not known of tip, LEDs and camera, which all touches share. The
 latter is kept as the derivative of the point by these parameters, so that it drops out
 of a difference of two points as far as it moves both alike.
 
@@ -131,8 +131,6 @@ def measure_touches(
     points = poses.rotations @ instrument.tip_pen + poses.translations
     noises = tip_covariances(poses.rotations, poses.covariances, instrument.tip_pen)
     noises *= (sigma / poses.sigma) ** 2
-    along = poses.rotations @ UPRIGHT_AXIS
-    across = np.eye(3) - along[:, :, None] * along[:, None, :]
     sensitivities = point_sensitivities(instrument, poses)
     touches, start = [], 0
     for still in held:
@@ -143,8 +141,7 @@ def measure_touches(
             ProbedPoint(
                 point_cam=points[own][agreeing].mean(axis=0),
                 noise=_mean_noise(points[own][agreeing], noises[own][agreeing])
-                + SEATING**2 * np.eye(3)
-                + instrument.bending**2 * across[own][agreeing].mean(axis=0),
+                + SEATING**2 * np.eye(3),
                 sensitivity=sensitivities[own][agreeing].mean(axis=0),
                 rotation=nearest_rotation(poses.rotations[own][agreeing].mean(axis=0)),
                 names=tuple(still.frames[i].name for i in agreeing),
