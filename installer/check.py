@@ -114,7 +114,6 @@ def try_all(trial: Trial, payload: Path, authority: Path | None) -> None:
     try_start(trial)
     life.try_entry_points(trial, __version__)
     extras.try_keyring(trial)
-    extras.try_timestamp(trial)
     life.try_demo(trial)
     life.try_double_click(trial)
     life.try_refusals(trial)

@@ -61,7 +61,6 @@ LIBRARIES = (
     Library("OpenSSL", "runtime/libcrypto-3.dll", *_OPENSSL),
     Library("OpenSSL", f"{PACKAGES}/psycopg_binary.libs/libcrypto-*.dll", *_OPENSSL),
     Library("OpenSSL", f"{PACKAGES}/cryptography/hazmat/bindings/_rust.pyd", *_OPENSSL),
-    Library("OpenSSL", f"{PACKAGES}/rfc3161_client/_rust.pyd", *_OPENSSL),
     Library(
         *("SQLite", "runtime/sqlite3.dll", "SQLite consortium", "blessing"),
         "sqlite:sqlite",

@@ -37,7 +37,7 @@ SPDX = {
     "MIT License": "MIT",  # jaraco.classes
 }
 # What these state there is no name of a licence.
-SPDX_OF = {"scipy": "BSD-3-Clause", "rfc3161-client": "Apache-2.0"}
+SPDX_OF = {"scipy": "BSD-3-Clause"}
 LICENCE = "License :: "  # of the classifiers of PyPI
 NAMES = re.compile("(licen[cs]e|copying|notice|authors|ofl)", re.IGNORECASE)
 

@@ -49,9 +49,8 @@ MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
            "cryptography.hazmat.bindings._rust", "PySide6.QtWidgets",
            "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
            "lightpen_app.wizard_pages")  # fmt: skip
-# Drive cameras, reach an archive on a server, and have its entries timestamped.
-OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "keyring.backends.Windows",
-            "rfc3161_client")  # fmt: skip
+# Drive cameras, and reach an archive on a server.
+OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "keyring.backends.Windows")
 
 
 def test_program(file: Path) -> int:

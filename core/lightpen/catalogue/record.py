@@ -36,7 +36,6 @@ MESSAGES = {
     "supervisor.no-name": "Enter the name of the supervisor.",
     "limits.damaged": "The limits in {file} were modified or damaged after they were saved. Restore the file from a copy.",
     "supervisor.needed": "A supervisor's approval and a reason are needed. Enter the supervisor's name and password.",
-    "supervisor.wait": "The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.",
     "supervisor.changed-meanwhile": "The limits were changed in another window after they were shown here. Nothing was saved. Read the present limits, then change them again.",
     "limits.missing": "A file is missing among the limits in {folder}. Nothing is accepted until the folder is restored from a copy.",
     "limits.unsigned": "The limits in {file} are not signed by this station and its supervisor: the file was changed or comes from elsewhere. Nothing is accepted until it is restored from a copy or removed.",

@@ -1,4 +1,4 @@
-"""``lightpen archive``: check, list, deliver, fetch, exchange and timestamp entries."""
+"""``lightpen archive``: check, list, deliver, fetch and export entries."""
 
 import argparse
 from datetime import date
@@ -9,7 +9,6 @@ import platformdirs
 from lightpen.commands.arguments import DataFolder, add_data, whole_number
 from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
-SAMPLE = 3  # tips that a check recomputes
 USUAL_LENGTH = 50  # entries that are listed
 
 
@@ -42,14 +41,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         action="store_true",
         help="check the copy on the server set by LIGHTPEN_ARCHIVE, too",
     )
-    check.add_argument(
-        "--recompute",
-        type=number_of_tips,
-        default=SAMPLE,
-        metavar="N",
-        help="accepted tips, chosen at random, to compute again from their LED "
-        f"centres: a number, or all ({SAMPLE})",
-    )
     delivered.add_argument(
         "--again",
         action="store_true",
@@ -61,23 +52,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         metavar="NAME",
         help="start of the chain to restore, where the server has several",
     )
-    stamped = actions.add_parser(
-        "timestamp", help="have the newest entry timestamped by an authority (RFC 3161)"
-    )
-    stamped.add_argument(
-        "--tsa",
-        default="",
-        metavar="URL",
-        help="time stamping authority (default: that set for the computer, else none)",
-    )
-    for action in (check, stamped):
-        action.add_argument(
-            "--certificate",
-            type=Path,
-            metavar="FILE",
-            help="PEM file with the root certificate of the time stamping authority, "
-            "and optionally its own",
-        )
     renewed = actions.add_parser(
         "new-key", help="introduce another station key, if the present one was lost"
     )
@@ -87,7 +61,7 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         help="supervisor who approves it, if the data folder has a supervisor "
         "password; the password is requested, or read from LIGHTPEN_PASSWORD",
     )
-    for action in (check, listed, export, taken, delivered, fetched, stamped, renewed):
+    for action in (check, listed, export, taken, delivered, fetched, renewed):
         add_data(action, data_folder)
     for action in (export, taken):
         action.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
@@ -114,11 +88,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     listed.add_argument(
         "--csv", action="store_true", help="write a table for other programs"
     )
-
-
-def number_of_tips(text: str) -> int | None:
-    """Return a number of tips from 0; None for all."""
-    return None if text == "all" else whole_number(text)
 
 
 def parse_date(text: str) -> date:

@@ -10,12 +10,6 @@ from lightpen.archive.chains.chains import chain_at_home, chain_head, note_deliv
 from lightpen.archive.chains.entries import SHORT, Kind
 from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.checks.check import check_file
-from lightpen.archive.checks.recompute_check import with_recomputed
-from lightpen.archive.checks.timestamps import (
-    authority,
-    request_timestamp,
-    with_timestamps,
-)
 from lightpen.archive.history.history import Line, lines
 from lightpen.archive.history.listing import entries_csv
 from lightpen.archive.history.queries import EntryFilter, newest
@@ -52,11 +46,6 @@ def _check(options: argparse.Namespace) -> int:
         data = data_of(options)
         with progress("Checking") as report:
             checked = check_file(data / ARCHIVE, data, report)
-        with progress("Recomputing") as report, _looked_into(data) as database:
-            checked = with_recomputed(
-                checked, database, data, options.recompute, report
-            )
-            checked = with_timestamps(checked, database, data, options.certificate)
         findings, delivery = checked.findings, ""
         if options.server:
             with _looked_into(data) as database, _server() as server:
@@ -70,11 +59,7 @@ def _check(options: argparse.Namespace) -> int:
             print(shown(f"Note: {note}"))
         has_findings = bool(findings)
         outcome = "Something was changed" if has_findings else "No change was found"
-        n_files = checked.n_files
-        n_tips = f", tips recomputed: {checked.n_tips}" if checked.n_tips else ""
-        if checked.n_timestamps:
-            n_tips += f", timestamps: {checked.n_timestamps}"
-        counts = f"{checked.n_entries} entries, {n_files} files{n_tips}"
+        counts = f"{checked.n_entries} entries, {checked.n_files} files"
         print(f"{outcome}: {counts}.{delivery}")
 
     return run(options) or (CHANGED if has_findings else 0)
@@ -148,16 +133,6 @@ def _server_sql(options: argparse.Namespace) -> None:
 
 
 @printing
-def _timestamp(options: argparse.Namespace) -> None:
-    by, data = authority(options.tsa, options.certificate), data_of(options)
-    if not by.address or by.certificate is None:
-        raise UsageError("timestamp.no-authority")
-    with _looked_into(data) as database:
-        found = request_timestamp(database, data, by)
-    print(shown(f"Entry {found.number} existed at {found.at}: {found.file}"))
-
-
-@printing
 def _new_key(options: argparse.Namespace) -> None:
     data = data_of(options)
     with closing(Logbook(data)) as logbook:
@@ -177,7 +152,6 @@ ACTIONS: dict[str, Command] = {
     "deliver": _deliver,
     "new-key": _new_key,
     "fetch": _fetch,
-    "timestamp": _timestamp,
     "server-sql": _server_sql,
 }
 

@@ -28,8 +28,6 @@ class MachineSettings:
     language: str = ""
     archive_server: str = ""
     update_file: str = ""  # names the newest version
-    timestamp_authority: str = ""
-    timestamp_certificate: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)  # of new stations, by key
     laboratory: Laboratory | None = None
 

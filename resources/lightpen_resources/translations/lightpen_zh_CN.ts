@@ -5944,10 +5944,6 @@ mm</translation>
         <translation>5 个畸变系数：更多系数不会更好地预测视图。交叉验证误差：{held_out:.4f} px。</translation>
     </message>
     <message>
-        <source>Entries after entry {after} without a timestamp: {n}.</source>
-        <translation>条目 {after} 之后没有时间戳的条目数：{n}。</translation>
-    </message>
-    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
     </message>
@@ -6776,10 +6772,6 @@ mm</translation>
         <translation>此处已触测过。请触测别处。</translation>
     </message>
     <message>
-        <source>Timestamps with a signature that was not verified: {n}. The certificate of the time stamping authority is not set.</source>
-        <translation>{n} 个时间戳的签名未经验证：未设置时间戳机构的证书。</translation>
-    </message>
-    <message>
         <source>Tip (CSV)</source>
         <translation>测球中心 (CSV)</translation>
     </message>
@@ -7340,20 +7332,8 @@ mm</translation>
         <translation>测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，合计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。差异显著。</translation>
     </message>
     <message>
-        <source>The tip of entry {number} does not follow from the LED centres of its record: recomputed it differs by {distance:.4f} mm, with U {uncertainty:.4f} mm instead of {stated:.4f} mm. It was computed by {program}. Recompute it with that version, and calibrate the tip again.</source>
-        <translation>条目 {number} 的测头无法由其记录的 LED 中心得出：重新计算相差 {distance:.4f} mm，U 为 {uncertainty:.4f} mm，而不是 {stated:.4f} mm。原由 {program} 计算。请用该版本重新计算，并重新标定测头。</translation>
-    </message>
-    <message>
-        <source>The tip of entry {number} does not follow from the LED centres of its record: {why}</source>
-        <translation>条目 {number} 的测头无法由其记录的 LED 中心得出：{why}</translation>
-    </message>
-    <message>
         <source>The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry was falsified.</source>
         <translation>条目 {number} 的测头在计算之前已被接受：工位时钟曾被调回，或条目被篡改。</translation>
-    </message>
-    <message>
-        <source>The tip of entry {number} was not recomputed: {why}</source>
-        <translation>未重新计算条目 {number} 的测头：{why}</translation>
     </message>
     <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
@@ -8060,20 +8040,12 @@ mm</translation>
         <translation>条目 {number} 没有完整的标定记录，无法恢复使用。请重新标定该测头。</translation>
     </message>
     <message>
-        <source>Entry {number} is later than its timestamp: the clock of the station is ahead. Nothing was stored. Set the clock, and repeat the request after the next entry.</source>
-        <translation>记录 {number} 晚于其时间戳：工位时钟超前。未保存任何内容。请校正时钟，并在下一条记录之后重新请求。</translation>
-    </message>
-    <message>
         <source>Entry {number} is not an accepted tip. Choose the entry of an accepted tip.</source>
         <translation>条目 {number} 不是已接受的测头。请选择已接受测头的条目。</translation>
     </message>
     <message>
         <source>Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.</source>
         <translation>第 {number} 条记录不属于本工位。只有在此接受的测头才能恢复。</translation>
-    </message>
-    <message>
-        <source>Entry {number} is the last one and has a timestamp already.</source>
-        <translation>记录 {number} 是最后一条，已有时间戳。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
@@ -8640,10 +8612,6 @@ mm</translation>
         <translation>LED 依次发光，间隔 {time}；结果已修正，其余部分计入 U。请同时点亮全部 LED，或在每次取图时保持光笔静止。</translation>
     </message>
     <message>
-        <source>The archive has no entry of this station, so there is nothing to timestamp.</source>
-        <translation>存档中没有本工位的记录，因此没有可加时间戳的内容。</translation>
-    </message>
-    <message>
         <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
         <translation>本数据文件夹的档案不是其限值所属的档案。在从副本恢复档案之前，不接受任何结果。</translation>
     </message>
@@ -8882,10 +8850,6 @@ mm</translation>
     <message>
         <source>The file {file} has no entry in the archive yet. Start the program to enter it.</source>
         <translation>文件 {file} 在档案中尚无记录。请启动程序进行登记。</translation>
-    </message>
-    <message>
-        <source>The file {file} has no root certificate. It needs that of the time stamping authority, in PEM form.</source>
-        <translation>文件 {file} 中没有根证书。需要时间戳机构的 PEM 格式根证书。</translation>
     </message>
     <message>
         <source>The file {file} is not signed by this station and its supervisor: it was changed or comes from elsewhere. Restore it from a copy, or move it away to continue without it.</source>
@@ -9252,10 +9216,6 @@ mm</translation>
         <translation>{file} 的扩展名不是导出格式。请使用其中之一：{suffixes}。</translation>
     </message>
     <message>
-        <source>The supervisor password was wrong several times. Wait {seconds:.0f} s, then enter it again.</source>
-        <translation>主管密码多次错误。请等待 {seconds:.0f} s 后重新输入。</translation>
-    </message>
-    <message>
         <source>The swing in {folder} cannot be read: {reason}. Check the read permission, or move the folder away.</source>
         <translation>{folder} 中的摆动无法读取：{reason}。请确认您有读取权限，或移走该文件夹。</translation>
     </message>
@@ -9278,30 +9238,6 @@ mm</translation>
     <message>
         <source>The temperature of the pen was not measured; this station requires it. Measure it and enter it at Start, then repeat the swing.</source>
         <translation>光笔温度未测量，而本工位要求测量。请测量并在“开始”页输入，然后重新摆动。</translation>
-    </message>
-    <message>
-        <source>The time stamping authority {authority} gave no timestamp: {reason}. Check its address and the network, then try again.</source>
-        <translation>时间戳机构 {authority} 未给出时间戳：{reason}。请检查其地址和网络，然后重试。</translation>
-    </message>
-    <message>
-        <source>The timestamp of the authority {authority} is not valid for this entry, or not signed by the certificate that is set. Nothing was stored. Check the certificate.</source>
-        <translation>机构 {authority} 的时间戳对此记录无效，或不是由所设证书签署。未保存任何内容。请检查证书。</translation>
-    </message>
-    <message>
-        <source>The timestamp {file} is damaged, or not signed by the time stamping authority.</source>
-        <translation>时间戳 {file} 已损坏，或不是由时间戳机构签署。</translation>
-    </message>
-    <message>
-        <source>The timestamp {file} is earlier than its entry {number}: the clock of the station was ahead, or the entry was falsified.</source>
-        <translation>时间戳 {file} 早于其记录 {number}：工位时钟曾超前，或记录被伪造。</translation>
-    </message>
-    <message>
-        <source>The timestamp {file} is not of entry {number} of chain {chain}: it was copied from another entry, or the entry was replaced.</source>
-        <translation>时间戳 {file} 不属于链 {chain} 的记录 {number}：它是从其他记录复制的，或该记录已被替换。</translation>
-    </message>
-    <message>
-        <source>The timestamp {file} is of entry {number} of chain {chain}, which is missing: entries were removed, or the archive was replaced by an older copy.</source>
-        <translation>时间戳 {file} 属于链 {chain} 的记录 {number}，而该记录缺失：记录被删除，或存档被较旧的副本取代。</translation>
     </message>
     <message>
         <source>The tip cannot be compared with the current one. {why}</source>
@@ -9552,10 +9488,6 @@ mm</translation>
         <translation>除了左右，请也朝向和远离相机倾斜光笔，并绕自身轴线转动。</translation>
     </message>
     <message>
-        <source>Timestamps need the package rfc3161-client, which is not installed. Install it with: pip install &quot;lightpen[timestamps]&quot;.</source>
-        <translation>时间戳需要软件包 rfc3161-client，但尚未安装。安装命令：pip install &quot;lightpen[timestamps]&quot;。</translation>
-    </message>
-    <message>
         <source>Tip error</source>
         <translation>测头误差</translation>
     </message>
@@ -9686,10 +9618,6 @@ mm</translation>
     <message>
         <source>cameras in {name} is not a list of 2 to {most} cameras. A single camera needs no rig file.</source>
         <translation>{name} 中的 cameras 不是 2 至 {most} 台相机的列表。单台相机不需要相机组文件。</translation>
-    </message>
-    <message>
-        <source>certificate file</source>
-        <translation>证书文件</translation>
     </message>
     <message>
         <source>circle</source>
@@ -9938,10 +9866,6 @@ mm</translation>
     <message>
         <source>the temperature of the pen. State its thermal expansion in the LED file, and measure its temperature during the swing</source>
         <translation>光笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
-    </message>
-    <message>
-        <source>timestamp</source>
-        <translation>时间戳</translation>
     </message>
     <message>
         <source>tip library file</source>

@@ -10,8 +10,6 @@ from PySide6.QtWidgets import QFileDialog
 
 from lightpen.archive.chains.growth import CopyResult
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
-from lightpen.archive.checks.recompute_check import with_recomputed
-from lightpen.archive.checks.timestamps import with_timestamps
 from lightpen.archive.history.listing import save_entries
 from lightpen.archive.replication.exchange import export_entries, import_entries
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
@@ -53,10 +51,7 @@ class ArchiveControl(QObject):
         logbook, folder = self._logbook, self._folder
 
         def check(report: Report) -> ArchiveCheckResult:
-            database = logbook.opened().database
-            checked = check_archive(database, folder, report)
-            checked = with_recomputed(checked, database, folder)
-            return with_timestamps(checked, database, folder)
+            return check_archive(logbook.opened().database, folder, report)
 
         self._do(check, self._on_checked)
 

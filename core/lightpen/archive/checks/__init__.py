@@ -1,1 +1,1 @@
-"""Checks of an archive and of the files that it refers to; timestamps."""
+"""Checks of an archive and of the files that it refers to."""

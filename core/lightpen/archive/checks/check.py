@@ -40,8 +40,6 @@ class ArchiveCheckResult:
     n_files: int  # images included
     findings: tuple[Message, ...]
     notes: tuple[Message, ...] = ()  # prove no change, see `check_notes`
-    n_tips: int = 0  # recomputed ones, see `recompute_check`
-    n_timestamps: int = 0  # valid ones, see `timestamps`
 
 
 def check_archive(

@@ -26,7 +26,6 @@ from lightpen.record.library.guard_files import (
 )
 from lightpen.record.library.key_changes import key_change
 from lightpen.record.library.numbered_files import number_of, numbered_files
-from lightpen.record.library.password_delay import note_attempt, require_patience
 from lightpen.record.library.signing.keys import (
     SigningKey,
     chain_of,
@@ -143,17 +142,15 @@ def require_supervisor(
 ) -> SigningKey:
     """Return the key of a supervisor; refuse anybody else.
 
-    Raises `AcceptanceError` if there is no password yet, it is another one, the name is
-    missing, or too many wrong passwords were entered just now.
+    Raises `AcceptanceError` if there is no password yet, it is another one, or the name
+    is missing.
     """
     if signature is None:
         raise AcceptanceError("supervisor.needed")
     require_name(signature)
     if supervision.password is None:
         raise AcceptanceError("supervisor.no-password")
-    require_patience(supervision.password.key)
     key = supervision.password.key_from(signature.password)
-    note_attempt(supervision.password.key, succeeded=key is not None)
     if key is None:
         raise AcceptanceError("supervisor.wrong-password")
     return key

@@ -2,7 +2,6 @@
 
 import shutil
 from collections.abc import Callable
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,7 +19,6 @@ from lightpen.record.library.guard_files import (
     write_limits_change,
 )
 from lightpen.record.library.key_changes import key_change
-from lightpen.record.library.password_delay import FREE
 from lightpen.record.library.signing.keys import (
     SALT_LENGTH,
     chain_of,
@@ -29,11 +27,7 @@ from lightpen.record.library.signing.keys import (
 )
 from lightpen.record.library.signing.signed_text import Signers
 from lightpen.record.library.signing.station import memory_file, station_name
-from lightpen.record.library.supervision import (
-    Signature,
-    read_supervision,
-    require_supervisor,
-)
+from lightpen.record.library.supervision import Signature, read_supervision
 from lightpen.record.library.supervision_changes import (
     renew_station_key,
     set_limits,
@@ -113,25 +107,6 @@ def test_limits_hold_for_every_spelling_of_the_station(guarded: Path) -> None:
         assert supervision.limits_at(name, LAX) == STRICT
         assert not supervision.is_unknown(name)
     assert supervision.is_unknown("Hall 22")
-
-
-def test_wrong_passwords_are_delayed(guarded: Path) -> None:
-    supervision = read_supervision(guarded)
-    for _ in range(FREE + 1):
-        with pytest.raises(AcceptanceError, match="Wrong supervisor password"):
-            require_supervisor(supervision, Signature("Eve", "wrong"))
-    with pytest.raises(AcceptanceError, match="Wait 1 s"):
-        require_supervisor(supervision, EVE)
-
-
-def test_a_right_password_forgets_wrong_ones(guarded: Path) -> None:
-    supervision = read_supervision(guarded)
-    for signature in (
-        [Signature("Eve", "wrong")] * FREE + [EVE] + [Signature("Eve", "wrong")]
-    ):
-        with suppress(AcceptanceError):
-            require_supervisor(supervision, signature)
-    require_supervisor(supervision, EVE)
 
 
 @pytest.mark.parametrize("salt", ["", "zz" * SALT_LENGTH, "00" * (SALT_LENGTH - 1)])
