@@ -12,7 +12,8 @@ from lightpen.formats.own_json import DamagedError
 
 # Of an entry to read.
 READ: tuple[Column[Any], ...] = (
-    *(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.text, ENTRIES.c.signature),
+    *(ENTRIES.c.chain, ENTRIES.c.number, ENTRIES.c.sha256),
+    *(ENTRIES.c.text, ENTRIES.c.signature),
 )
 
 
@@ -70,6 +71,7 @@ def read_row(database: Database, row: Row[Any]) -> StoredEntry:
         entry = read_entry(row.text, row.signature)
     except DamagedError as error:
         raise damaged from error
-    if entry.sha256 != row.sha256:
+    stated = (entry.entry.chain, entry.entry.number, entry.sha256)
+    if stated != (row.chain, row.number, row.sha256):
         raise damaged
     return entry
