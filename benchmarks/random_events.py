@@ -44,7 +44,6 @@ from PySide6.QtWidgets import (
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.swing.image_sources import N_CAMERAS, SourceChoice
 from lightpen_app.application import SETTLED_MS, Wizard, make_application
-from lightpen_app.plain_import import use_plain_import
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Preferences, Settings
 
@@ -291,7 +290,6 @@ def main() -> int:
     seconds = float(sys.argv[1])
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else SEED
     qInstallMessageHandler(lambda kind, context, text: None)  # hints of the platform
-    use_plain_import()
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory(prefix="lightpen-events-") as folder:
         os.environ["LIGHTPEN_KEYS"] = str(Path(folder) / "keys")

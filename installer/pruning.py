@@ -50,7 +50,17 @@ DROPPED = (
 )  # fmt: skip
 # Sub-packages of scipy that are imported, and those that they import.
 SCIPY = {
-    *("_external", "_lib", "constants", "fft", "linalg", "sparse", "spatial", "special")
+    *(
+        "_external",
+        "_lib",
+        "constants",
+        "fft",
+        "linalg",
+        "optimize",
+        "sparse",
+        "spatial",
+        "special",
+    )
 }
 KEPT = ("numpy/testing/*",)
 

@@ -83,13 +83,7 @@ def tried(
 
 
 def test_the_commands_are_those_of_the_program() -> None:
-    for command in (
-        "discover",
-        "measure",
-        "archive fetch",
-        "tips spin",
-        "verify plane",
-    ):
+    for command in ("discover", "measure", "archive fetch", "verify plane"):
         assert tuple(command.split()) in EVERY
 
 

@@ -29,7 +29,7 @@ def test_a_tip_is_added_changed_retired_and_listed(
     tip = ("tip", "T-10", *where)
     added = lightpen(
         *("tips", "add", *tip, "--ball-diameter", "10", "--nominal", "0", "1.5"),
-        *("-150", "--axis", "0", "2", "0", "--max-change", "0.02", "--max-days", "7"),
+        *("-150", "--max-change", "0.02", "--max-days", "7"),
     )
     assert added.stdout == "tip  T-10  10 mm  not calibrated\n", added.stderr
 
@@ -39,7 +39,6 @@ def test_a_tip_is_added_changed_retired_and_listed(
 
     listed = lightpen("tips", "list", *where[:2], "--json")
     (record,) = json.loads(listed.stdout)
-    assert record["stylus_axis"] == [0, 1, 0]
     assert record["nominal_tip_mm"] == [0, 1.5, -150]
     assert (record["max_change_mm"], record["max_days"]) == (None, 7)
     assert (record["due"], record["standing"]) == ("2031-05-01", "not calibrated")
@@ -87,28 +86,13 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
     for words, reported in (
         (("add", "tip", "T-1", "--ball-diameter", "0"), "diameter 0 mm is not valid"),
         (("add", "cone", "C-1", "--ball-diameter", "5"), "Only a tip has a ball"),
-        (("add", "tip", "T-1", "--axis", "0", "1"), "takes three numbers"),
+        (("add", "tip", "T-1", "--nominal", "0", "1"), "takes three numbers"),
         (("change", "tip", "T-1"), "There is no tip T-1 in the library"),
     ):
         refused = lightpen("tips", *words, *where)
         assert refused.returncode == 2
         assert reported in refused.stderr
     assert not (tmp_path / "data" / "library").exists()
-
-
-def test_a_swing_is_no_spin(
-    lightpen: Run, scene: Callable[..., Path], tmp_path: Path
-) -> None:
-    images = scene("--binning", "2", "--images", "40", "--seed", "8")
-    where = ("--data", tmp_path / "data")
-    lightpen("tips", "add", "tip", "T-1", *where)
-
-    spun = lightpen(
-        *("tips", "spin", "T-1", images, "--camera", images / "camera.yaml"),
-        *("--pen", images / "leds.csv", *where),
-    )
-    assert spun.returncode == 1
-    assert "stylus" in spun.stderr
 
 
 def test_a_copy_of_a_guarded_folder_without_its_limits_takes_no_change(

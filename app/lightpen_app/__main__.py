@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 from lightpen.interpreter import run_program
-from lightpen_app.plain_import import use_plain_import
 
 SELF_TEST = "--self-test"
 
@@ -17,7 +16,6 @@ class Launchers:
 
     def show_window(self, swing: Path | None) -> int:
         """Open the window, at a recorded swing if a path leads to one."""
-        use_plain_import()
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run
         from lightpen_app.wizard_pages import make_pages
@@ -27,7 +25,6 @@ class Launchers:
 
     def play_demo(self) -> int:
         """Play a calibration with a simulated operator."""
-        use_plain_import()
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run_demo
         from lightpen_app.wizard_pages import make_pages

@@ -13,7 +13,7 @@ def make_pages(workbench: Workbench, sounds: Sounds) -> Iterator[Page]:
 
     The first is painted before the others are made.
     """
-    yield StartPage(workbench, sounds)
+    yield StartPage(workbench)
     from lightpen_app.steps.camera.page import CameraPage
 
     yield CameraPage(workbench, sounds)

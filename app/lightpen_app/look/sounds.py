@@ -1,21 +1,24 @@
 """Sounds that accompany the swing; each also has a picture and a word.
 
 The program runs without any: what plays them is looked for when it starts, and if
-there is nothing, `SilentSounds` takes its place and says why.
+there is nothing, `SilentSounds` takes its place; the log says so.
 """
 
 import io
+import logging
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from PySide6.QtCore import QCoreApplication, QProcess
+from PySide6.QtCore import QProcess
 
 from lightpen.arrays import FloatArray
+
+_logger = logging.getLogger(__name__)
 
 RATE = 44_100  # samples a second
 FADE = 0.008  # s, so that a tone does not click
@@ -53,28 +56,12 @@ class Sounds(Protocol):
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         """Begin to play and return at once; KEPT rises with progress, 0 to 1."""
 
-    def why_silent(self) -> str:
-        """Return why audio is unavailable; empty if it is available."""
-
 
 class SilentSounds:
-    """Plays nothing.
-
-    ``missing`` are programs of which one could play sounds, if it were installed.
-    """
-
-    def __init__(self, missing: Sequence[str] = ()) -> None:
-        self._missing = tuple(missing)
+    """Plays nothing."""
 
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         """No-op."""
-
-    def why_silent(self) -> str:
-        """Return why audio is unavailable."""
-        if not self._missing:
-            return ""
-        words = QCoreApplication.translate("sounds", "none of {0} is installed")
-        return words.format(", ".join(self._missing))
 
 
 class FileSounds:
@@ -100,10 +87,6 @@ class FileSounds:
                 return  # a sound is never worth an interruption
         self._play_file(path)
 
-    def why_silent(self) -> str:
-        """Return an empty text: audio is available."""
-        return ""
-
 
 class MutedSounds:
     """Forwards sounds unless muted."""
@@ -117,10 +100,6 @@ class MutedSounds:
         if not self.muted:
             self._sounds.play(sound, progress)
 
-    def why_silent(self) -> str:
-        """Return why audio is unavailable, whether muted or not."""
-        return self._sounds.why_silent()
-
 
 def find_sounds(folder: Path) -> Sounds:
     """Return the player of this system; sound files are written to a folder."""
@@ -130,7 +109,9 @@ def find_sounds(folder: Path) -> Sounds:
         path = shutil.which(program)
         if path is not None:
             return FileSounds(folder, _player(path, options))
-    return SilentSounds([program for program, *_ in PLAYERS])
+    programs = ", ".join(program for program, *_ in PLAYERS)
+    _logger.warning("There are no sounds: none of %s is installed.", programs)
+    return SilentSounds()
 
 
 def sound_wav(sound: Sound, step: int = 0) -> bytes:

@@ -20,7 +20,6 @@ MESSAGES = {
     "library.id-in-use": "The {kind} {id} is in the library already. Edit that item, or choose another ID.",
     "library.id-of-retired": "The {kind} {id} is in the library already, retired. Reactivate it, or choose another ID.",
     "library.other-picture": "The picture {path} was modified after it was saved. Save it again.",
-    "library.no-direction": "0 0 0 is not a direction. Enter the stylus axis from the ball into the pen, in the pen frame, such as 0 1 0.",
     "library.bad-id": "'{id}' is not a valid ID. Enter up to {most} letters and digits without / and \\, as on the label.",
     "library.absurd-ball": "Ball diameter {diameter:g} mm is not valid; the range is above 0 to {most:g} mm. Enter the measured diameter, or leave it empty.",
     "library.absurd-change": "Max. change {limit:g} mm is not valid. Enter a value above 0 and up to {most:g} mm.",

@@ -10,7 +10,6 @@ from lightpen.commands.archive import parse_date
 from lightpen.commands.arguments import (
     FORGOTTEN,
     DataFolder,
-    add_camera_and_pen,
     add_data,
     finite,
     whole_number,
@@ -38,12 +37,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         help="take over the newest changes of other stations, from the server set by "
         "LIGHTPEN_ARCHIVE and from imported archives",
     )
-    spun = actions.add_parser(
-        "spin",
-        help="determine the axis of a stylus from images of its pen rotated in the "
-        "cone",
-    )
-    for action in (listed, added, changed, retired, returned, shared, spun):
+    for action in (listed, added, changed, retired, returned, shared):
         add_data(action, data_folder)
         action.add_argument("--json", action="store_true", help="print JSON")
     listed.add_argument("--all", action="store_true", help="include retired items")
@@ -58,16 +52,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         action.add_argument("id", metavar="ID", help="ID as on the label")
     for action in (added, changed):
         _add_entries(action)
-    spun.add_argument("id", metavar="TIP", help="tip in the library")
-    spun.add_argument(
-        "images",
-        type=Path,
-        nargs="+",
-        metavar="IMAGES",
-        help="images of the pen turned about its stylus in a cone",
-    )
-    add_camera_and_pen(spun)
-    for action in (added, changed, retired, returned, spun):
+    for action in (added, changed, retired, returned):
         _add_author(action)
     shared.add_argument(
         "--supervisor",
@@ -120,13 +105,13 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
         ("--picture", Path, "FILE", "picture of the tip"),
     ):
         of_tips.add_argument(name, type=_or_nothing(kind), metavar=unit, help=help_text)
-    for name, help_text in (
-        ("--nominal", "nominal tip centre, pen frame, mm"),
-        ("--axis", "stylus axis from the ball into the pen, pen frame"),
-    ):
-        of_tips.add_argument(
-            name, type=_or_nothing(finite), nargs="+", metavar="X Y Z", help=help_text
-        )
+    of_tips.add_argument(
+        "--nominal",
+        type=_or_nothing(finite),
+        nargs="+",
+        metavar="X Y Z",
+        help="nominal tip centre, pen frame, mm",
+    )
 
 
 def _add_author(action: argparse.ArgumentParser) -> None:

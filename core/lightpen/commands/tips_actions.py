@@ -18,13 +18,9 @@ from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
 from lightpen.commands.arguments import FORGOTTEN, data_of
-from lightpen.commands.console import Command, images_at, printing, progress, shown
+from lightpen.commands.console import Command, printing, shown
 from lightpen.commands.supervisor import supervisor_signature
-from lightpen.detection.observations import observe_images
 from lightpen.errors import ArchiveError, NoArchiveError, UsageError
-from lightpen.estimation.spin import SpinFit, fit_spin
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
@@ -40,7 +36,6 @@ from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import (
     MADE,
     AnyItem,
-    AxisOrigin,
     ItemKind,
     Library,
     ListedReference,
@@ -51,13 +46,11 @@ from lightpen.record.library.tip_library import (
 OF_TIPS = {  # options, by their entry of a tip
     "ball_diameter_mm": "ball_diameter",
     "nominal_tip_mm": "nominal",
-    "stylus_axis": "axis",
     "max_change_mm": "max_change",
     "max_days": "max_days",
     "max_swings": "max_swings",
     "picture": "picture",
 }
-POINTS = ("nominal", "axis")
 
 
 @printing
@@ -128,24 +121,6 @@ def _share(options: argparse.Namespace) -> None:
     print(f"{len(taken)} changes of other stations were taken over.")
 
 
-@printing
-def _spin(options: argparse.Namespace) -> None:
-    data = data_of(options)
-    tip = known_item(read_library(data), ItemKind.TIP, options.id)
-    assert isinstance(tip, ListedTip)
-    found = _spun(options)
-    x, y, z = found.axis_pen.tolist()
-    spun = structs.replace(tip, stylus_axis=(x, y, z), axis_origin=AxisOrigin.SPIN)
-    library = change_item(data, spun, _author(options), local_now(), tip)
-    if not options.json:
-        print(
-            f"Axis {x:.5f} {y:.5f} {z:.5f}, U (k = 2) "
-            f"{_degrees(found.expanded_uncertainty)}, turned by "
-            f"{_degrees(found.turn)}, tilted by {_degrees(found.wobble)} rms."
-        )
-    _enter_and_print(options, spun, library)
-
-
 ACTIONS: dict[str, Command] = {
     "list": _list,
     "add": _add,
@@ -153,17 +128,7 @@ ACTIONS: dict[str, Command] = {
     "retire": _set_retired,
     "return": _set_retired,
     "share": _share,
-    "spin": _spin,
 }
-
-
-def _spun(options: argparse.Namespace) -> SpinFit:
-    camera = read_camera(options.camera)
-    pen = read_pen(options.pen, options.units, options.led_diameter, None)
-    with progress("Finding LEDs") as report:
-        seen = observe_images(images_at(*options.images), camera, pen, report)
-    fit = [i for i, reason in enumerate(seen.reasons) if not reason]
-    return fit_spin(seen.rotations[fit])
 
 
 def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
@@ -187,13 +152,11 @@ def _entries_of_tip(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
         value = getattr(options, option)
         if value is None:
             continue
-        if option in POINTS:
+        if option == "nominal":
             value = _point(option, value)
         elif option == "picture" and value is not FORGOTTEN:
             value = keep_picture(data_of(options), value)
         yield entry, _or_none(value)
-        if option == "axis":
-            yield "axis_origin", None if value is FORGOTTEN else AxisOrigin.GIVEN
 
 
 def _or_none(value: Any) -> Any:
@@ -272,7 +235,3 @@ def _line(record: dict[str, Any]) -> str:
     if record["due"] is not None:
         words.append(f"by {record['due']}")
     return "  ".join(filter(None, [*words, record["note"]]))
-
-
-def _degrees(angle: float) -> str:
-    return f"{angle * 57.29577951308232:.2f} degrees"

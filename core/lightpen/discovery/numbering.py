@@ -8,7 +8,6 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.discovery.normals import towards_camera
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.model.assignment import assigned_columns
 from lightpen.model.pen import Pen, moved, order_of_paper, pen_frame_from_raw
 from lightpen.model.rigid import fit_rigid
 
@@ -117,9 +116,11 @@ def _sides(triples: FloatArray) -> FloatArray:
 
 def _matched(points: FloatArray, sketch: FloatArray) -> tuple[IntArray, float]:
     """Return the point of each of the sketch, and the rms distance after a fit, mm."""
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s
+
     for _ in range(2):
         apart = np.linalg.norm(sketch[:, None] - points, axis=2)
-        match = assigned_columns(apart**2)
+        _, match = linear_sum_assignment(apart**2)
         R, t = fit_rigid(points[match], sketch)
         points = points @ R.T + t
     misses = np.linalg.norm(points[match] - sketch, axis=1)

@@ -28,7 +28,6 @@ from lightpen.detection.robust_residuals import disc_residuals, robust_sigma
 from lightpen.detection.spots import Spots
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message
-from lightpen.model.assignment import assigned_columns
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
@@ -284,11 +283,13 @@ def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
 
     As few coordinates as possible of the file are wrong then; of equals, the nearest.
     """
-    if not len(leds) or not len(points):
-        return [-1] * len(leds)
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s
+
     gaps = np.abs(leds[:, None] - points)
     costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
-    return [int(column) for column in assigned_columns(costs)]
+    rows, columns = linear_sum_assignment(costs)
+    owners = dict(zip(rows.tolist(), columns.tolist(), strict=True))
+    return [owners.get(led, -1) for led in range(len(leds))]
 
 
 def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:

@@ -1990,14 +1990,6 @@
 <context>
     <name>ItemForm</name>
     <message>
-        <source>Stop rotation</source>
-        <translation>停止转动</translation>
-    </message>
-    <message>
-        <source>Determine by rotation</source>
-        <translation>旋转求轴线</translation>
-    </message>
-    <message>
         <source>Picture of the tip</source>
         <translation>测头图片</translation>
     </message>
@@ -2066,24 +2058,12 @@
         <translation>测头与上次标定位置的最大距离。超出时，结果需检查。</translation>
     </message>
     <message>
-        <source>Determine the axis: turn the pen about its stylus in view of the camera, with the tip in the cone.</source>
-        <translation>求轴线：测头置于锥孔，在相机前绕测杆转动光笔。</translation>
-    </message>
-    <message>
         <source>Ball diameter</source>
         <translation>测球直径</translation>
     </message>
     <message>
         <source>Picture</source>
         <translation>图片</translation>
-    </message>
-    <message>
-        <source>Axis of the stylus, from the ball into the pen</source>
-        <translation>测杆轴线，由测球指向光笔</translation>
-    </message>
-    <message>
-        <source>Axis of the stylus, {0}</source>
-        <translation>测杆轴线，{0}</translation>
     </message>
     <message>
         <source>Browse...</source>
@@ -4526,53 +4506,6 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>SoundTest</name>
-    <message>
-        <source>Tip seated</source>
-        <translation>测头就位</translation>
-    </message>
-    <message>
-        <source>No sound available: {0}. All information is also shown as text and icons.</source>
-        <translation>没有声音：{0}。所有信息也以文字和图标显示。</translation>
-    </message>
-    <message>
-        <source>Sounds are off. Press B to turn them on.</source>
-        <translation>声音已关闭。按 B 打开。</translation>
-    </message>
-    <message>
-        <source>Image captured</source>
-        <translation>已采集图像</translation>
-    </message>
-    <message>
-        <source>Posture complete</source>
-        <translation>姿态已完成</translation>
-    </message>
-    <message>
-        <source>Tip slipped or pen lost</source>
-        <translation>测头滑动或光笔丢失</translation>
-    </message>
-    <message>
-        <source>Capture complete</source>
-        <translation>采集完毕</translation>
-    </message>
-    <message>
-        <source>Done</source>
-        <translation>完成</translation>
-    </message>
-    <message>
-        <source>Failed</source>
-        <translation>失败</translation>
-    </message>
-    <message>
-        <source>Test the sounds</source>
-        <translation>测试声音</translation>
-    </message>
-    <message>
-        <source>Plays the sounds of a swing one after the other</source>
-        <translation>依次播放摆动中的各种声音</translation>
-    </message>
-</context>
-<context>
     <name>SourcePanel</name>
     <message>
         <source>Cameras found: {0}</source>
@@ -4681,17 +4614,6 @@ needed</source>
     <message>
         <source>Try again</source>
         <translation>重试</translation>
-    </message>
-</context>
-<context>
-    <name>SpinRecorder</name>
-    <message>
-        <source>Press the tip into the cone and turn the pen about its stylus.</source>
-        <translation>将测头压入锥孔，绕测杆转动光笔。</translation>
-    </message>
-    <message>
-        <source>Rotation {0}°; U (k = 2) of the axis {1}°</source>
-        <translation>已转动 {0}°；轴线的 U (k = 2) 为 {1}°</translation>
     </message>
 </context>
 <context>
@@ -7884,10 +7806,6 @@ mm</translation>
         <translation>固定点的离散为 {of_point:.4f} mm，而各次标定间测头的离散仅 {of_tip:.4f} mm。测头是稳定的：测点之间锥孔或相机移动过，或测头未落稳在锥孔中。</translation>
     </message>
     <message>
-        <source>0 0 0 is not a direction. Enter the stylus axis from the ball into the pen, in the pen frame, such as 0 1 0.</source>
-        <translation>0 0 0 不是方向。请给出测杆轴线在光笔坐标系中由测球指向光笔的方向，例如 0 1 0。</translation>
-    </message>
-    <message>
         <source>A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.</source>
         <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
     </message>
@@ -9036,10 +8954,6 @@ mm</translation>
         <translation>光笔几乎没有动：各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请把光笔向各个方向倾斜 20° 以上，并绕自身轴线转动。</translation>
     </message>
     <message>
-        <source>The pen is detected in {n} images of the rotation; {needed} are needed. Turn it slowly with its LEDs facing the camera.</source>
-        <translation>旋转的图像中只有 {n} 幅看到光笔；需要 {needed} 幅。请让 LED 朝向相机，慢慢旋转。</translation>
-    </message>
-    <message>
         <source>The pen is lifted. Put the tip back to continue.</source>
         <translation>光笔已抬起。放回测头即可继续。</translation>
     </message>
@@ -9058,10 +8972,6 @@ mm</translation>
     <message>
         <source>The pen was swung about one axis only, {axis}: this axis turned by {found:.1f}° (RMS); {needed:.0f}° are needed, so the tip along it is not determined. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
-    </message>
-    <message>
-        <source>The pen was turned by {turn:.0f}° about its stylus; at least {needed:.0f}° are needed. Keep the tip in the cone and turn it further to both sides.</source>
-        <translation>光笔绕测杆只转了 {turn:.0f} 度；至少需要 {needed:.0f} 度。请保持测头在锥孔中，向两侧再多转一些。</translation>
     </message>
     <message>
         <source>The picture {path} was modified after it was saved. Save it again.</source>
@@ -9350,10 +9260,6 @@ mm</translation>
     <message>
         <source>The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.</source>
         <translation>未指定证书值的不确定度。请输入其证书中的 U (k = 2)。</translation>
-    </message>
-    <message>
-        <source>The uncertainty of the stylus axis is {uncertainty:.1f}°; the limit is {needed:.1f}°. The pen was tilted during the rotation. Hold the stylus upright between two fingers and only turn it.</source>
-        <translation>测杆轴线的不确定度为 {uncertainty:.1f}°，上限为 {needed:.1f}°。旋转时光笔发生了倾斜。请用两指扶直测杆，只作转动。</translation>
     </message>
     <message>
         <source>The verification in {file} was modified or damaged after it was written. Restore the file from a copy.</source>
@@ -10477,10 +10383,6 @@ mm</translation>
     <message>
         <source>nominal centre {0} mm</source>
         <translation>标称中心 {0} mm</translation>
-    </message>
-    <message>
-        <source>axis {0}</source>
-        <translation>轴线 {0}</translation>
     </message>
     <message>
         <source>signed by {0}</source>
@@ -11777,13 +11679,6 @@ mm</translation>
     <message>
         <source>{0} images</source>
         <translation>{0} 幅图像</translation>
-    </message>
-</context>
-<context>
-    <name>sounds</name>
-    <message>
-        <source>none of {0} is installed</source>
-        <translation>未安装 {0} 中的任何一个</translation>
     </message>
 </context>
 <context>

@@ -32,9 +32,6 @@ class Recorder:
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         self.played.append(sound)
 
-    def why_silent(self) -> str:
-        return ""
-
 
 def samples_of(data: bytes) -> FloatArray:
     with wave.open(io.BytesIO(data)) as file:
@@ -116,7 +113,7 @@ def test_mute_lets_nothing_through_until_it_is_lifted() -> None:
 
 
 def test_a_machine_without_a_player_says_why_it_is_silent(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr("shutil.which", lambda program: None)
@@ -124,7 +121,7 @@ def test_a_machine_without_a_player_says_why_it_is_silent(
     sounds = find_sounds(tmp_path)
 
     assert isinstance(sounds, SilentSounds)
-    assert "aplay" in sounds.why_silent()
+    assert "aplay" in caplog.text
     sounds.play(Sound.DONE)
 
 

@@ -6,14 +6,7 @@ from pathlib import Path
 
 from msgspec import structs
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFileDialog,
-    QGridLayout,
-    QLabel,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QLineEdit, QWidget
 
 from lightpen.local_time import local_now
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
@@ -24,14 +17,13 @@ from lightpen.record.library.tip_library import (
     LARGEST_REFERENCE,
     LONGEST_ID,
     AnyItem,
-    AxisOrigin,
     ListedReference,
     ListedTip,
 )
-from lightpen_app.look.layouts import GridPlace, fill, grid_layout, horizontal_layout
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.layouts import GridPlace, grid_layout
+from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.steps.start.fields import AXES, PointField
+from lightpen_app.steps.start.fields import PointField
 from lightpen_app.steps.start.tip_picture import ReadPicture, TipPicture
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import add_labelled, field_label
@@ -51,7 +43,6 @@ class ItemForm(Translated, QWidget):
     """
 
     value_edited = Signal()  # something is typed
-    spin_toggled = Signal(bool)  # start or end determining the axis by a spin
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
@@ -69,13 +60,6 @@ class ItemForm(Translated, QWidget):
         self._days = NumberField("", (0, MOST_DAYS), 0)
         self._swings = NumberField("", (0, MOST_SWINGS), 0)
         self._nominal = PointField()
-        self._has_axis = QCheckBox()
-        self._axis = tuple(NumberField("", (-1.0, 1.0), 5) for _ in AXES)
-        self._axis_row = QWidget()
-        self._spin = PushButton()
-        self._spin.setCheckable(True)
-        self._spun: tuple[float, float, float] | None = None
-        self._spin_text = text_label(TextSize.SMALL, Tone.QUIET)
         self._picture = PathField()
         self._browse = PushButton()
         self._picture.add_button(self._browse)
@@ -106,15 +90,8 @@ class ItemForm(Translated, QWidget):
         for column, field in enumerate(own):
             self._add(inner, field, at=(0, column))
         self._add(inner, self._nominal, at=(1, 0, 1, 3))
-        inner.addWidget(self._has_axis, 2, 0, 1, 3)
-        inner.addWidget(self._axis_row, 3, 0, 1, 3)
-        axis = horizontal_layout(self._axis_row)
-        for name, field in zip(AXES, self._axis, strict=True):
-            fill(axis, QLabel(name), (field, 1))
-        fill(axis, self._spin)
-        inner.addWidget(self._spin_text, 4, 0, 1, 3)
-        self._add(inner, self._picture, at=(5, 0, 1, 3))
-        inner.addWidget(self._preview, 1, 3, 5, 1, Qt.AlignmentFlag.AlignCenter)
+        self._add(inner, self._picture, at=(2, 0, 1, 3))
+        inner.addWidget(self._preview, 1, 3, 2, 1, Qt.AlignmentFlag.AlignCenter)
         for layout in (grid, inner):
             for column in range(4):
                 layout.setColumnStretch(column, 1)
@@ -123,8 +100,6 @@ class ItemForm(Translated, QWidget):
         self._id.textChanged.connect(self.value_edited)
         for day in (self._due, self._certified):
             day.textChanged.connect(self.value_edited)
-        self._has_axis.toggled.connect(self._on_axis_toggled)
-        self._spin.toggled.connect(self._on_spin_toggled)
         self._browse.clicked.connect(self._on_browse_clicked)
         self._picture.value_changed.connect(self._show_picture)
 
@@ -132,7 +107,7 @@ class ItemForm(Translated, QWidget):
 
     def value(self) -> AnyItem:
         """Return the item in the form, with the earlier picture."""
-        for field in (self._ball, self._change, self._days, self._swings, *self._axis):
+        for field in (self._ball, self._change, self._days, self._swings):
             field.settle()
         self._nominal.settle()
         item = structs.replace(
@@ -148,12 +123,7 @@ class ItemForm(Translated, QWidget):
             return structs.replace(item, certified_mm=self._value.value() or None)
         if not isinstance(item, ListedTip):
             return item
-        nominal, axis = self._nominal.value(), self._typed_axis()
-        if self._spun is not None and _alike(axis, self._spun):
-            item = structs.replace(
-                item, stylus_axis=self._spun, axis_origin=AxisOrigin.SPIN
-            )
-        same = item.stylus_axis is not None and _alike(axis, item.stylus_axis)
+        nominal = self._nominal.value()
         return structs.replace(
             item,
             ball_diameter_mm=self._ball.value() or None,
@@ -161,24 +131,7 @@ class ItemForm(Translated, QWidget):
             max_days=round(self._days.value()) or None,
             max_swings=round(self._swings.value()) or None,
             nominal_tip_mm=None if nominal is None else tuple(nominal.tolist()),
-            stylus_axis=item.stylus_axis if same else axis,
-            axis_origin=item.axis_origin if same else AxisOrigin.GIVEN,
         )
-
-    def show_spin(self, text: str) -> None:
-        """Show the progress of a spin."""
-        self._spin_text.setText(text)
-        self._spin_text.setVisible(bool(text))
-
-    def set_spun_axis(self, axis: tuple[float, float, float]) -> None:
-        """Show the axis that a spin has found."""
-        self._spun = axis
-        for field, part in zip(self._axis, axis, strict=True):
-            field.set_value(part)
-
-    def stop_spin(self) -> None:
-        """Stop a spin in progress."""
-        self._spin.setChecked(False)
 
     def picture(self) -> str:
         """Return the path of a new picture; empty if it is the previous one."""
@@ -186,9 +139,7 @@ class ItemForm(Translated, QWidget):
 
     def set_value(self, item: AnyItem, *, is_new: bool) -> None:
         """Show an item."""
-        self.stop_spin()
-        self._item, self._spun = item, None
-        self.show_spin("")
+        self._item = item
         self._id.setText(item.id)
         self._id.setReadOnly(not is_new)
         self._due.set_value(item.due)
@@ -208,12 +159,6 @@ class ItemForm(Translated, QWidget):
             self._days.set_value(item.max_days or 0)
             self._swings.set_value(item.max_swings or 0)
             self._nominal.set_value(item.nominal_tip)
-            self._has_axis.setChecked(item.stylus_axis is not None)
-            self._axis_row.setVisible(item.stylus_axis is not None)
-            for field, part in zip(
-                self._axis, item.stylus_axis or (0.0, 1.0, 0.0), strict=True
-            ):
-                field.set_value(part)
         self._retranslate()
 
     def focus_first(self) -> None:
@@ -228,28 +173,6 @@ class ItemForm(Translated, QWidget):
         """Return whether the fields of days are valid or empty."""
         days = (self._due, self._certified)
         return all(not d.text().strip() or d.value() is not None for d in days)
-
-    def _typed_axis(self) -> tuple[float, float, float] | None:
-        if not self._has_axis.isChecked():
-            return None
-        x, y, z = (field.value() for field in self._axis)
-        return x, y, z
-
-    def _on_axis_toggled(self, has_axis: bool) -> None:
-        self._axis_row.setVisible(has_axis)
-        if not has_axis:
-            self.stop_spin()
-            self.show_spin("")
-
-    def _on_spin_toggled(self, spins: bool) -> None:
-        self._name_spin()
-        self.spin_toggled.emit(spins)
-
-    def _name_spin(self) -> None:
-        spins = self._spin.isChecked()
-        self._spin.setText(
-            self.tr("Stop rotation") if spins else self.tr("Determine by rotation")
-        )
 
     def _on_browse_clicked(self) -> None:
         self._picture.pick(
@@ -308,19 +231,6 @@ class ItemForm(Translated, QWidget):
         )
         for field in (self._days, self._swings):
             field.set_empty_text(usual)
-        self._has_axis.setText(
-            self.tr("Axis of the stylus, from the ball into the pen")
-        )
-        for name, field in zip(AXES, self._axis, strict=True):
-            field.setAccessibleName(self.tr("Axis of the stylus, {0}").format(name))
-        self._name_spin()
-        set_tooltip(
-            self._spin,
-            self.tr(
-                "Determine the axis: turn the pen about its stylus in view of the "
-                "camera, with the tip in the cone."
-            ),
-        )
         self._browse.setText(self.tr("Browse..."))
         kept = self._item.picture if isinstance(self._item, ListedTip) else None
         self._picture.edit.setPlaceholderText("" if kept is None else kept.place)
@@ -331,12 +241,3 @@ def kept_picture(folder: Path, tip: ListedTip) -> ReadPicture | None:
     if tip.picture is None:
         return None
     return partial(read_kept_picture, folder, tip.picture)
-
-
-def _alike(
-    axis: tuple[float, float, float] | None, kept: tuple[float, float, float]
-) -> bool:
-    """Return whether an axis equals the stored one at the displayed precision."""
-    return axis is not None and all(
-        abs(one - two) < 1e-5 for one, two in zip(axis, kept, strict=True)
-    )

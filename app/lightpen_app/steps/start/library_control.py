@@ -7,7 +7,6 @@ from msgspec import structs
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.errors import CalibrationError
 from lightpen.model.origin import Origin
 from lightpen.record.library.library_changes import (
     Author,
@@ -22,13 +21,11 @@ from lightpen.record.library.tip_library import (
     Library,
     ListedTip,
 )
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.start.barcode import BarcodeListener
 from lightpen_app.steps.start.fields import ItemChoice
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog, RequestedChange
-from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.status_mark import status_message
 from lightpen_app.work.workbench import Workbench
@@ -61,7 +58,6 @@ class LibraryControl(QObject):
         self._question = question
         self._dialog: LibraryDialog | None = None  # until it is opened first
         self._unknown = ""
-        self._spin = SpinRecorder(workbench.live, self)
         self.barcodes = BarcodeListener(self)
 
         # Connections
@@ -106,25 +102,7 @@ class LibraryControl(QObject):
         self._watch.change_failed.connect(self._on_change_failed)
         dialog.chosen.connect(self.chosen)
         dialog.change_asked.connect(self._on_change_asked)
-        dialog.form.spin_toggled.connect(self._on_spin_toggled)
-        self._spin.message_sent.connect(dialog.form.show_spin)
         return dialog
-
-    def _on_spin_toggled(self, spins: bool) -> None:
-        """Begin a spin, or take over the axis that it has found."""
-        if spins:
-            self._spin.start()
-            return
-        self._spin.stop()
-        form = None if self._dialog is None else self._dialog.form
-        try:
-            x, y, z = self._spin.fit().axis_pen.tolist()
-        except CalibrationError as error:
-            if form is not None:
-                form.show_spin(worded(error.message))
-        else:
-            if form is not None:
-                form.set_spun_axis((x, y, z))
 
     def _choices(self, kind: ItemKind, pen: str) -> tuple[ItemChoice, ...]:
         """Return the items that can be chosen; a simulated tip is never due."""

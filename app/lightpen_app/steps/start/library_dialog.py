@@ -266,7 +266,6 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
     def _stop_editing(self) -> None:
         self._item = self._asked = None
-        self.form.stop_spin()
         self._panel.hide()
         self._list.show()
         self._refresh()
@@ -310,7 +309,6 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         is_typed = not self.form.isHidden()
         if is_typed and is_refusing(self.form):
             return
-        self.form.stop_spin()
         item = self.form.value() if is_typed else self._item
         signature = self._supervisor.value() if self._is_guarded else None
         self._fault.set_value(StatusMessage())

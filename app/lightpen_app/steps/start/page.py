@@ -7,7 +7,6 @@ from typing_extensions import override
 
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.start.day_control import DayControl
@@ -36,7 +35,7 @@ class StartPage(ResponsiveLayout, Page):
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
     very_large_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
-    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
+    def __init__(self, workbench: Workbench) -> None:
         super().__init__()
         self._selection, self._run = workbench.selection, workbench.run
         self._tips = workbench.library
@@ -47,7 +46,7 @@ class StartPage(ResponsiveLayout, Page):
         self._interrupted = InterruptedPanel()
         self._day = DayView()
         is_known = bool(workbench.selection.stations())
-        self._setup = setup = SetupView(workbench, sounds, is_known=is_known)
+        self._setup = setup = SetupView(workbench, is_known=is_known)
         self._result = LastResultPanel(workbench.around.now)
         self._large = LargeScreenPanel(workbench.run.logbook)
         self._views = QStackedWidget()
@@ -160,7 +159,6 @@ class StartPage(ResponsiveLayout, Page):
     def left(self) -> None:
         self._control.stop()
         self._entries.settle()
-        self._setup.sound_test.stop()
 
     @override
     def shut_down(self) -> None:

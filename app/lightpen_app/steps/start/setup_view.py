@@ -9,13 +9,11 @@ from lightpen_app.look.layouts import (
     set_stacked,
     vertical_layout,
 )
-from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
-from lightpen_app.steps.start.sound_test import SoundTest
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.workbench import Workbench
@@ -26,14 +24,13 @@ class SetupView(Translated, QWidget):
 
     done = Signal()  # show the day page
 
-    def __init__(self, workbench: Workbench, sounds: Sounds, *, is_known: bool) -> None:
+    def __init__(self, workbench: Workbench, *, is_known: bool) -> None:
         super().__init__()
         self._is_known = is_known
 
         # Widgets: the order of making them is the order of the Tab key
         self.names, self.limits = NamesForm(), LimitsForm()
         self.assumed = AssumptionsPanel()
-        self.sound_test = SoundTest(sounds)
         self.folder = DataFolderPanel(workbench.folder, workbench.notifications)
         self.newcomer = NewcomerPanel()
         self._done = PushButton()
@@ -51,7 +48,7 @@ class SetupView(Translated, QWidget):
             stretch=5,
         )
         self._right = vertical_layout(self._columns, spacing=2 * GRID, stretch=4)
-        fill(self._right, self.sound_test, self.folder)
+        fill(self._right, self.folder)
         if is_known:
             fill(self._right, self.newcomer)
         fill(self._right, 1)

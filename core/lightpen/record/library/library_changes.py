@@ -1,6 +1,5 @@
 """Changes of the tip library: checked, signed if necessary, and stored."""
 
-import math
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -39,7 +38,6 @@ from lightpen.record.library.tip_library import (
     LONGEST_ID,
     PICTURES,
     AnyItem,
-    AxisOrigin,
     Item,
     ItemKind,
     Library,
@@ -175,15 +173,6 @@ def keep_picture(data: Path, file: Path) -> Picture:
     return Picture(kept.relative_to(data).as_posix(), digest)
 
 
-def given_axis(direction: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return the axis of a stylus along a direction, of length 1."""
-    length = float(np.linalg.norm(direction))
-    if not (math.isfinite(length) and length > 0):
-        raise UsageError("library.no-direction")
-    x, y, z = (part / length for part in direction)
-    return x, y, z
-
-
 def no_such_item(kind: ItemKind, name: str) -> Message:
     """Return the error that an item is not in the library."""
     return message("library.no-such-item", kind=KIND_WORDS[kind], id=printable(name))
@@ -242,12 +231,7 @@ def _sensible_tip(tip: ListedTip) -> ListedTip:
         raise UsageError(
             "library.absurd-nominal", tip=printable(tip.id), most=LARGEST_PLACE
         )
-    axis, origin = tip.stylus_axis, tip.axis_origin
-    if axis is None:
-        return structs.replace(tip, axis_origin=None)
-    return structs.replace(
-        tip, stylus_axis=given_axis(axis), axis_origin=origin or AxisOrigin.GIVEN
-    )
+    return tip
 
 
 def _in_use(there: Item) -> Message:

@@ -68,13 +68,6 @@ KIND_WORDS: Mapping[ItemKind, Message] = {
 }
 
 
-class AxisOrigin(StrEnum):
-    """Origin of the axis of a stylus."""
-
-    GIVEN = "given"
-    SPIN = "spin"
-
-
 class Picture(Struct, frozen=True):
     """A picture of an item: its file, from the data folder, and its hash."""
 
@@ -149,8 +142,6 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
 
     ball_diameter_mm: Annotated[float, Meta(gt=0, le=LARGEST_BALL)] | None = None
     nominal_tip_mm: Vector | None = None  # pen frame; None: the LED file's
-    stylus_axis: Vector | None = None  # from ball into pen, of length 1
-    axis_origin: AxisOrigin | None = None
     # Since the current tip; None for no limit but the uncertainty of the change
     max_change_mm: Annotated[float, Meta(gt=0, le=LARGEST_CHANGE)] | None = None
     # `DueRule` of its own; None: the station's

@@ -42,7 +42,6 @@ from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.record_header import record_header
-from lightpen_app.look.sounds import MutedSounds, SilentSounds, Sound, Sounds
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import breakable
 from lightpen_app.shell.main_window import MainWindow
@@ -54,7 +53,6 @@ from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.steps.start.result_panel import LastResultPanel
-from lightpen_app.steps.start.sound_test import SoundTest
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
@@ -73,9 +71,9 @@ ODD = 'Ä/\\ 王 %41, "x"; \'' + 170 * "w"
 class Opened:
     """A Start page on the screen, driven as an operator does."""
 
-    def __init__(self, qtbot: QtBot, workbench: Workbench, sounds: Sounds) -> None:
+    def __init__(self, qtbot: QtBot, workbench: Workbench) -> None:
         with undressed():
-            self.page = StartPage(workbench, sounds)
+            self.page = StartPage(workbench)
         self.notices: list[str] = []
         self.statuses: list[str] = []
         self.steps: list[str] = []
@@ -152,8 +150,7 @@ class Opened:
             button.text()
             for button in self.page.findChildren(QPushButton)
             if button.isVisibleTo(self.page)
-            and button.text()
-            in ("Resume", "Discard", "Search again", "Test the sounds")
+            and button.text() in ("Resume", "Discard", "Search again")
         ]
 
     @property
@@ -185,8 +182,8 @@ def fresh(settings: Settings, tmp_path: Path) -> Iterator[Workbench]:
 def show(qtbot: QtBot) -> Iterator[Callable[[Workbench], Opened]]:
     pages: list[StartPage] = []
 
-    def opened(workbench: Workbench, sounds: Sounds | None = None) -> Opened:
-        result = Opened(qtbot, workbench, sounds or SilentSounds())
+    def opened(workbench: Workbench) -> Opened:
+        result = Opened(qtbot, workbench)
         pages.append(result.page)
         return result
 
@@ -913,7 +910,7 @@ def test_the_page_is_there_before_the_swings_are_looked_for(
     qtbot: QtBot, workbench: Workbench
 ) -> None:
     interrupted(workbench, "a")
-    page = StartPage(workbench, SilentSounds())
+    page = StartPage(workbench)
     qtbot.addWidget(page)
     page.entered()
     QThreadPool.globalInstance().waitForDone()
@@ -1142,12 +1139,12 @@ def test_a_damaged_swing_is_reported_until_it_is_mended(
     (row,) = start.rows()
     assert row.words()[0] == "Damaged: a"
     assert row.words()[1].startswith(sentence)
-    assert start.buttons() == ["Discard", "Search again", "Test the sounds"]
+    assert start.buttons() == ["Discard", "Search again"]
 
     shutil.copytree(tmp_path / "copy", folder, dirs_exist_ok=True)
     start.press("Search again")
     qtbot.wait_until(lambda: start.rows()[0].words()[0] != "Damaged: a")
-    assert start.buttons() == ["Resume", "Discard", "Test the sounds"]
+    assert start.buttons() == ["Resume", "Discard"]
 
 
 def test_a_damaged_swing_can_be_discarded_and_keeps_its_images(
@@ -1204,7 +1201,7 @@ def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
         "LP-04  \u00b7  T-10  \u00b7  12 images",
         "In use by another program",
     ]
-    assert start.buttons() == ["Resume", "Discard", "Search again", "Test the sounds"]
+    assert start.buttons() == ["Resume", "Discard", "Search again"]
 
     other.kill()
     other.wait()
@@ -1442,88 +1439,6 @@ def test_an_interrupted_swing_is_seen_whole(
         assert label.height() >= label.heightForWidth(label.width())
 
 
-# Sounds
-
-
-class Recorder:
-    """Remembers what was played, and what was said meanwhile."""
-
-    def __init__(self) -> None:
-        self.played: list[Sound] = []
-        self.said: list[str] = []
-        self.words: Callable[[], str] = str
-
-    def play(self, sound: Sound, progress: float = 0.0) -> None:
-        self.played.append(sound)
-        self.said.append(self.words())
-
-    def why_silent(self) -> str:
-        return ""
-
-
-def test_the_sound_test_plays_each_sound_with_its_word(qtbot: QtBot) -> None:
-    sounds = Recorder()
-    widget = SoundTest(sounds, step_ms=0)
-    sounds.words = widget.words
-    qtbot.addWidget(widget)
-    widget.show()
-
-    (button,) = widget.findChildren(QPushButton)
-    QTest.mouseClick(button, LEFT)
-    qtbot.wait_until(lambda: widget.words() == "")
-
-    assert sounds.played == list(Sound)
-    assert sounds.said == [
-        *(
-            "Tip seated",
-            "Image captured",
-            "Posture complete",
-            "Tip slipped or pen lost",
-        ),
-        *("Capture complete", "Done", "Failed"),
-    ]
-
-
-def test_it_is_reported_why_there_is_no_sound(
-    show: Callable[..., Opened], workbench: Workbench
-) -> None:
-    start = show(workbench, SilentSounds(["pw-play", "aplay"]))
-
-    start.press("Test the sounds")
-
-    (widget,) = start.page.findChildren(SoundTest)
-    assert widget.words() == (
-        "No sound available: none of pw-play, aplay is installed. "
-        "All information is also shown as text and icons."
-    )
-
-
-def test_it_is_reported_that_sounds_are_off(
-    show: Callable[..., Opened], workbench: Workbench
-) -> None:
-    recorder = Recorder()
-    start = show(workbench, MutedSounds(recorder, muted=True))
-
-    start.press("Test the sounds")
-
-    (widget,) = start.page.findChildren(SoundTest)
-    assert widget.words() == "Sounds are off. Press B to turn them on."
-    assert recorder.played == []
-
-
-def test_the_sound_test_ends_with_the_page(
-    show: Callable[..., Opened], workbench: Workbench
-) -> None:
-    start = show(workbench, Recorder())
-    start.press("Test the sounds")
-    (widget,) = start.page.findChildren(SoundTest)
-    assert widget.words() == "Tip seated"
-
-    start.page.left()
-
-    assert widget.words() == ""
-
-
 # Keys, names, languages
 
 
@@ -1549,7 +1464,7 @@ class Next(Page):
 def window(
     qtbot: QtBot, workbench: Workbench, settings: Settings
 ) -> Iterator[MainWindow]:
-    page = StartPage(workbench, SilentSounds())
+    page = StartPage(workbench)
     window = MainWindow(
         [page, Next()], settings, Preferences(), workbench.notifications
     )
@@ -1611,7 +1526,6 @@ def test_every_control_has_a_name_and_is_reached_by_tab(start: Opened) -> None:
         *("List of pens", "List of tips", "List of cones"),
         *("Max. expanded uncertainty U (k = 2)", "Min. images"),
     ]
-    assert "Test the sounds" in names
     assert all(names)
 
 
@@ -1666,20 +1580,6 @@ def test_every_word_changes_with_the_language(
 
 
 # What is reported as long as it holds
-
-
-def test_that_sounds_are_off_is_said_until_they_are_on(
-    qtbot: QtBot, look: None
-) -> None:
-    sounds = MutedSounds(Recorder(), muted=True)
-    widget = SoundTest(sounds, step_ms=0)
-    qtbot.addWidget(widget)
-    widget.findChildren(QPushButton)[0].click()
-    assert widget.words() == "Sounds are off. Press B to turn them on."
-
-    sounds.muted = False
-
-    qtbot.waitUntil(lambda: widget.words() == "")
 
 
 def test_a_row_that_is_worked_on_waits_though_the_list_is_read_anew(

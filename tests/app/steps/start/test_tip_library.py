@@ -7,7 +7,6 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
 from PySide6.QtGui import QColor, QImage, QKeyEvent
@@ -17,12 +16,10 @@ from pytestqt.qtbot import QtBot
 from tests.app.undressed import undressed
 
 from lightpen.local_time import local_now
-from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.library.tip_library import (
-    AxisOrigin,
     ItemKind,
     Library,
     ListedCone,
@@ -33,14 +30,12 @@ from lightpen.record.library.tip_library import (
     read_library,
 )
 from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
 from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.day_state import tip_details
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.page import StartPage
-from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.row_table import RowTable
@@ -60,7 +55,7 @@ class Desk:
     def __init__(self, qtbot: QtBot, workbench: Workbench) -> None:
         self.qtbot, self.workbench = qtbot, workbench
         with undressed():
-            self.page = StartPage(workbench, SilentSounds())
+            self.page = StartPage(workbench)
         self.reported: list[str] = []
         workbench.notifications.status_changed.connect(self.reported.append)
         qtbot.addWidget(self.page)
@@ -317,7 +312,7 @@ def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
     desk.click("Save")
     desk.settle()
     tip = desk.library.tips["T-11"]
-    assert (tip.ball_diameter_mm, tip.axis_origin) == (8.0, None)
+    assert tip.ball_diameter_mm == 8.0
     changes = [change for _, change in library_changes(desk.data)]
     assert [change.operator for change in changes] == ["Ann", "Ann"]
     assert changes[0].reason == "new"
@@ -498,56 +493,6 @@ def test_where_a_password_guards_a_supervisor_signs(desk: Desk) -> None:
     desk.settle()
     ((_, change),) = library_changes(desk.data)
     assert (change.item.id, change.supervisor) == ("C-5", "Eve")
-    desk.click("Close")
-
-
-def test_the_axis_of_a_spin_stays_one_until_it_is_typed_anew(desk: Desk) -> None:
-    axis = (0.123456789, 0.98, 0.15)
-    desk.add(ListedTip(id="T-7", stylus_axis=axis, axis_origin=AxisOrigin.SPIN))
-    before = desk.library.tips["T-7"]
-    desk.names.library_requested.emit(ItemKind.TIP)
-    desk.click("Change...")
-    desk.enter("Comment", "polished")
-    desk.click("Save")
-    desk.settle()
-    after = desk.library.tips["T-7"]
-    assert after.stylus_axis == before.stylus_axis
-    assert after.axis_origin is AxisOrigin.SPIN
-
-    desk.click("Change...")
-    desk.enter("Axis of the stylus, x", "0.5")
-    desk.click("Save")
-    desk.settle()
-    assert desk.library.tips["T-7"].axis_origin is AxisOrigin.GIVEN
-    desk.click("Close")
-
-
-def test_the_axis_of_a_stylus_is_found_by_a_spin(desk: Desk) -> None:
-    desk.add(TIP)
-    desk.names.library_requested.emit(ItemKind.TIP)
-    desk.click("Change...")
-    box = desk.control("Axis of the stylus, from the ball into the pen")
-    assert isinstance(box, QAbstractButton)
-    box.click()
-    desk.click("Determine by rotation")
-    recorder = desk.page.findChild(SpinRecorder)
-    assert isinstance(recorder, SpinRecorder)
-    axis = np.array([0.0, 0.8, 0.6])
-    said: list[str] = []
-    recorder.message_sent.connect(said.append)
-    for rotation in rotation_from_vector(
-        np.radians(np.arange(0, 90, 3))[:, None] * axis
-    ):
-        recorder.keep(rotation)
-    assert said[0].startswith("The pen is detected in 1 images of the rotation;")
-    assert said[-1].startswith("Rotation 87\N{DEGREE SIGN}")
-
-    desk.click("Stop rotation")
-    desk.click("Save")
-    desk.settle()
-    tip = desk.library.tips["T-7"]
-    assert tip.stylus_axis == pytest.approx(tuple(axis), abs=1e-9)
-    assert tip.axis_origin is AxisOrigin.SPIN
     desk.click("Close")
 
 

@@ -86,9 +86,6 @@ class Recorder:
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         self.played.append((sound, progress))
 
-    def why_silent(self) -> str:
-        return ""
-
     def sounds(self) -> list[Sound]:
         return [sound for sound, _ in self.played]
 

@@ -25,7 +25,6 @@ from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.library.tip_library import (
     LIBRARY,
-    AxisOrigin,
     ItemKind,
     Library,
     ListedCone,
@@ -106,7 +105,6 @@ def test_the_id_of_a_retired_tip_is_refused_with_what_to_do(tmp_path: Path) -> N
         ({"max_change_mm": -0.1}, "Max. change -0.1 mm"),
         ({"max_days": 0}, "0 is not valid"),
         ({"max_swings": 10**6}, "1000000 is not valid"),
-        ({"stylus_axis": (0.0, 0.0, 0.0)}, "0 0 0 is not a direction."),
         ({"nominal_tip_mm": (0.0, float("inf"), 0.0)}, "The nominal centre"),
         ({"id": "  "}, "is not a valid ID"),
         ({"id": "T\n1"}, "is not a valid ID"),
@@ -124,14 +122,6 @@ def test_what_makes_no_sense_of_a_tip_is_refused(
 def test_a_tip_that_is_not_there_cannot_be_changed(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="There is no tip T-10 in the library"):
         change_item(tmp_path, TIP, ANN, NOON)
-
-
-def test_an_axis_is_kept_as_a_direction_with_where_it_is_from(tmp_path: Path) -> None:
-    tip = structs.replace(TIP, stylus_axis=(0.0, 3.0, 4.0))
-    kept = add_item(tmp_path, tip, ANN, NOON).tips["T-10"]
-
-    assert kept.stylus_axis == pytest.approx((0, 0.6, 0.8))
-    assert kept.axis_origin is AxisOrigin.GIVEN
 
 
 def test_a_tip_has_a_rule_of_its_own_or_that_of_the_station() -> None:
