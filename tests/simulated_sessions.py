@@ -36,11 +36,6 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.tasks.articulation import (
-    ARTICULATION,
-    ArticulationOptions,
-    measure_articulation,
-)
 from lightpen.verification.tasks.circle import (
     SIMULATED_AXES,
     SIMULATED_CENTER,
@@ -61,23 +56,14 @@ from lightpen.verification.tasks.length import (
     LengthOptions,
     measure_length,
 )
-from lightpen.verification.tasks.plane import PlaneOptions, measure_plane
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
     ProbingFrame,
     StillFrames,
     measure_touches,
 )
-from lightpen.verification.tasks.sphere import SIMULATED_AXES as SPHERE_AXES
-from lightpen.verification.tasks.sphere import SIMULATED_RADIUS as SPHERE_RADIUS
-from lightpen.verification.tasks.sphere import (
-    SphereOptions,
-    measure_sphere,
-    sphere_directions,
-)
-from lightpen.verification.tasks.task import Conditions, Found, Surface
+from lightpen.verification.tasks.task import Conditions, Found
 
-BALL = 10.0  # mm
 LED_SIGMA = SEAT_SIGMA = 0.002  # mm
 SIGMA = 0.03  # px
 N_IMAGES, N_FRAMES = 60, 5
@@ -275,40 +261,6 @@ def length_session(station: SimulatedStation, rng: np.random.Generator) -> Found
     )
 
 
-def plane_session(
-    station: SimulatedStation, rng: np.random.Generator, n: int = 12
-) -> Found:
-    """Verify by a plate, the pen upright."""
-    angles = 2 * np.pi * np.arange(n) / n
-    spokes = np.column_stack([np.cos(angles), np.sin(angles)])
-    places = _on_table(np.tile([15.0, 30.0], n)[:n, None] * spokes)
-    points = station.probe(places, held(np.zeros(n), np.zeros(n), rng), rng)
-    return measure_plane([("", points)], Conditions(station.instrument), PlaneOptions())
-
-
-def sphere_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
-    """Verify by the 25 points of a sphere, the pen upright."""
-    ways = sphere_directions() @ SPHERE_AXES
-    n = len(ways)
-    places = PAPER_CONE + SIMULATED_CENTER + (SPHERE_RADIUS + BALL / 2) * ways
-    postures = held(np.zeros(n), np.zeros(n), rng)
-    conditions = Conditions(station.instrument, ball_diameter=BALL)
-    options = SphereOptions(2 * SPHERE_RADIUS, surface=Surface.BOSS)
-    points = station.probe(places, postures, rng)
-    return measure_sphere([("", points)], conditions, options)
-
-
-def articulation_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
-    """Verify by five postures of five points."""
-    runs = []
-    for run in range(5):
-        goal = ARTICULATION.hand(ArticulationOptions(), run, 0)
-        postures = held([goal.tilt] * 5, np.full(5, goal.direction), rng)
-        points = station.probe(np.tile(PAPER_CONE, (5, 1)), postures, rng)
-        runs.append((str(run), points))
-    return measure_articulation(runs, Conditions(station.instrument))
-
-
 def drift_session(
     station: SimulatedStation, rng: np.random.Generator, move: FloatArray | None = None
 ) -> Found:
@@ -332,14 +284,11 @@ Session: TypeAlias = Callable[[SimulatedStation, np.random.Generator], Found]
 
 SESSIONS: dict[str, Session] = {
     "fixed point": fixed_point_session,
-    "articulation": articulation_session,
     "ring, upright": ring_session,
     "ring, turned": partial(ring_session, n_runs=1, is_turned=True),
     "ring, 280 degrees, one image a point": partial(
         ring_session, n_runs=1, n=30, covered=np.radians(280), n_frames=1
     ),
     "length": length_session,
-    "plane": plane_session,
-    "sphere, upright": sphere_session,
     "drift": drift_session,
 }

@@ -102,16 +102,12 @@ def commands(
     write_camera(CAMERA, camera)
     write_pen(PEN, pen)
     write_swing(swing)
-    rng = np.random.default_rng(5)
-    ways = rng.standard_normal((25, 3)) - np.array([0.0, 1.0, 1.0])
-    ball = 15 * ways / np.linalg.norm(ways, axis=1)[:, None]
     angles = np.linspace(0, 2 * np.pi, 20, endpoint=False)
     ring = 31.75 * np.column_stack([np.cos(angles), np.sin(angles)]) @ FLAT
     ring *= (31.75 / np.linalg.norm(ring, axis=1))[:, None]
     grid = np.stack(np.meshgrid([-60.0, 0.0, 60.0], [-40.0, 0.0, 40.0]), axis=-1)
     touched = {
         "ring": ring @ rotation_from_vector(np.array([0.1, 0.0, 0.0])).T,
-        "ball": ball,
         "flat": grid.reshape(-1, 2) @ FLAT,
         "edge": np.linspace(-60, 60, 8)[:, None] * [1.0, 0.1, 0.2],
         "cone": np.zeros((8, 3)),
@@ -148,8 +144,6 @@ def commands(
         ],
         verify("fixed-point", "cone"),
         verify("circle", "ring", "--radius", "31.75"),
-        verify("sphere", "ball", "--diameter", "30"),
-        verify("plane", "flat"),
         ["measure", str(plan), *features, *use],
     ]
 

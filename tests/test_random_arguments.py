@@ -83,7 +83,7 @@ def tried(
 
 
 def test_the_commands_are_those_of_the_program() -> None:
-    for command in ("discover", "measure", "archive fetch", "verify plane"):
+    for command in ("discover", "measure", "archive fetch", "verify circle"):
         assert tuple(command.split()) in EVERY
 
 

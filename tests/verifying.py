@@ -33,8 +33,6 @@ from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleO
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen.verification.tasks.registry import AnyTask
-from lightpen.verification.tasks.sphere import SIMULATED_RADIUS as SPHERE_RADIUS
-from lightpen.verification.tasks.sphere import SphereOptions
 from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 TIMEOUT = 60.0  # s until a test gives up
@@ -46,7 +44,6 @@ CHOICES = VerificationChoices(
         FixedPointOptions(n_touches=4),
         CircleOptions(SIMULATED_RADIUS, 0.001),
         LengthOptions(SIMULATED_LENGTH, 0.001),
-        SphereOptions(2 * SPHERE_RADIUS, 0.001),
     ),
     n_frames=3,
 )

@@ -56,7 +56,6 @@ MESSAGES = {
     "limit.form": "Ring, plate: form and out-of-plane deviation",
     "limit.length": "Length: error",
     "limit.length-per-m": "Length: additional error per metre",
-    "limit.location": "Location error",
     "limit.repeatability": "Repeatability: std. deviation of the tip",
     "limit.drift": "Motion of drift reference",
     "limit.max-days": "Tip: calibration interval (days)",

@@ -113,13 +113,11 @@ class VerificationLimits:
     along: float = _limit(0.03, message("limit.along"))
     # Error of the mean radius of a circle.
     radius: float = _limit(0.02, message("limit.radius"))
-    # Roundness of a circle and its deviation from a plane; excess of a flatness.
+    # Roundness of a circle and its deviation from a plane; excess of a certified form.
     form: float = _limit(0.1, message("limit.form"))
     # Error of a length: a constant, and what each metre adds to it.
     length: float = _limit(0.03, message("limit.length"))
     length_per_m: float = _limit(0.0, message("limit.length-per-m"), "mm", (0.0, 10.0))
-    # Diameter of the sphere about one point probed in several postures.
-    location: float = _limit(0.1, message("limit.location"))
     # Standard deviation of a coordinate of the tip over calibrations.
     repeatability: float = _limit(0.01, message("limit.repeatability"))
     # How far a drift reference may move during a session.

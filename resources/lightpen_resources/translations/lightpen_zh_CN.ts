@@ -3692,8 +3692,8 @@ needed</source>
         <translation>自动触测所有任务。</translation>
     </message>
     <message>
-        <source>Simulated artefacts: ring radius {0} mm, bar length {1} mm, sphere diameter {2} mm (ball centres).</source>
-        <translation>模拟标准器：环规半径 {0} mm，长度杆 {1} mm，标准球直径 {2} mm（球心）。</translation>
+        <source>Simulated: ring radius {0} mm, bar length {1} mm.</source>
+        <translation>模拟标准件：圆环半径 {0} mm，标准棒长度 {1} mm。</translation>
     </message>
     <message>
         <source>Lift</source>
@@ -5754,14 +5754,6 @@ mm</translation>
         <translation>证书值</translation>
     </message>
     <message>
-        <source>Certified diameter</source>
-        <translation>证书直径</translation>
-    </message>
-    <message>
-        <source>Certified flatness</source>
-        <translation>证书平面度</translation>
-    </message>
-    <message>
         <source>Certified length</source>
         <translation>证书长度</translation>
     </message>
@@ -5774,10 +5766,6 @@ mm</translation>
         <translation>改变光笔倾斜</translation>
     </message>
     <message>
-        <source>Change the posture</source>
-        <translation>改变姿态</translation>
-    </message>
-    <message>
         <source>Changes of other stations to the tip library that a supervisor has not signed yet: {n}.</source>
         <translation>其他工位对测头库的更改中，主管尚未签署的有 {n} 项。</translation>
     </message>
@@ -5788,10 +5776,6 @@ mm</translation>
     <message>
         <source>Complete the line; if it is the last one, the file is cut short.</source>
         <translation>请补全该行；如果是最后一行，则文件不完整。</translation>
-    </message>
-    <message>
-        <source>Cone by each posture, in the form of ISO 10360-12 / mm</source>
-        <translation>各姿态测得的锥孔，按 ISO 10360-12 的形式 / mm</translation>
     </message>
     <message>
         <source>Cone by the nominal tip / mm</source>
@@ -5828,18 +5812,6 @@ mm</translation>
     <message>
         <source>Deviation from the ring / mm</source>
         <translation>与圆环的偏差 / mm</translation>
-    </message>
-    <message>
-        <source>Deviation from the sphere / mm</source>
-        <translation>与球面的偏差 / mm</translation>
-    </message>
-    <message>
-        <source>Diameter</source>
-        <translation>直径</translation>
-    </message>
-    <message>
-        <source>Diameter / mm; certified {certified:.4f} mm</source>
-        <translation>直径 / mm；证书值 {certified:.4f} mm</translation>
     </message>
     <message>
         <source>Diameter of the discs: {flaw}</source>
@@ -5900,22 +5872,6 @@ mm</translation>
     <message>
         <source>Fixed point: std. deviation perpendicular to the line of sight</source>
         <translation>固定点：垂直于视线的标准差</translation>
-    </message>
-    <message>
-        <source>Flatness</source>
-        <translation>平面度</translation>
-    </message>
-    <message>
-        <source>Flatness / mm</source>
-        <translation>平面度 / mm</translation>
-    </message>
-    <message>
-        <source>Flatness {flatness:.4f} mm (U {uncertainty:.4f} mm), certified {certified:.4f} mm (limit of the excess {limit:.4f} mm).</source>
-        <translation>平面度 {flatness:.4f} mm（U {uncertainty:.4f} mm），证书值 {certified:.4f} mm（超出量限值 {limit:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Flatness {flatness:.4f} mm (U {uncertainty:.4f} mm), certified {certified:.4f} mm: the excess is beyond the limit of {limit:.4f} mm. The tip, the LED file or the intrinsics file may be wrong, or the plate is dirty.</source>
-        <translation>平面度 {flatness:.4f} mm（U {uncertainty:.4f} mm），证书值 {certified:.4f} mm：超出量大于限值 {limit:.4f} mm。测头、LED 文件或内参文件可能有误，或平板不清洁。</translation>
     </message>
     <message>
         <source>Form error</source>
@@ -6078,10 +6034,6 @@ mm</translation>
         <translation>{name} 第 {line} 行：{flaw}</translation>
     </message>
     <message>
-        <source>Location error</source>
-        <translation>位置误差</translation>
-    </message>
-    <message>
         <source>Measure the missing features.</source>
         <translation>请测量缺少的要素。</translation>
     </message>
@@ -6238,10 +6190,6 @@ mm</translation>
         <translation>位置数</translation>
     </message>
     <message>
-        <source>Plane</source>
-        <translation>平面</translation>
-    </message>
-    <message>
         <source>Points</source>
         <translation>测点数</translation>
     </message>
@@ -6250,24 +6198,12 @@ mm</translation>
         <translation>{n_touches} 个测点中有 {n_left_out} 个位于别处而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
-        <source>Points excluded because they lie off the plane: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
-        <translation>{n_left_out} 个测点偏离平面而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
-    </message>
-    <message>
         <source>Points excluded because they lie off the ring: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
         <translation>{n_left_out} 个测点偏离圆环而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
-        <source>Points excluded because they lie off the sphere: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
-        <translation>{n_left_out} 个测点偏离球面而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
-    </message>
-    <message>
         <source>Points of {name} ({kind}), camera frame / mm</source>
         <translation>{name}（{kind}）的点，相机坐标系 / mm</translation>
-    </message>
-    <message>
-        <source>Points on the plate and their distance from the plane / mm</source>
-        <translation>平板上的测点及其到平面的距离 / mm</translation>
     </message>
     <message>
         <source>Port {port} is in use already, by another window or another program. Choose another port, or close that one.</source>
@@ -6278,24 +6214,12 @@ mm</translation>
         <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、球）；至少需要 {needed} 个。请再触测几个。</translation>
     </message>
     <message>
-        <source>Postures</source>
-        <translation>姿态</translation>
-    </message>
-    <message>
         <source>Press the tip into the cone and keep it there.</source>
         <translation>把测头压入锥孔并保持。</translation>
     </message>
     <message>
         <source>Press the tip into the cone and swing the pen gently.</source>
         <translation>把测头压入锥孔，轻轻摆动光笔。</translation>
-    </message>
-    <message>
-        <source>Probe a plate</source>
-        <translation>触测平板</translation>
-    </message>
-    <message>
-        <source>Probe a reference sphere</source>
-        <translation>触测标准球</translation>
     </message>
     <message>
         <source>Probe a ring</source>
@@ -6322,10 +6246,6 @@ mm</translation>
         <translation>在其他任务之间触测锥孔</translation>
     </message>
     <message>
-        <source>Probe the cone five times in each of five postures</source>
-        <translation>以五个姿态各触测锥孔五次</translation>
-    </message>
-    <message>
         <source>Probe the cone in new postures</source>
         <translation>以新的姿态触测锥孔</translation>
     </message>
@@ -6342,24 +6262,8 @@ mm</translation>
         <translation>触测另一端</translation>
     </message>
     <message>
-        <source>Probe the plate</source>
-        <translation>触测平板</translation>
-    </message>
-    <message>
-        <source>Probe the plate all over and hold still on each point.</source>
-        <translation>在整个平板上触测，在每个点上保持不动。</translation>
-    </message>
-    <message>
         <source>Probe the ring</source>
         <translation>触测圆环</translation>
-    </message>
-    <message>
-        <source>Probe the sphere</source>
-        <translation>触测球</translation>
-    </message>
-    <message>
-        <source>Probe the upper half of the sphere all over and hold still on each point.</source>
-        <translation>在球的整个上半部触测，并在每个点保持静止。</translation>
     </message>
     <message>
         <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
@@ -6446,10 +6350,6 @@ mm</translation>
         <translation>所需测头 - 当前测头</translation>
     </message>
     <message>
-        <source>Residual</source>
-        <translation>残差</translation>
-    </message>
-    <message>
         <source>Ring</source>
         <translation>圆环</translation>
     </message>
@@ -6470,24 +6370,8 @@ mm</translation>
         <translation>尺寸</translation>
     </message>
     <message>
-        <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm), form error {form:.4f} mm.</source>
-        <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm），形状误差 {form:.4f} mm。</translation>
-    </message>
-    <message>
-        <source>Size error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file, the intrinsics file or the ball diameter may be wrong.</source>
-        <translation>尺寸误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件、内参文件或球径可能有误。</translation>
-    </message>
-    <message>
         <source>Slide along {name}: {n_points} of {needed} points.</source>
         <translation>沿 {name} 滑动：{n_points} / {needed} 点。</translation>
-    </message>
-    <message>
-        <source>Sphere</source>
-        <translation>球</translation>
-    </message>
-    <message>
-        <source>Spread</source>
-        <translation>离散</translation>
     </message>
     <message>
         <source>Standard uncertainty of points in between along u, v, w: {u:.4f}, {v:.4f}, {w:.4f} mm.</source>
@@ -6586,10 +6470,6 @@ mm</translation>
         <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
     </message>
     <message>
-        <source>The measured diameter is {measured:.3f} mm, the certified one {certified} mm. Check that this sphere was probed, that its diameter and not its radius is stated, and the ball diameter of the tip.</source>
-        <translation>测得直径为 {measured:.3f} mm，证书直径为 {certified} mm。请检查触测的是否为该球、输入的是否为直径而非半径，以及测头的球径。</translation>
-    </message>
-    <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
         <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
     </message>
@@ -6604,14 +6484,6 @@ mm</translation>
     <message>
         <source>The point scatters, std. deviation {deviation:.4f} mm along {axis} (at most {limit:.4f} mm is allowed or expected by noise), which no other tip position explains. The tip may not rest in the cone: look for dirt, wear and a loose cone.</source>
         <translation>点的散布沿 {axis} 的标准差为 {deviation:.4f} mm（允许或按噪声预期不超过 {limit:.4f} mm），其他测头位置无法解释。测头可能未就位于锥孔：请检查污物、磨损和锥座松动。</translation>
-    </message>
-    <message>
-        <source>The points lie in one place or on a line, which determines no plane. Probe the plate all over.</source>
-        <translation>各测点位于同一处或一条直线上，不能确定平面。请在整个平板上触测。</translation>
-    </message>
-    <message>
-        <source>The points lie on no plane: {n_off} of {n_points} are outliers, and the others deviate by up to {off:.2f} mm. Probe one plate, and hold the pen on it.</source>
-        <translation>各测点不在同一平面上：{n_points} 个测点中有 {n_off} 个为离群点，其余最大偏差 {off:.2f} mm。请只触测一块平板，并使测头保持接触。</translation>
     </message>
     <message>
         <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
@@ -6686,10 +6558,6 @@ mm</translation>
         <translation>测头库中没有{kind} {id}。请先添加。</translation>
     </message>
     <message>
-        <source>This place of the plate was probed before. Probe it elsewhere.</source>
-        <translation>平板的这一处已触测过。请触测别处。</translation>
-    </message>
-    <message>
         <source>This place was probed before. Probe elsewhere.</source>
         <translation>此处已触测过。请触测别处。</translation>
     </message>
@@ -6736,10 +6604,6 @@ mm</translation>
     <message>
         <source>U (k = 2) of difference</source>
         <translation>差值的 U (k = 2)</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the flatness is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip.</source>
-        <translation>平面度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
     </message>
     <message>
         <source>U {axis}</source>
@@ -6998,10 +6862,6 @@ mm</translation>
         <translation>{n_points} / {needed} 点</translation>
     </message>
     <message>
-        <source>{n_points} points can be used, a plane needs at least {needed}. Probe the plate all over.</source>
-        <translation>有 {n_points} 个可用的测点，平面至少需要 {needed} 个。请在整个平板上触测。</translation>
-    </message>
-    <message>
         <source>{n_tagged} of {n_images} images, the first of them {name}, have the orientation tag {tag} ({meaning}). It is not applied: the pixels are used as stored, which must be the orientation that the intrinsics file was made for. If another program turned the images, save them again as the camera delivers them.</source>
         <translation>{n_images} 幅图像中有 {n_tagged} 幅（第一幅为 {name}）带有方向标记 {tag}（{meaning}）。程序不执行该标记：像素按存储的方向使用，内参文件必须是在这一方向上标定的。如果图像被其他程序旋转过，请按相机原样输出重新保存。</translation>
     </message>
@@ -7160,10 +7020,6 @@ mm</translation>
     <message>
         <source>{name} is {width} x {height} px, the other images are {usual_width} x {usual_height} px. Replay only images of one camera together.</source>
         <translation>{name} 为 {width} × {height} px，其他图像为 {usual_width} × {usual_height} px。请只回放同一台相机的图像。</translation>
-    </message>
-    <message>
-        <source>{n} points are usable; a sphere needs at least {needed}, 25 are usual. Probe its upper half all over.</source>
-        <translation>可用点 {n} 个；球至少需要 {needed} 个，通常为 25 个。请在整个上半部触测。</translation>
     </message>
     <message>
         <source>{other} was calibrated with another LED file than {first}. Give calibrations of one pen with one LED file.</source>
@@ -8178,18 +8034,6 @@ mm</translation>
         <translation>无法在 {place} 提供实时数据流：{reason}。请选择 1024 到 65535 之间空闲的端口。</translation>
     </message>
     <message>
-        <source>Location error {error:.4f} mm (U {uncertainty:.4f} mm), {expected:.4f} mm expected by noise.</source>
-        <translation>位置误差 {error:.4f} mm（U {uncertainty:.4f} mm），按噪声预期 {expected:.4f} mm。</translation>
-    </message>
-    <message>
-        <source>Location error {error:.4f} mm over all postures (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
-        <translation>各姿态的位置误差为 {error:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Location error {error:.4f} mm over all postures (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the point moves with the pen tilt.</source>
-        <translation>各姿态的位置误差为 {error:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：点随光笔倾斜而移动。</translation>
-    </message>
-    <message>
         <source>Max. change {limit:g} mm is not valid. Enter a value above 0 and up to {most:g} mm.</source>
         <translation>最大变化 {limit:g} mm 无效。请输入大于 0 且不超过 {most:g} mm 的值。</translation>
     </message>
@@ -8388,10 +8232,6 @@ mm</translation>
     <message>
         <source>Probe one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
         <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
-    </message>
-    <message>
-        <source>Probe the cone {needed} times in one posture and lift the tip in between: {n_touches} of {needed}. Posture {posture} of {n_postures}: upright, and tilted to four sides.</source>
-        <translation>以同一姿态触测锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {posture} / {n_postures} 个姿态：竖直，以及向四个方向倾斜。</translation>
     </message>
     <message>
         <source>Probe the ring all round and hold still on each point. Points: {n_touches}.</source>
@@ -9022,10 +8862,6 @@ mm</translation>
         <translation>各姿态相差 {found:.1f}°（均方根），验证测头需要 {needed:.0f}°。请向各个方向倾斜光笔。</translation>
     </message>
     <message>
-        <source>The postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed. Hold the pen upright, and tilt it to four sides.</source>
-        <translation>各姿态相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请使光笔竖直，并向四个方向倾斜。</translation>
-    </message>
-    <message>
         <source>The projection is uncertain by {px:.1f} px over the image: the views do not determine the lens there. Add views with the board in each corner of the image.</source>
         <translation>图像上投影的不确定度为 {px:.1f} px：视图在该处不能确定镜头。请增加标定板位于图像各角的视图。</translation>
     </message>
@@ -9350,10 +9186,6 @@ mm</translation>
         <translation>现有 {n_images} 幅图像；至少需要 {needed} 幅，通常为 300 幅。请记录 15 秒或更长的摆动，每秒 10 幅或更多。</translation>
     </message>
     <message>
-        <source>There are {n_postures} postures, {needed} are needed: upright, and tilted to four sides.</source>
-        <translation>有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四个方向倾斜。</translation>
-    </message>
-    <message>
         <source>There is no LED {number}; {n_leds} LEDs are found, numbered from the tip upwards and from left to right. Give a length between two of these.</source>
         <translation>没有 LED {number}；找到 {n_leds} 个 LED，从测头向上、从左到右编号。请给出其中两个之间的长度。</translation>
     </message>
@@ -9362,16 +9194,8 @@ mm</translation>
         <translation>这一端已触测过。请触测另一端。</translation>
     </message>
     <message>
-        <source>This place of the sphere was probed before. Probe it elsewhere.</source>
-        <translation>球的此处已触测过。请触测其他位置。</translation>
-    </message>
-    <message>
         <source>This posture was recorded before. Keep the tip in the cone and change the pen tilt.</source>
         <translation>该姿态已记录过。请保持测头在锥孔中并改变光笔的倾斜。</translation>
-    </message>
-    <message>
-        <source>This posture was used before. Tilt the pen another way and probe the cone five times.</source>
-        <translation>该姿态已用过。请换一个方向倾斜光笔，触测锥孔五次。</translation>
     </message>
     <message>
         <source>This result needs checking. {why} Enter a reason to accept it.</source>
@@ -9420,10 +9244,6 @@ mm</translation>
     <message>
         <source>Turn the LEDs towards the camera. No data is lost.</source>
         <translation>请将 LED 朝向相机。没有数据丢失。</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the diameter is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip.</source>
-        <translation>直径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：这不能验证测头。</translation>
     </message>
     <message>
         <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip. Probe each end more often, and lay the length across the view.</source>
@@ -9500,10 +9320,6 @@ mm</translation>
     <message>
         <source>approach</source>
         <translation>接近方向</translation>
-    </message>
-    <message>
-        <source>by the ball centres</source>
-        <translation>按球心计</translation>
     </message>
     <message>
         <source>calibration result</source>
@@ -9636,10 +9452,6 @@ mm</translation>
     <message>
         <source>not simultaneous</source>
         <translation>不是同一时刻</translation>
-    </message>
-    <message>
-        <source>on its inside</source>
-        <translation>在其内侧</translation>
     </message>
     <message>
         <source>optional</source>
@@ -9974,10 +9786,6 @@ mm</translation>
         <translation>{path} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请用该版本打开此记录。</translation>
     </message>
     <message>
-        <source>{posture} has {n_touches} usable points, {needed} are needed in each posture.</source>
-        <translation>{posture} 有 {n_touches} 个可用的测点，每个姿态需要 {needed} 个。</translation>
-    </message>
-    <message>
         <source>{run} has {n_touches} usable points; a circle needs at least {needed}, 20 are usual. Probe the ring all round.</source>
         <translation>{run} 有 {n_touches} 个可用的测点；圆至少需要 {needed} 个，通常为 20 个。请沿环一周触测。</translation>
     </message>
@@ -9992,10 +9800,6 @@ mm</translation>
     <message>
         <source>{text} is not a board. Use a form such as {forms}; lengths are in mm.</source>
         <translation>{text} 不是标定板。请按如下形式命名：{forms}；长度单位为 mm。</translation>
-    </message>
-    <message>
-        <source>{touch} is {distance:.2f} mm from the other points: the pen was lifted or slipped. Probe that posture again.</source>
-        <translation>{touch} 与其他各点相距 {distance:.2f} mm：光笔曾抬起或滑动。请在该姿态下重新触测。</translation>
     </message>
     <message>
         <source>{reason}. Choose another folder or name.</source>
@@ -10032,10 +9836,6 @@ mm</translation>
     <message>
         <source>The database {name} is empty. Its administrator must set it up as described in docs/archive.md.</source>
         <translation>数据库 {name} 为空。管理员须按 docs/archive.md 所述进行设置。</translation>
-    </message>
-    <message>
-        <source>The diameter of the sphere is not specified. Enter the certified one.</source>
-        <translation>未指定球的直径。请输入证书值。</translation>
     </message>
     <message>
         <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.</source>
@@ -10098,28 +9898,12 @@ mm</translation>
         <translation>光笔倾斜与首次触测时不同，因此此点不计入。请按首次的姿态握持光笔，使光笔的系统误差抵消。</translation>
     </message>
     <message>
-        <source>The pen tilt differs from that of the points before, so this point does not count. Keep the tilt until the posture is complete.</source>
-        <translation>光笔倾斜与之前的点不同，因此此点不计入。请在该姿态完成前保持倾斜。</translation>
-    </message>
-    <message>
         <source>The points are {rms:.2f} px from those of a flat board {board}: its squares differ from the description, it is bent, or the images are not from one camera with one focus. Count and measure its squares again.</source>
         <translation>各点与平面标定板 {board} 的点相差 {rms:.2f} px：方格与描述不符、标定板弯曲，或图像并非来自同一相机同一对焦。请重新数并测量方格。</translation>
     </message>
     <message>
-        <source>The points cover too little of a sphere to determine it. Probe its upper half all over, from the pole to the equator.</source>
-        <translation>这些点覆盖的球面太小，无法确定球。请在整个上半部触测，从顶点到赤道。</translation>
-    </message>
-    <message>
-        <source>The points deviate by up to {form:.4f} mm from a sphere (limit {limit:.4f} mm): the tip slipped, the sphere is dirty, or the tip is wrong.</source>
-        <translation>这些点与球面最大偏差 {form:.4f} mm（限值 {limit:.4f} mm）：测头打滑、球不清洁或测头有误。</translation>
-    </message>
-    <message>
         <source>The points lie on a circle of radius {measured:.3f} mm; certified are {certified} mm. Check that it is this ring, and that the radius is entered, not the diameter.</source>
         <translation>各点位于半径 {measured:.3f} mm 的圆上；证书值为 {certified} mm。请检查是否为此环规，且填写的是半径而不是直径。</translation>
-    </message>
-    <message>
-        <source>The points lie on no sphere: {n_off} of {n} are outliers, and the others deviate by up to {off:.2f} mm. Probe one sphere.</source>
-        <translation>这些点不在球面上：{n} 个中有 {n_off} 个离群点，其余最大偏差 {off:.2f} mm。请只触测一个球。</translation>
     </message>
     <message>
         <source>The points of {run} are at more than two positions: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>

@@ -25,8 +25,8 @@ MIN_PASSED, MIN_FOUND = 0.95, 0.9
 WRONG = 0.02  # mm
 # Sessions at each station; the larger tasks take a fifth of a second.
 N_EACH = {"fixed point": 5, "drift": 5}
-SHOWING_TIP = ["fixed point", "articulation"]
-SHOWING_NO_TIP = ["ring, upright", "length", "plane", "sphere, upright"]
+SHOWING_TIP = ["fixed point"]
+SHOWING_NO_TIP = ["ring, upright", "length"]
 
 Stations: TypeAlias = tuple[SimulatedStation, ...]
 

@@ -19,7 +19,7 @@ from tests.verifying import BAR, CHOICES, FRAME, NOON, TABLE, found_by
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
 from lightpen.formats.opened_files import CameraFile
-from lightpen.measuring.plan import Plan, PlannedFeature, Side
+from lightpen.measuring.plan import Plan, PlannedFeature, Side, free_plan
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
 from lightpen.model.rig import rig_of
@@ -42,7 +42,6 @@ from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptio
 from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.sphere import SPHERE
 from lightpen.verification.workflow import VerificationWorkflow
 
 UPRIGHT = (Hold(tilt=0.0),) * 3
@@ -275,7 +274,8 @@ def test_a_verification_that_is_done_when_its_certificate_changes(trace: Trace) 
 def test_a_length_that_is_ended_between_two_places(
     trace: Trace, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    bars = replace(CHOICES, kinds=(LENGTH.kind, SPHERE.kind))
+    bars = replace(CHOICES, kinds=(LENGTH.kind, PART.kind))
+    bars = bars.with_options(PartOptions(free_plan("Part")))
     trace.come(bars.with_options(LengthOptions(SIMULATED_LENGTH, 0.001, n_places=3)))
     trace.pick_up()
     trace.touch(*BAR, *BAR)

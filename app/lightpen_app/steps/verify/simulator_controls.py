@@ -9,7 +9,6 @@ from lightpen.simulator.hand import Operator
 from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS
 from lightpen.verification.tasks.length import SIMULATED_LENGTH
 from lightpen.verification.tasks.registry import AnyTask
-from lightpen.verification.tasks.sphere import SIMULATED_RADIUS as SPHERE_RADIUS
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
@@ -58,12 +57,8 @@ class ProbingSimulatorControls(SimulatorControls):
         set_words(
             self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
         )
-        sizes = self.tr(
-            "Simulated artefacts: ring radius {0} mm, bar length {1} mm, sphere "
-            "diameter {2} mm (ball centres)."
-        )
-        found = SIMULATED_RADIUS, SIMULATED_LENGTH, 2 * SPHERE_RADIUS
-        words = sizes.format(*(f"{each:g}" for each in found))
+        sizes = self.tr("Simulated: ring radius {0} mm, bar length {1} mm.")
+        words = sizes.format(f"{SIMULATED_RADIUS:g}", f"{SIMULATED_LENGTH:g}")
         self._sizes.setText(words if self._has_ring else "")
 
     @override

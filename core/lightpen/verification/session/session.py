@@ -326,9 +326,8 @@ def _with_run(setup: SessionSetup, state: SessionState, task: AnyTask) -> Sessio
     runs = (*state.runs, state.touches)
     if len(runs) >= task.n_runs(setup.choices.options_of(task)):
         return _done(setup, state, task, _numbered(runs))
-    if task.is_each_run_measured:
-        options = setup.choices.options_of(task)
-        (task.check or task.measure)(_numbered(runs), setup.conditions, options)
+    options = setup.choices.options_of(task)
+    (task.check or task.measure)(_numbered(runs), setup.conditions, options)
     return replace(without_touches(state), runs=runs)
 
 

@@ -26,7 +26,6 @@ from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.posture import angles_between
 from lightpen.model.quantiles import chi_square_quantile
-from lightpen.verification.tasks.articulation import ALIKE, SAME_POSTURE
 from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
     VerificationAssessment,
@@ -56,6 +55,7 @@ from lightpen.verification.tasks.task import (
 
 MIN_VISITS = 2
 VISIT_POINTS = 3
+SAME_POSTURE = float(np.radians(12.0))  # within which a pen is held alike
 BY_CHANCE = 0.005  # probability that a fixed reference seems to move
 ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
 TOUCH_LONGER = message("drift.touch-longer")
@@ -213,7 +213,7 @@ DRIFT = VerificationTask(
     purpose=message("drift.purpose"),
     first=message("drift.first"),
     another=message("task.lift"),
-    known=ALIKE,
+    known=message("task.lift"),
     limits=("drift",),
     options=DriftOptions,
     measure=measure_drift,

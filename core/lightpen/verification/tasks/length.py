@@ -391,7 +391,7 @@ def _tables(found: Length, conditions: Conditions) -> tuple[ResultTable, ...]:
     scale, worst = found.scale, found.worst
     columns = (
         message("length.measured"),
-        message("plane.certified"),
+        message("table.certified"),
         message("table.error"),
         message("table.uncertainty"),
         message("table.limit"),

@@ -1,19 +1,16 @@
-"""Common parts of the tasks that probe a ring, a sphere or a plate."""
+"""Common parts of the tasks that probe a ring or a length."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
 from lightpen.model.information import symmetric_root
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import (
     Conditions,
     Points,
-    ResultRow,
-    ResultTable,
     Screening,
     Surface,
     TaskProgress,
@@ -85,35 +82,3 @@ def missing_certificate(
     if surface is not Surface.GROOVE and not ball_diameter:
         return message("verification.no-ball")
     return None
-
-
-def residuals_table(
-    title: Message, column: Message, points: Points, residuals: FloatArray
-) -> ResultTable:
-    """Return coordinates of points and their residuals from a surface."""
-    rows = tuple(
-        ResultRow(
-            message("table.point", number=i), [*point.point_cam.tolist(), residual]
-        )
-        for i, (point, residual) in enumerate(
-            zip(points, residuals.tolist(), strict=True), start=1
-        )
-    )
-    return ResultTable(title, (*"uvw", column), rows)
-
-
-def residuals_so_far(
-    title: Message,
-    column: Message,
-    points: Points,
-    residuals_of: Callable[[FloatArray], FloatArray],
-    least: int,
-) -> tuple[ResultTable, ...]:
-    """Return the residuals of all points, once there are at least ``least``."""
-    if len(points) < least:
-        return (ResultTable(title),)
-    try:
-        residuals = residuals_of(np.array([point.point_cam for point in points]))
-    except CalibrationError:  # they do not determine the surface yet
-        return (ResultTable(title),)
-    return (residuals_table(title, column, points, residuals),)

@@ -256,7 +256,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     )
     # Whether the pen slides along a surface in a run, from 0
     scans: Callable[[OptionsT, int], bool] = lambda options, run: False
-    is_each_run_measured: bool = True  # whether a single run gives a result
     # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, OptionsT], object] | None = None
     is_pooled: bool = False  # all images of the command are one run

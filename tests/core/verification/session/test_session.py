@@ -37,7 +37,6 @@ from lightpen.verification.session.session_state import (
     instruction,
     with_drift,
 )
-from lightpen.verification.tasks.articulation import ALIKE, ARTICULATION, OTHER_POSTURE
 from lightpen.verification.tasks.circle import CIRCLE
 from lightpen.verification.tasks.drift import DRIFT, measure_drift
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
@@ -335,55 +334,6 @@ def test_a_task_done_anew_forgets_what_it_found(session: Session) -> None:
 
     assert again.task(session.setup) is FIXED_POINT
     assert again.touches == ()
-
-
-# Five postures of five touches
-
-
-@pytest.fixture
-def postures(session: Session) -> Session:
-    session.choose(ARTICULATION)
-    return session
-
-
-@pytest.mark.slow
-def test_a_posture_ends_with_its_fifth_touch_and_the_last_one_the_task(
-    postures: Session,
-) -> None:
-    for hold in [Hold(tilt=0.0), *leant(4)]:
-        for _ in range(5):
-            postures.touch(hold)
-            postures.see(postures.holder.away())
-
-    assert ARTICULATION.kind in postures.state.found
-    assert found_by(postures.state, ARTICULATION).assessment.is_accepted
-
-
-def test_a_posture_held_before_and_one_that_changes_do_not_count(
-    postures: Session,
-) -> None:
-    upright = Hold(tilt=0.0)
-    postures.touch(upright)
-    postures.see(postures.holder.away())
-    postures.touch(Hold(tilt=0.4))
-    assert postures.state.fault is OTHER_POSTURE
-    assert len(postures.state.touches) == 1
-
-    for _ in range(5):
-        postures.see(postures.holder.away())
-        postures.touch(upright)
-    assert len(postures.state.runs) == 1
-    assert postures.state.fault is ALIKE
-    assert not postures.state.touches
-
-
-def test_a_touch_above_the_cone_does_not_count_in_a_posture(postures: Session) -> None:
-    seated, lifted = Hold(tilt=0.0), Hold((0.0, -0.5, 0.0), tilt=0.0)
-    for hold in (seated, seated, lifted, seated, seated):
-        postures.touch(hold)
-        postures.see(postures.holder.away())
-
-    assert len(postures.state.touches) == 4
 
 
 # A cone that stands still, as witness that the camera does

@@ -8,7 +8,6 @@ import pytest
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import PAPER_CONE
-from lightpen.verification.tasks.articulation import ARTICULATION, ArticulationOptions
 from lightpen.verification.tasks.drift import DRIFT, DriftOptions
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.probed_point import ProbedPoint
@@ -38,21 +37,19 @@ def screened(
     progress = TaskProgress(tuple(points), tuple(map(tuple, runs)))
     if task == "drift":
         return DRIFT.screen(DriftOptions(), Conditions(by), progress)
-    if task == "articulation":
-        return ARTICULATION.screen(ArticulationOptions(), Conditions(by), progress)
     return FIXED_POINT.screen(FixedPointOptions(), Conditions(by), progress)
 
 
-@pytest.mark.parametrize("task", ["drift", "articulation", "fixed point"])
+@pytest.mark.parametrize("task", ["drift", "fixed point"])
 @pytest.mark.parametrize(
     ("off", "degrees", "codes"),
     [
-        (0.199, 0.0, (None, None, None)),
-        (0.201, 0.0, ("session.elsewhere", "session.elsewhere", None)),
-        (4.99, 0.0, ("session.elsewhere", "session.elsewhere", None)),
-        (5.01, 0.0, ("session.elsewhere",) * 3),
-        (0.0, 11.9, (None, None, None)),
-        (0.0, 12.1, ("session.other-than-first", "session.other-posture", None)),
+        (0.199, 0.0, (None, None)),
+        (0.201, 0.0, ("session.elsewhere", None)),
+        (4.99, 0.0, ("session.elsewhere", None)),
+        (5.01, 0.0, ("session.elsewhere",) * 2),
+        (0.0, 11.9, (None, None)),
+        (0.0, 12.1, ("session.other-than-first", None)),
     ],
 )
 def test_a_third_point_is_dropped_elsewhere_or_in_another_posture(
@@ -66,7 +63,7 @@ def test_a_third_point_is_dropped_elsewhere_or_in_another_posture(
     last = placed([0.0, off, 0.0], turn=np.radians(degrees))
     found = screened(task, [placed(ORIGIN), placed(ORIGIN), last], [], instrument)
 
-    code = codes[["drift", "articulation", "fixed point"].index(task)]
+    code = codes[["drift", "fixed point"].index(task)]
     assert (None if found.fault is None else found.fault.code) == code
     assert len(found.kept) == (3 if code is None else 2)
     if code == "session.elsewhere":
@@ -89,11 +86,7 @@ def test_of_two_points_of_a_reference_the_first_may_be_wrong_and_later_the_last(
 
 @pytest.mark.parametrize(("degrees", "is_new"), [(7.9, False), (8.1, True)])
 def test_a_posture_is_another_one_from_eight_degrees_on(
-    instrument: Instrument, placed: Placed, degrees: float, is_new: bool
+    degrees: float, is_new: bool
 ) -> None:
-    now = placed(ORIGIN, turn=np.radians(degrees))
-    found = screened("articulation", [now], [[placed(ORIGIN)]], instrument)
-
-    assert (found.fault is None) == is_new
     turn, _ = FIXED_POINT.newness(FixedPointOptions())
     assert (np.radians(degrees) >= turn) == is_new
