@@ -43,7 +43,6 @@ class _Trials:
     joint: FloatArray
     joint_stated: FloatArray
     two_stage: FloatArray
-    two_stage_stated: FloatArray
     one_step: FloatArray
     weighted: FloatArray
 
@@ -73,8 +72,7 @@ def cramer_rao_rows(workers: Workers) -> list[Row]:
             "cover the truth, x y z",
             f"{numbers(covered, 1)} %",
             f"{low:.0f} to {high:.0f} % each",
-            "two-stage (paper) "
-            f"{numbers(_covered(found.two_stage, found.two_stage_stated), 0)}",
+            "-",
             bool(np.all((covered >= low) & (covered <= high))),
         ),
     ]
@@ -132,7 +130,6 @@ def _calibration(seed: int) -> _Trials:
         joint=error(calibration.joint.tip_pen),
         joint_stated=_deviations(calibration.bundle.independent_noise),
         two_stage=error(calibration.two_stage.tip_pen),
-        two_stage_stated=_deviations(calibration.two_stage_covariance),
         one_step=error(one_step(poses, weighted=False).tip_pen),
         weighted=error(one_step(poses, weighted=True).tip_pen),
     )

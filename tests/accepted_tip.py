@@ -83,7 +83,7 @@ def accept_tip(
             grade=grade,
             record=data / "records" / "swing",
             images=(),
-            calibration=calibration_record(found, inputs, "joint", preparation.limits),
+            calibration=calibration_record(found, inputs, preparation.limits),
             origin=origin,
         )
     )

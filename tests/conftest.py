@@ -470,7 +470,7 @@ def stated() -> dict[str, Any]:
     file = InputFile(Path("folder/file.csv"), 64 * "0")
     inputs = Inputs(file, file, (file,), pen.nominal_tip, origin=Origin.RECORDED)
     limits = SwingLimits(max_uncertainty=0.05, min_images=12)
-    return entries_of(calibration_record(calibration, inputs, "joint", limits))
+    return entries_of(calibration_record(calibration, inputs, limits))
 
 
 @pytest.fixture(scope="session")

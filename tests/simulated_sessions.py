@@ -152,7 +152,7 @@ def recorded(found: Calibration, file: Path, created: datetime) -> CalibrationFi
     """Return a calibration as it is read back from its record."""
     nothing = InputFile(Path("leds.csv"), "0" * 64)
     inputs = Inputs(nothing, nothing, (), None)
-    record = calibration_record(found, inputs, "joint", SwingLimits())
+    record = calibration_record(found, inputs, SwingLimits())
     file.write_bytes(record_bytes(structs.replace(record, created=created)))
     return read_calibration(file)
 

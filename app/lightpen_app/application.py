@@ -335,4 +335,4 @@ def _print_tip(run: SwingRun) -> None:
 
         nominal = status.solution.source.pen.nominal_tip
         calibration = status.solution.calibration
-        print("\n" + calibration_text(calibration, "joint", nominal, status.verdict))
+        print("\n" + calibration_text(calibration, nominal, status.verdict))

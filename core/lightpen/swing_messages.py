@@ -35,6 +35,7 @@ class Code(StrEnum):
     NOT_UPRIGHT = "verdict.not-upright"
     UNKNOWN = "verdict.unknown"
     UNCERTAIN = "verdict.uncertain"
+    TWO_STAGE_OFF = "verdict.two-stage-off"
     HALVES_DIFFER = "verdict.halves-differ"
     MANY_DROPPED = "verdict.many-dropped"
     MANY_EXCLUDED = "verdict.many-excluded"

@@ -9,6 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.sources import source_named
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.limits import SwingLimits
+from lightpen.model.method import Method
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SecondCamera, SourceChoice
 from lightpen.swing.preparation import Preparation
@@ -56,6 +57,7 @@ class Station:
     files: FilePaths = field(default_factory=FilePaths)
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
+    method: Method = "joint"  # of the reported tip
     verification: VerificationChoices = field(default_factory=VerificationChoices)
     heading: float | None = None  # the operator's right as the camera sees it, rad
     temperature_day: str = ""  # see `Preparation`
@@ -80,6 +82,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         mask=_mask(camera),
         limits=station.limits,
         assumptions=station.assumptions,
+        method=station.method,
         heading=station.heading,
         temperature_day=station.temperature_day,
     )
@@ -107,6 +110,7 @@ def station_of(
         ),
         limits=preparation.limits,
         assumptions=preparation.assumptions,
+        method=preparation.method,
         verification=choices,
         heading=preparation.heading,
         temperature_day=preparation.temperature_day,

@@ -32,6 +32,7 @@ MESSAGES = {
     "verdict.too-few-images": "Images captured: {n_kept} of {needed} (minimum).",
     "verdict.too-little-tilt": "Not enough tilt {sides}. Tilt the pen further. Images needed: about {n_images}.",
     "verdict.not-upright": "Hold the pen upright. Images needed: {n_images}.",
+    "verdict.two-stage-off": "U (k = 2) of the two-stage tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm: it is {distance:.4f} mm off the joint fit, {bias:.4f} mm by the projection of the discs. Report the joint fit.",
     "verdict.uncertain": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm. Capture more images in other postures.",
     "swing.out-of-reach": "With this LED file the lowest achievable U (k = 2) is {floor:.1f} µm; the limit is {limit:.1f} µm. Only the images needed for the postures are captured.",
     "verdict.file-uncertain": "U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm; {share:.4f} mm due to {advice}. More images hardly help.",

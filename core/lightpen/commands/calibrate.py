@@ -34,9 +34,8 @@ from lightpen.detection.observations import (
 from lightpen.detection.rig_observations import observe_rig_centers, observe_rig_images
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
-from lightpen.estimation.reports.methods import Method
 from lightpen.estimation.reports.report import calibration_record
-from lightpen.estimation.reports.summary import calibration_text
+from lightpen.estimation.reports.summary import calibration_text, convergence_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
@@ -83,7 +82,6 @@ class _Calibrated:
     limits: SwingLimits
     origin: Origin | None
     inputs: Callable[[], Inputs]
-    method: Method
 
 
 @printing
@@ -102,19 +100,17 @@ def _calibrate(options: argparse.Namespace) -> None:
     else:
         calibrated = _from_observations(options)
     calibration = calibrated.calibration
+    if options.method is not None:
+        calibration = replace(calibration, method=options.method)
     verdict = judge(calibration, calibrated.limits)
     text = calibration_text(
-        calibration,
-        calibrated.method,
-        calibrated.nominal_tip,
-        verdict,
-        calibrated.origin,
+        calibration, calibrated.nominal_tip, verdict, calibrated.origin
     )
     print(shown(text))
+    if options.verbose:
+        print(f"\n{convergence_text(calibration.two_stage)}")
     if options.json is not None:
-        record = calibration_record(
-            calibration, calibrated.inputs(), calibrated.method, calibrated.limits
-        )
+        record = calibration_record(calibration, calibrated.inputs(), calibrated.limits)
         write_record(options.json, record)
 
 
@@ -127,7 +123,6 @@ def _from_json(options: argparse.Namespace) -> _Calibrated:
         found.limits,
         found.inputs.origin,
         lambda: found.inputs,
-        found.method,
     )
 
 
@@ -164,7 +159,6 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         recorded_limits(record),
         solution.source.origin,
         lambda: record_inputs(solution.source),
-        options.method,
     )
 
 
@@ -241,7 +235,6 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
             units=options.units,
             led_diameter=options.led_diameter,
         ),
-        options.method,
     )
 
 
@@ -317,7 +310,6 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
             units=options.units,
             led_diameter=options.led_diameter,
         ),
-        options.method,
     )
 
 

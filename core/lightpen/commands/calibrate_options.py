@@ -14,8 +14,8 @@ from lightpen.commands.arguments import (
 )
 from lightpen.errors import UsageError
 from lightpen.estimation.bundle.priors import ConeSeparation
-from lightpen.estimation.reports.methods import METHODS
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
+from lightpen.model.method import METHODS
 
 SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
 
@@ -114,8 +114,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--method",
         choices=METHODS,
-        default="joint",
-        help="estimator of the reported tip (joint)",
+        help="estimator of the reported tip (joint; of a record, its own)",
     )
     parser.add_argument(
         "--nominal-tip",

@@ -54,7 +54,7 @@ from lightpen.estimation.contact.single_images import (
 from lightpen.estimation.pivot.two_stage import (
     TwoStageFit,
     fit_two_stage,
-    propagated_covariance,
+    projection_bias,
 )
 from lightpen.estimation.rigs.initial_extrinsics import find_initial_extrinsics
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
@@ -77,6 +77,7 @@ from lightpen.estimation.uncertainty.second_cone import (
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
+from lightpen.model.method import Method
 from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import Rig, of_camera, rig_of
 
@@ -129,8 +130,8 @@ class Calibration:
     shares_images: bool
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit  # the paper's method on the same images, of the first camera
-    # (6, 6), of its (tip, cone) by the covariances of the poses, mm^2.
-    two_stage_covariance: FloatArray
+    # (6,), error of its (tip, cone) as it takes projected discs for points, mm.
+    projection_bias: FloatArray
     budget: Budget
     # Cameras and pen as adjusted, for measurements with this tip.
     instrument: Instrument
@@ -139,6 +140,7 @@ class Calibration:
     coverage: Coverage
     lags: tuple[TimeLag | None, ...] = ()  # of each camera of a rig but the first
     second: SecondCone | None = None
+    method: Method = "joint"  # of the reported tip
 
     @property
     def observations(self) -> Observations:
@@ -453,8 +455,10 @@ def _calibration_of(
         shares_images=inputs.shares_images,
         contradictions=adjustment.contradictions,
         two_stage=two_stage,
-        two_stage_covariance=propagated_covariance(
-            paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
+        projection_bias=projection_bias(
+            *(state.rig.cameras[0], state.pen),
+            *(paper_poses.rotations, paper_poses.translations),
+            np.isfinite(paper_poses.residuals[..., 0]),
         ),
         budget=budget,
         instrument=adjusted_instrument(adjustment, budget),

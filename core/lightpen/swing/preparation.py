@@ -15,6 +15,7 @@ from lightpen.local_time import local_now
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.method import Method
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.library.tip_library import ListedTip
@@ -67,6 +68,7 @@ class Preparation:
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
+    method: Method = "joint"  # of the reported tip
     has_unsaved_leds: bool = False  # edited or opened ones, not of the file in use
     second: SecondCamera | None = None  # None for a single camera
     heading: float | None = None  # operator's right in the image, rad, once learnt
@@ -332,6 +334,7 @@ class Preparation:
             and self.names == other.names
             and self.limits == other.limits
             and self.assumptions_today == other.assumptions_today
+            and self.method == other.method
             and _same(self.nominal_tip, other.nominal_tip)
             and np.array_equal(self.mask, other.mask)
             and self._has_second_of(other)

@@ -57,6 +57,7 @@ def record_header(
             "min_per_field": limits.min_per_field,
             "spacing_rad": limits.spacing,
             "requires_temperature": limits.requires_temperature,
+            "method": preparation.method,
             **assumption_entries(preparation.assumptions_today),
             **(settings or {}),
         },

@@ -18,6 +18,7 @@ from lightpen.errors import AcceptanceError, LightpenError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.json_records import Plain
 from lightpen.messages import Message, message
+from lightpen.model.method import Method
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.acceptance import accept
 from lightpen.record.results.assessment import SwingAssessment, assess
@@ -31,7 +32,12 @@ from lightpen.record.swings.reading import (
     recorded_names,
     recorded_origin,
 )
-from lightpen.record.swings.solving import Solution, solve_again, solve_record
+from lightpen.record.swings.solving import (
+    Solution,
+    report_by,
+    solve_again,
+    solve_record,
+)
 from lightpen.record.swings.writing import (
     RecordWriter,
     make_record_folder,
@@ -454,6 +460,17 @@ class SwingWorkflow:
         """Include images again and compute the tip again."""
         back = set(numbers)
         self._want({n: why for n, why in self._wanted.items() if n not in back})
+
+    def report_by(self, method: Method) -> None:
+        """Report the tip of a solution that is not accepted by another method."""
+        status, record = self._status, self._record
+        if status.solution is None or record is None or self._task.is_there:
+            return
+        if status.result is not None or status.solution.source.method == method:
+            return
+        solution = report_by(status.solution, method)
+        assessment = assess(self._archive, record, solution)
+        self._publish(replace(status, solution=solution, assessment=assessment))
 
     def _want(self, excluded: Mapping[int, str]) -> None:
         """Solve without these images, now or after the present computation."""

@@ -58,12 +58,12 @@ def test_u_covers_the_error_of_the_tip(name: str, calibrated: Calibrated) -> Non
 
 
 def recorded(calibration: Calibration) -> dict[str, Any]:
-    return entries_of(calibration_record(calibration, INPUTS, "joint", LIMITS))
+    return entries_of(calibration_record(calibration, INPUTS, LIMITS))
 
 
 def text_of(calibration: Calibration) -> str:
     verdict = judge(calibration, LIMITS)
-    return calibration_text(calibration, "joint", INPUTS.nominal_tip, verdict)
+    return calibration_text(calibration, INPUTS.nominal_tip, verdict)
 
 
 def test_record_and_text_have_the_lamps_that_were_followed(

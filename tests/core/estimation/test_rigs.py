@@ -124,7 +124,7 @@ def test_three_cameras_give_one_tip() -> None:
 
     np.testing.assert_allclose(result.joint.tip_pen, swing.tip_pen, atol=1e-5)
     inputs = Inputs(FILE, FILE, (FILE,), None, RigInputs(FILE, (FILE, FILE, FILE)))
-    record = calibration_record(result, inputs, "joint", SwingLimits())
+    record = calibration_record(result, inputs, SwingLimits())
     first, *others = entries_of(record)["rig"]["cameras"]
     assert "change_from_file" not in first["cam_from_rig"]
     changes = [each["cam_from_rig"]["change_from_file"] for each in others]
@@ -417,8 +417,8 @@ def test_a_camera_that_sees_no_pen_is_named() -> None:
 def test_text_and_record_tell_of_each_camera(good: Calibration) -> None:
     inputs = Inputs(FILE, FILE, (FILE,), None, RigInputs(FILE, (FILE, FILE)))
     limits = SwingLimits()
-    record = entries_of(calibration_record(good, inputs, "joint", limits))
-    text = calibration_text(good, "joint", None, judge(good, limits))
+    record = entries_of(calibration_record(good, inputs, limits))
+    text = calibration_text(good, None, judge(good, limits))
 
     left, right = record["rig"]["cameras"]
     assert (left["name"], right["name"]) == RIG.names

@@ -41,7 +41,7 @@ def folder(swung: Callable[..., Path], tmp_path: Path) -> Path:
 
 def without_time(solution: Solution) -> dict[str, Any]:
     inputs = record_inputs(solution.source)
-    record = calibration_record(solution.calibration, inputs, "joint", SwingLimits())
+    record = calibration_record(solution.calibration, inputs, SwingLimits())
     found = entries_of(record)
     found.pop("created")
     return found

@@ -160,7 +160,7 @@ def test_the_record_gives_the_same_tip_to_the_last_digit(wizard: Wizard) -> None
         *(InputFile(Path("a"), ""), InputFile(Path("b"), "")), (), nominal_tip=None
     )
     records = [
-        entries_of(calibration_record(one, inputs, "joint", SwingLimits()))
+        entries_of(calibration_record(one, inputs, SwingLimits()))
         for one in (first, again)
     ]
     for record in records:

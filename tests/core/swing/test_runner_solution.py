@@ -49,7 +49,7 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
     solution = solved.solution
     inputs = record_inputs(solution.source)
     limits = recorded_limits(open_record(solved.record_folder))
-    record = calibration_record(solution.calibration, inputs, "joint", limits)
+    record = calibration_record(solution.calibration, inputs, limits)
     fields = entries_of(record)
     fields.pop("created")
 

@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 from lightpen.archive.logbook.result_entry import with_entry
+from lightpen.estimation.reports.methods import reported
 from lightpen.local_time import local_now
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import read_calibration
@@ -72,7 +73,7 @@ class ResultExport(QObject):
     def _copy_tip(self) -> None:
         status = self._run.status
         if status.solution is not None:
-            tip = status.solution.calibration.joint.tip_pen
+            tip = reported(status.solution.calibration).tip_pen
             line = copied_tip(tip, status.origin)
             QApplication.clipboard().setText(line)
             self.message_sent.emit(self.tr("Tip copied: x, y, z in mm."))

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.self_check import SelfCheck
+from lightpen.estimation.reports.methods import reported
 from lightpen.estimation.reports.verdict import halves_agree
 from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
@@ -42,12 +43,12 @@ class ReviewedResult:
     @property
     def tip_pen(self) -> FloatArray:
         """The tip, pen frame, (3,), mm."""
-        return self.solution.calibration.joint.tip_pen
+        return reported(self.solution.calibration).tip_pen
 
     @property
     def uncertainty(self) -> FloatArray:
         """U (k = 2) along x, y and z, (3,), mm."""
-        return self.solution.calibration.budget.expanded_uncertainty[:3]
+        return reported(self.solution.calibration).expanded_uncertainty[:3]
 
 
 class ResultPanel(Translated, QFrame):

@@ -16,6 +16,7 @@ from lightpen.archive.chains.entries import (
     this_program,
 )
 from lightpen.errors import FileError
+from lightpen.estimation.reports.methods import reported
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import LARGEST_RECORD, read_bytes
@@ -143,17 +144,16 @@ def event_of_refused(
     record, calibration = open_record(solution.source.folder), solution.calibration
     has_passed = assessment.verdict.grade is Grade.PASS
     kind = Kind.ABANDONED if has_passed else Kind.REFUSED
+    found = reported(calibration)
     event = replace(
         _event_of_swing(results, record, kind, at),
         grade=assessment.verdict.grade.value,
         why=StoredMessage.of(assessment.verdict.reason),
-        tip_pen_mm=tuple(calibration.joint.tip_pen.tolist()),
-        expanded_uncertainty_mm=tuple(
-            calibration.budget.expanded_uncertainty[:3].tolist()
-        ),
+        tip_pen_mm=tuple(found.tip_pen.tolist()),
+        expanded_uncertainty_mm=tuple(found.expanded_uncertainty[:3].tolist()),
     )
     inputs, limits = record_inputs(solution.source), assessment.limits
-    written = calibration_record(calibration, inputs, "joint", limits)
+    written = calibration_record(calibration, inputs, limits)
     text = json_bytes(written).decode()
     return ExtractedEvent(replace(event, record_sha256=text_sha256(text)), text)
 

@@ -1,7 +1,7 @@
 """The paper's second stage: tip and cone from poses by the general inverse method.
 
-Kept exactly as published, with its convergence record, as the reference that every
-result is shown against. The residual of image i is the distance
+Kept exactly as published, with its convergence record. The residual of image i is the
+distance
 
     f_i = |R_i x0 + T_i - u0|                                              (3)
 
@@ -18,10 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.pose import CameraReprojection
+from lightpen.detection.robust_residuals import normal_equations
 from lightpen.errors import CalibrationError
-from lightpen.estimation.pivot.pivot import contact_matrix, tip_covariances
+from lightpen.estimation.pivot.pivot import contact_matrix
+from lightpen.model.camera import Camera
 from lightpen.model.coverage import require_spread
+from lightpen.model.pen import Pen
 
 N_START = 6  # images of the linear start
 STEP_TOLERANCE = 1e-9  # mm, of |alpha dX|
@@ -104,17 +108,31 @@ def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.lstsq(normal, right)[0])
 
 
-def propagated_covariance(
-    rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
+def projection_bias(
+    camera: Camera,
+    pen: Pen,
+    rotations: FloatArray,
+    translations: FloatArray,
+    seen: BoolArray,
 ) -> FloatArray:
-    """Return the covariance of (tip_pen, cone_cam), given that of poses, (6, 6), mm^2.
+    """Return the error of tip and cone by equation (5), (6,), mm.
 
-    Arguments as of `lightpen.estimation.pivot.pivot.tip_covariances`.
+    The equation takes the centre of an LED's image for the image of its centre. To
+    first order, at the poses cam_from_pen, mm, of images with the LEDs ``seen`` (N, L).
     """
+    nowhere = np.where(seen[..., None], 0.0, np.nan)
+    discs, centres = (
+        CameraReprojection(camera, pen.leds, pen.normals, radius, nowhere)
+        for radius in (pen.diameter / 2, 0.0)
+    )
+    modelled, J = centres.residuals_with_jacobian(rotations, translations)
+    offsets = modelled - discs.residuals_with_jacobian(rotations, translations)[0]
+    H, g = normal_equations(J, offsets, seen.astype(float))
+    step = np.linalg.solve(H, g[..., None])[..., 0]
     M = contact_matrix(rotations)
-    inverse = np.linalg.inv(np.einsum("nki,nkj->ij", M, M))
-    each = np.swapaxes(M, 1, 2) @ tip_covariances(rotations, covariances, tip_pen) @ M
-    return np.asarray(inverse @ each.sum(axis=0) @ inverse)
+    tip = np.linalg.lstsq(M.reshape(-1, 6), -translations.ravel())[0][:3]
+    moved = np.cross(step[:, :3], rotations @ tip) + step[:, 3:]
+    return np.asarray(np.linalg.lstsq(M.reshape(-1, 6), -moved.ravel())[0])
 
 
 def _linear_start(M: FloatArray, translations: FloatArray) -> FloatArray:

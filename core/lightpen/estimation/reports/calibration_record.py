@@ -13,13 +13,13 @@ from msgspec import UNSET, Meta, Struct, UnsetType
 
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.bundle.effects import EffectName
-from lightpen.estimation.reports.methods import Method
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.json_records import FileRecord, ProgramName
 from lightpen.formats.own_json import Length, Vector, ZonedTime
 from lightpen.formats.stored_messages import StoredMessage, StoredValue
 from lightpen.model.assumptions import Assumptions
+from lightpen.model.method import Method
 from lightpen.model.origin import Origin
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]
@@ -56,7 +56,15 @@ class Convergence(Struct, frozen=True):
 
 
 class MethodRecord(Struct, frozen=True, omit_defaults=True):
-    """Tip and cone by one of the estimators."""
+    """Tip and cone by one of the estimators.
+
+    Attributes
+    ----------
+    off_joint_mm
+        Tip of the two-stage method less that of the joint fit, a part of its U.
+    projection_bias_mm
+        The part of it by projected discs that are taken for points.
+    """
 
     tip_pen_mm: Triple
     cone_cam_mm: Triple
@@ -64,6 +72,8 @@ class MethodRecord(Struct, frozen=True, omit_defaults=True):
     expanded_uncertainty_mm: Triple
     rms_mm: Number
     convergence: Convergence | None = None
+    off_joint_mm: Triple | None = None
+    projection_bias_mm: Triple | None = None
 
 
 class VerdictLimits(Struct, frozen=True, omit_defaults=True):
@@ -435,8 +445,8 @@ class SecondConeRecord(Struct, frozen=True, omit_defaults=True):
 class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Calibration of the probe tip of a light pen.
 
-    Lengths are in mm, image points in px. Residuals, verdict, uncertainty, weakest
-    direction and LEDs are those of the joint estimator, whichever method gives the tip.
+    Lengths are in mm, image points in px. Verdict and weakest direction are those of
+    the reported tip; residuals, budget and LEDs those of the joint estimator.
     The file ends with one entry more, its checksum.
 
     Attributes

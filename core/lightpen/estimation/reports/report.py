@@ -39,7 +39,11 @@ from lightpen.estimation.reports.calibration_record import (
     VerdictLimits,
     VerdictRecord,
 )
-from lightpen.estimation.reports.methods import METHODS, Method, result_of
+from lightpen.estimation.reports.methods import (
+    reported,
+    result_of,
+    two_stage_difference,
+)
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.budget import ContributionName
@@ -53,22 +57,22 @@ from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import SwingLimits
+from lightpen.model.method import METHODS, Method
 
 
 def calibration_record(
-    calibration: Calibration, inputs: Inputs, method: Method, limits: SwingLimits
+    calibration: Calibration, inputs: Inputs, limits: SwingLimits
 ) -> CalibrationRecord:
-    """Return the record of a calibration, with the tip by one of the methods."""
-    result = result_of(calibration, method)
+    """Return the record of a calibration, with the tip by its method."""
+    result = reported(calibration)
     tip, nominal = result.tip_pen, inputs.nominal_tip
-    budget = calibration.budget
     several = len(calibration.cameras) > 1
     frames, check = calibration.tip_frames, calibration.self_check
     return CalibrationRecord(
         program=THIS_PROGRAM,
         created=local_now().replace(microsecond=0),
         origin=inputs.origin,
-        method=method,
+        method=calibration.method,
         tip_pen_mm=plain(tip),
         cone_cam_mm=plain(result.cone_cam),
         covariance=plain(result.covariance),
@@ -95,8 +99,8 @@ def calibration_record(
         second_cone=_second_cone(calibration.second),
         instrument=_instrument(calibration.instrument),
         weakest_direction=DirectionRecord(
-            vector_pen=plain(budget.weakest_direction),
-            expanded_uncertainty_mm=plain(budget.weakest_uncertainty),
+            vector_pen=plain(result.weakest_direction),
+            expanded_uncertainty_mm=plain(result.weakest_uncertainty),
         ),
         coverage=_coverage(calibration),
         leds=_leds(calibration),
@@ -140,8 +144,9 @@ def _verdict(calibration: Calibration, limits: SwingLimits) -> VerdictRecord:
     )
 
 
-def _method(calibration: Calibration, name: str) -> MethodRecord:
+def _method(calibration: Calibration, name: Method) -> MethodRecord:
     result, two_stage = result_of(calibration, name), calibration.two_stage
+    is_paper = name == "two-stage"
     steps = Convergence(
         x_mm=plain(two_stage.iterates),
         objective_mm2=plain(two_stage.objectives),
@@ -154,7 +159,9 @@ def _method(calibration: Calibration, name: str) -> MethodRecord:
         covariance=plain(result.covariance),
         expanded_uncertainty_mm=plain(result.expanded_uncertainty[:3]),
         rms_mm=plain(result.rms_mm),
-        convergence=steps if name == "two-stage" else None,
+        convergence=steps if is_paper else None,
+        off_joint_mm=plain(two_stage_difference(calibration)[:3]) if is_paper else None,
+        projection_bias_mm=plain(calibration.projection_bias[:3]) if is_paper else None,
     )
 
 

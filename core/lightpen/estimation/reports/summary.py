@@ -5,11 +5,17 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, CameraImages
+from lightpen.estimation.pivot.two_stage import TwoStageFit
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
-from lightpen.estimation.reports.methods import METHODS, Method, MethodResult, result_of
+from lightpen.estimation.reports.methods import (
+    MethodResult,
+    result_of,
+    two_stage_difference,
+)
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import Verdict
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.method import METHODS
 from lightpen.model.origin import Origin
 
 MAX_NAMED = 5  # images
@@ -18,21 +24,21 @@ WIDTH = 10  # characters of a camera's name
 
 def calibration_text(
     calibration: Calibration,
-    method: Method,
     nominal_tip: FloatArray | None,
     verdict: Verdict,
     origin: Origin | None = None,
 ) -> str:
     """Return a calibration as text for the screen, the verdict on it last."""
     results = {name: result_of(calibration, name) for name in METHODS}
+    method = calibration.method
     chosen = results[method]
     lines = [_heading("Tip in the pen frame, mm", "xyz")]
     for name in (method, *(other for other in METHODS if other != method)):
         lines.append(_numbers(name, results[name].tip_pen))
-        part = ", of image noise" if name == "two-stage" else ""
-        lines.append(
-            _numbers(f"  U (k = 2){part}", results[name].expanded_uncertainty[:3])
-        )
+        lines.append(_numbers("  U (k = 2)", results[name].expanded_uncertainty[:3]))
+    off = two_stage_difference(calibration)[:3]
+    lines.append(_numbers("two-stage - joint", off))
+    lines.append(_numbers("  by projected discs", calibration.projection_bias[:3]))
     if nominal_tip is not None:
         lines.append(_numbers("nominal", nominal_tip))
         lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
@@ -57,6 +63,22 @@ def calibration_text(
         f"Verdict      {verdict.grade.upper()}: {verdict.reason}",
         f"             {verdict.next_step.message}",
     ]
+    return "\n".join(lines)
+
+
+def convergence_text(fit: TwoStageFit) -> str:
+    """Return the iterations of the paper's equation (11) as a table."""
+    names = ("x0", "y0", "z0", "u0", "v0", "w0")
+    title = "".join(f"{name + ' / mm':>13}" for name in names)
+    lines = [
+        "Two-stage method, equations (9) to (12) of the paper",
+        f"{'k':>3}{title}{'alpha':>10}{'|alpha dX|':>12}{'objective':>13}",
+    ]
+    steps = zip((np.nan, *fit.step_lengths), (np.nan, *fit.increments), strict=True)
+    for k, (alpha, increment) in enumerate(steps):
+        X = "".join(f"{value:13.6f}" for value in fit.iterates[k])
+        step = f"{'':22}" if k == 0 else f"{alpha:10.4f}{increment:12.2e}"
+        lines.append(f"{k:3}{X}{step}{fit.objectives[k]:13.6g}")
     return "\n".join(lines)
 
 
@@ -114,8 +136,8 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
     lines = [
         f"Residuals    {joint.rms:.4f} px rms, tip of single images "
         f"{chosen.rms_mm:.4f} mm rms",
-        f"Weakest      {_direction(budget.weakest_direction)}, "
-        f"U = {budget.weakest_uncertainty:.4f} mm",
+        f"Weakest      {_direction(chosen.weakest_direction)}, "
+        f"U = {chosen.weakest_uncertainty:.4f} mm",
         _numbers("Odd - even images", halves.difference),
         _numbers("  U (k = 2)", halves.expanded_uncertainty),
     ]

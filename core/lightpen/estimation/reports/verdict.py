@@ -11,6 +11,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.led_quality import DISPLACED
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.estimation.reports.methods import reported, two_stage_difference
 from lightpen.estimation.reports.report_warnings import late_cameras
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
@@ -20,6 +21,7 @@ from lightpen.estimation.uncertainty.budget import (
 )
 from lightpen.messages import Message, message
 from lightpen.model.coverage import dial_counts
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import SwingLimits
 from lightpen.swing_messages import (
     NO_TEMPERATURE,
@@ -52,6 +54,7 @@ class NextStep(StrEnum):
     ACCEPT = "accept"
     CAPTURE_MORE = "capture more"
     REPEAT = "repeat"
+    REPORT_JOINT = "report joint fit"
     CHECK_FILES = "check files"
     CHECK_CAMERA = "check camera file"
     CHECK_LEDS = "check LED file"
@@ -70,6 +73,7 @@ _TOLD = {
     NextStep.ACCEPT: message("next-step.accept"),
     NextStep.CAPTURE_MORE: message("next-step.capture-more"),
     NextStep.REPEAT: message("next-step.repeat"),
+    NextStep.REPORT_JOINT: message("next-step.report-joint"),
     NextStep.CHECK_FILES: message("next-step.check-files"),
     NextStep.CHECK_CAMERA: message("next-step.check-camera"),
     NextStep.CHECK_LEDS: message("next-step.check-leds"),
@@ -127,6 +131,7 @@ _BY_CAUSE = {
 _NEXT_STEPS = {
     Code.GOOD: NextStep.ACCEPT,
     Code.UNCERTAIN: NextStep.CAPTURE_MORE,
+    Code.TWO_STAGE_OFF: NextStep.REPORT_JOINT,
     Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
     Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
     Code.HALVES_DIFFER: NextStep.REPEAT,
@@ -242,12 +247,12 @@ def halves_agree(halves: SplitHalfCheck) -> bool:
 
 
 def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
-    """Judge a calibration by the uncertainty of its tip and by its residuals.
+    """Judge a calibration by U of the reported tip and by its residuals.
 
     Only images that show the pen count, copies once. What else there is depends on how
     long a camera ran before and after, and a swing that is captured does not keep it.
     """
-    uncertainty = calibration.budget.weakest_uncertainty
+    uncertainty = reported(calibration).weakest_uncertainty
     if uncertainty > FAR_OFF * limits.max_uncertainty:
         return Verdict(Grade.REPEAT, _why_uncertain(calibration, limits))
     for finding in _findings(calibration, limits):
@@ -257,12 +262,21 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
 
 def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
     """Return what makes U large: too few images, or a contribution that stays."""
-    budget = calibration.budget
+    budget, limit = calibration.budget, limits.max_uncertainty
+    uncertainty = reported(calibration).weakest_uncertainty
+    off = float(np.linalg.norm(two_stage_difference(calibration)[:3]))
+    if calibration.method == "two-stage" and COVERAGE_FACTOR * off > limit:
+        return message(
+            Code.TWO_STAGE_OFF,
+            uncertainty=uncertainty,
+            limit=limit,
+            distance=off,
+            bias=float(np.linalg.norm(calibration.projection_bias[:3])),
+        )
     largest = budget.largest_share
     is_same_in_more = (
         largest.name is ContributionName.CENTERS and calibration.used.sum() >= POSTURES
     )
-    uncertainty, limit = budget.weakest_uncertainty, limits.max_uncertainty
     if largest.name in IMAGES_SHRINK and not is_same_in_more:
         return message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
     share, sigma = budget.weakest_share(largest), calibration.led_sigma
@@ -306,7 +320,7 @@ def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message
         if 2 * n_excluded > n_dropped:
             yield message(Code.MANY_EXCLUDED, n_excluded=n_excluded)
         yield message(Code.MANY_DROPPED, n_dropped=n_dropped, n_images=n_images)
-    if calibration.budget.weakest_uncertainty > limit:
+    if reported(calibration).weakest_uncertainty > limit:
         yield _why_uncertain(calibration, limits)
     if limits.requires_temperature and calibration.assumptions.temperature_c is None:
         yield NO_TEMPERATURE

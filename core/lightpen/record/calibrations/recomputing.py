@@ -24,7 +24,6 @@ from lightpen.estimation.reports.calibration_record import (
     CalibrationRecord,
     FrameRecord,
 )
-from lightpen.estimation.reports.methods import Method
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import InputFile, Inputs, RigInputs
@@ -47,11 +46,10 @@ from lightpen.record.calibrations.calibrations import (
 
 @dataclass(frozen=True, eq=False)
 class Recomputed:
-    """A calibration computed again, with the estimator of the recorded tip."""
+    """A calibration computed again; it reports by the method of the recorded tip."""
 
     calibration: Calibration
     inputs: Inputs
-    method: Method
     limits: SwingLimits
 
 
@@ -86,7 +84,10 @@ def recompute(path: Path) -> Recomputed:
     seen = [_of_camera(path, record, c, rig, pen) for c in range(rig.n_cameras)]
     second = _second_swing(path, record, rig, pen)
     return Recomputed(
-        calibrate_rig(rig, pen, seen, record.assumptions, second),
+        replace(
+            calibrate_rig(rig, pen, seen, record.assumptions, second),
+            method=record.method,
+        ),
         Inputs(
             kept_cameras[0],
             kept_pen,
@@ -97,7 +98,6 @@ def recompute(path: Path) -> Recomputed:
             units=found.units,
             led_diameter=found.led_diameter_mm,
         ),
-        record.method,
         SwingLimits(
             max_uncertainty=limits.max_uncertainty_mm,
             min_images=limits.min_images,

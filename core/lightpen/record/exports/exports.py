@@ -47,7 +47,7 @@ def exported_solution(solution: Solution, names: Names) -> CalibrationFile:
     """Return a solved, not yet accepted swing for export."""
     limits = recorded_limits(open_record(solution.source.folder))
     inputs = record_inputs(solution.source)
-    record = calibration_record(solution.calibration, inputs, "joint", limits)
+    record = calibration_record(solution.calibration, inputs, limits)
     data = record_bytes(record)
     file = parse_calibration(data, Path("calibration.json"))
     return replace(file, names=names)

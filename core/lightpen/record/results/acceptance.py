@@ -166,10 +166,7 @@ def _result(
         record=record.folder,
         images=_images_of(record),
         calibration=calibration_record(
-            solution.calibration,
-            record_inputs(solution.source),
-            "joint",
-            assessment.limits,
+            solution.calibration, record_inputs(solution.source), assessment.limits
         ),
         origin=recorded_origin(record),
         reason=reason,

@@ -8,6 +8,7 @@ from itertools import chain
 import numpy as np
 
 from lightpen.errors import AcceptanceError, FileError
+from lightpen.estimation.reports.methods import reported
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import (
     Change,
@@ -68,15 +69,15 @@ def assess(
         last = archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
     except (FileError, AcceptanceError) as error:
         unknown = error.message
-    verdict = judge(solution.calibration, limits)
+    verdict, found = judge(solution.calibration, limits), reported(solution.calibration)
     if unknown is not None:
         verdict = judge_unknown(verdict, unknown)
     change, doubt = None, None
     if last is not None:
         date = f"{local_time(last.accepted):%Y-%m-%d}"
         change = change_since(
-            solution.calibration.joint.tip_pen,
-            solution.calibration.budget.expanded_uncertainty[:3],
+            found.tip_pen,
+            found.expanded_uncertainty[:3],
             last.tip_pen,
             last.uncertainty,
         )
@@ -124,7 +125,7 @@ def overdue_items(library: Library, names: Names, day: date) -> Iterator[Message
 
 def _far_from_nominal(solution: Solution) -> list[Message]:
     nominal = solution.source.pen.nominal_tip
-    distance = distance_from_nominal(solution.calibration.joint.tip_pen, nominal)
+    distance = distance_from_nominal(reported(solution.calibration).tip_pen, nominal)
     if distance is None:
         return []
     return [message("doubt.far-from-nominal", distance=distance)]

@@ -1,10 +1,11 @@
-"""Assumptions of a station in the settings of a record."""
+"""Assumptions and method of a station in the settings of a record."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
 
 from lightpen.formats.json_records import Plain
 from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.method import Method
 
 PREFIX = "assumed_"
 
@@ -25,3 +26,8 @@ def recorded_assumptions(settings: Mapping[str, Plain]) -> Assumptions:
         if isinstance(value, int | float):
             values[name] = float(value)
     return Assumptions(**values)
+
+
+def recorded_method(settings: Mapping[str, Plain]) -> Method:
+    """Return the method of the reported tip among settings."""
+    return "two-stage" if settings.get("method") == "two-stage" else "joint"

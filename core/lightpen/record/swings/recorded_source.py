@@ -17,10 +17,11 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
+from lightpen.model.method import Method
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
-from lightpen.record.swings.assumed import recorded_assumptions
+from lightpen.record.swings.assumed import recorded_assumptions, recorded_method
 from lightpen.record.swings.header import (
     CAMERA_STEM,
     PEN_STEM,
@@ -43,6 +44,7 @@ class RecordSource:
     camera_files: tuple[Path, ...]
     pen_file: Path
     assumptions: Assumptions = USUAL
+    method: Method = "joint"
     origin: Origin | None = None
     units: str | None = None  # as of `Header`
     led_diameter: float | None = None  # as in `Header`
@@ -78,6 +80,7 @@ def source(record: Record) -> RecordSource:
         camera_files=camera_files,
         pen_file=pen_file,
         assumptions=recorded_assumptions(header.settings),
+        method=recorded_method(header.settings),
         origin=recorded_origin(record),
         units=header.units,
         led_diameter=header.led_diameter_mm,

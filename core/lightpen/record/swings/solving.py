@@ -22,6 +22,7 @@ from lightpen.estimation.contact.camera_motion import steadied
 from lightpen.estimation.contact.joint import ContactModel, reduce
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
 from lightpen.formats.pairing import Pairing
+from lightpen.model.method import Method
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.swings.reading import Record
@@ -108,6 +109,15 @@ def solve_again(solution: Solution, excluded: Mapping[int, str]) -> Solution:
     return _solved(solution.source, solution.numbers, seen, excluded)
 
 
+def report_by(solution: Solution, method: Method) -> Solution:
+    """Return a solution whose tip is reported by another method."""
+    return replace(
+        solution,
+        source=replace(solution.source, method=method),
+        calibration=replace(solution.calibration, method=method),
+    )
+
+
 def load_image(solution: Solution, number: int, camera: int = 0) -> Image:
     """Read an image of a solved record again, (H, W), by its number and camera."""
     index = int(np.searchsorted(solution.numbers, number))
@@ -158,6 +168,7 @@ def _solved(
         [leave_out(each, reasons) for each in seen],
         source.assumptions,
     )
+    calibration = replace(calibration, method=source.method)
     return Solution(
         source=source,
         numbers=numbers,

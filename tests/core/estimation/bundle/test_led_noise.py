@@ -226,7 +226,7 @@ def test_sigmas_of_centers_sharpen_the_tip_and_are_recorded() -> None:
     ]
     assert noise[0] < 0.8 * noise[1]
     record = calibration_record(
-        by_own, Inputs(FILE, FILE, (FILE,), None), "joint", SwingLimits()
+        by_own, Inputs(FILE, FILE, (FILE,), None), SwingLimits()
     )
     np.testing.assert_array_equal(shown_images(record).sigmas, own.sigmas)
     off = by_own.joint.tip_pen - swing.tip_pen

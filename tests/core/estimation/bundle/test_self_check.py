@@ -100,7 +100,7 @@ def test_leds_that_wander_with_the_lean_are_reported() -> None:
     assert not found.self_check.is_passed
     codes = [each.code for each in warnings_of(found)]
     assert "warning.self-check" in codes
-    text = calibration_text(found, "joint", None, judge(found, SwingLimits()))
+    text = calibration_text(found, None, judge(found, SwingLimits()))
     assert "Self-check" in text
 
 

@@ -53,7 +53,7 @@ def test_a_displaced_led_leaves_two_frames() -> None:
     R, t = fit_rigid(leds, PEN.leds)
     assert (np.abs(frames.of_all - (R @ swing.tip_pen + t)) < U).all()
     assert np.linalg.norm(frames.of_all - frames.of_file) > 0.015
-    text = calibration_text(found, "joint", None, judge(found, SwingLimits()))
+    text = calibration_text(found, None, judge(found, SwingLimits()))
     assert "Result and U refer to the former." in text
     assert " ".join(f"{value:.4f}" for value in frames.of_all) in text
 

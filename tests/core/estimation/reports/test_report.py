@@ -15,11 +15,14 @@ from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot_calibration import calibrate_pivot
-from lightpen.estimation.reports.methods import Method
 from lightpen.estimation.reports.pivot_report import pivot_record
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
-from lightpen.estimation.reports.summary import calibration_text, pivot_text
+from lightpen.estimation.reports.summary import (
+    calibration_text,
+    convergence_text,
+    pivot_text,
+)
 from lightpen.estimation.reports.verdict import Verdict, judge
 from lightpen.estimation.uncertainty.budget import (
     ContributionName,
@@ -30,6 +33,7 @@ from lightpen.formats.json_records import json_bytes
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.method import Method
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     paper_camera,
@@ -78,7 +82,8 @@ def verdict() -> Verdict:
 
 
 def record(method: Method = "joint") -> dict[str, Any]:
-    written = json_bytes(calibration_record(calibration(), INPUTS, method, LIMITS))
+    found = replace(calibration(), method=method)
+    written = json_bytes(calibration_record(found, INPUTS, LIMITS))
 
     def refuse(constant: str) -> None:
         raise AssertionError(f"{constant} is not JSON")
@@ -109,7 +114,7 @@ def test_the_record_holds_the_tip_and_its_uncertainty() -> None:
 @pytest.mark.parametrize(
     "lost",
     [
-        {"two_stage_covariance": np.full((6, 6), np.nan)},
+        {"projection_bias": np.full(6, np.nan)},
         {"growth": math.nan},
         {"tips_cam": np.full((40, 3), np.nan)},
         {"rms": np.full(40, np.nan)},
@@ -121,7 +126,7 @@ def test_a_figure_that_could_not_be_found_leaves_the_record_readable(
 ) -> None:
     """A tip in force must not be lost by a figure beside it."""
     found = replace(calibration(), **lost)
-    written = json_bytes(calibration_record(found, INPUTS, "joint", LIMITS))
+    written = json_bytes(calibration_record(found, INPUTS, LIMITS))
 
     assert record_of(json.loads(written)).tip_pen_mm == tuple(found.joint.tip_pen)
 
@@ -133,6 +138,37 @@ def test_the_method_decides_which_result_is_given_and_both_are_there() -> None:
     assert found["tip_pen_mm"] == found["methods"]["two-stage"]["tip_pen_mm"]
     assert found["tip_pen_mm"] != found["methods"]["joint"]["tip_pen_mm"]
     assert len(found["methods"]["two-stage"]["convergence"]["x_mm"][0]) == 6
+
+
+def test_the_two_stage_tip_is_uncertain_by_its_difference_from_the_joint_fit() -> None:
+    joint, paper = record(), record("two-stage")
+    off = np.subtract(paper["tip_pen_mm"], joint["tip_pen_mm"])
+
+    np.testing.assert_allclose(paper["methods"]["two-stage"]["off_joint_mm"], off)
+    np.testing.assert_allclose(
+        np.square(paper["expanded_uncertainty_mm"]),
+        np.square(joint["expanded_uncertainty_mm"]) + np.square(2 * off),
+    )
+    tip = np.array(paper["covariance"])[:3, :3]
+    stated = paper["weakest_direction"]["expanded_uncertainty_mm"]
+    assert stated == pytest.approx(2 * np.sqrt(np.linalg.eigvalsh(tip)[-1]))
+
+
+def test_the_convergence_is_a_table_of_the_iteration() -> None:
+    fit = calibration().two_stage
+    _, heading, *rows = convergence_text(fit).splitlines()
+
+    assert heading.split()[0] == "k"
+    assert len(rows) == len(fit.objectives)
+    k, *X = map(float, rows[0].split())
+    assert k == 0
+    np.testing.assert_allclose(X[:6], fit.iterates[0], atol=1e-6)
+    k, *X, alpha, increment, objective = map(float, rows[-1].split())
+    assert k == len(fit.increments)
+    np.testing.assert_allclose(X, fit.iterates[-1], atol=1e-6)
+    assert alpha == pytest.approx(fit.step_lengths[-1], abs=1e-4)
+    assert increment == pytest.approx(fit.increments[-1], rel=0.01)
+    assert objective == pytest.approx(fit.objectives[-1], rel=1e-5)
 
 
 def test_every_image_is_in_the_record_with_its_fate() -> None:
@@ -205,8 +241,8 @@ def test_the_record_holds_what_the_images_made_of_the_camera_and_the_discs() -> 
 def test_what_is_assumed_is_marked_in_record_and_text() -> None:
     camera = replace(CAMERA, covariance=None)
     result = of_camera(camera)
-    written = json_bytes(calibration_record(result, INPUTS, "joint", LIMITS))
-    text = calibration_text(result, "joint", None, judge(result, LIMITS))
+    written = json_bytes(calibration_record(result, INPUTS, LIMITS))
+    text = calibration_text(result, None, judge(result, LIMITS))
 
     shares = json.loads(written)["uncertainty"]["shares"]
     assumed = [share["name"] for share in shares if share["assumed"]]
@@ -218,9 +254,9 @@ def test_what_is_assumed_is_marked_in_record_and_text() -> None:
 def test_a_contradicted_file_is_in_record_warnings_and_text() -> None:
     intrinsics_off = replace(CAMERA, fx=1.01 * CAMERA.fx, fy=1.01 * CAMERA.fy)
     result = of_camera(intrinsics_off)
-    written = json_bytes(calibration_record(result, INPUTS, "joint", LIMITS))
+    written = json_bytes(calibration_record(result, INPUTS, LIMITS))
     found = json.loads(written)
-    text = calibration_text(result, "joint", None, judge(result, LIMITS))
+    text = calibration_text(result, None, judge(result, LIMITS))
 
     (entry,) = (
         each
@@ -250,7 +286,7 @@ def test_words_among_the_values_of_a_verdict_have_codes_and_text() -> None:
     one_sided = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
     limits = SwingLimits(max_uncertainty=1.0)
 
-    written = json_bytes(calibration_record(one_sided, INPUTS, "joint", limits))
+    written = json_bytes(calibration_record(one_sided, INPUTS, limits))
 
     found = json.loads(written)["verdict"]
     assert found["code"] == "verdict.too-little-tilt"
@@ -265,7 +301,7 @@ def test_words_among_the_values_of_a_verdict_have_codes_and_text() -> None:
 
 
 def test_the_text_ends_with_the_verdict_its_reason_and_the_next_step() -> None:
-    text = calibration_text(calibration(), "joint", None, verdict())
+    text = calibration_text(calibration(), None, verdict())
 
     assert text.splitlines()[-2:] == [
         "Verdict      CHECK: Images captured: 39 of 41 (minimum).",
@@ -284,7 +320,8 @@ def test_the_record_names_program_and_inputs() -> None:
 
 @pytest.mark.parametrize("method", ["joint", "two-stage"])
 def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: Method) -> None:
-    text = calibration_text(calibration(), method, PEN.nominal_tip, verdict())
+    found = replace(calibration(), method=method)
+    text = calibration_text(found, PEN.nominal_tip, verdict())
     rows = {line.split()[0]: line for line in text.splitlines() if line.strip()}
 
     assert f"{calibration().joint.tip_pen[1]:.4f}" in text
@@ -301,7 +338,8 @@ def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: Method) ->
 @pytest.mark.parametrize("method", ["joint", "two-stage"])
 def test_the_text_shows_the_uncertainty_of_the_cone_under_it(method: Method) -> None:
     found = record(method)
-    lines = iter(calibration_text(calibration(), method, None, verdict()).splitlines())
+    text = calibration_text(replace(calibration(), method=method), None, verdict())
+    lines = iter(text.splitlines())
 
     assert any(line.startswith("Cone") for line in lines)
     shown = [next(lines).split()[-3:], next(lines).split()[-3:]]
@@ -318,7 +356,7 @@ def test_an_led_that_was_never_found_is_warned_of() -> None:
     assert warning["code"] == "warning.led-unseen"
     assert warning["values"] == {"led": 10}
     assert warning["text"].startswith("LED 10 was not detected in any image.")
-    assert warning["text"] in calibration_text(calibration(), "joint", None, verdict())
+    assert warning["text"] in calibration_text(calibration(), None, verdict())
 
 
 def test_large_residuals_are_warned_of() -> None:
@@ -378,7 +416,7 @@ def test_a_jitter_is_reported_where_it_is_more_than_round_parts_make(
 
 def shown(found: Calibration, start: str) -> list[str]:
     """Return the lines of the text that start so."""
-    text = calibration_text(found, "joint", None, verdict())
+    text = calibration_text(found, None, verdict())
     return [line for line in text.splitlines() if line.startswith(start)]
 
 

@@ -66,6 +66,37 @@ def good() -> Calibration:
     return calibrated(swing_poses(150, np.random.default_rng(0)))
 
 
+def test_the_verdict_judges_the_reported_method(good: Calibration) -> None:
+    limits = SwingLimits(max_uncertainty=0.02)
+    verdict = judge(replace(good, method="two-stage"), limits)
+
+    assert judge(good, limits).grade is Grade.PASS
+    assert verdict.grade is not Grade.PASS
+    assert verdict.reason.code == Code.TWO_STAGE_OFF
+    assert verdict.next_step is NextStep.REPORT_JOINT
+
+
+def test_a_two_stage_tip_of_small_discs_passes() -> None:
+    small = replace(PEN, diameter=2.0, diameter_sigma=0.02)
+    swing = swing_poses(150, np.random.default_rng(0))
+    pixels = simulate_centers(
+        CAMERA,
+        small,
+        swing.rotations,
+        swing.translations,
+        0.02,
+        np.random.default_rng(1),
+    )
+    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+    seen = observe_centers(centers, CAMERA, small)
+    found = replace(calibrate(CAMERA, small, seen), method="two-stage")
+
+    verdict = judge(found, SwingLimits(max_uncertainty=0.03))
+    assert verdict.grade is Grade.PASS
+    uncertainty = float(str(verdict.reason.values["uncertainty"]))
+    assert np.abs(found.two_stage.tip_pen - swing.tip_pen).max() < uncertainty
+
+
 def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> None:
     verdict = judge(good, SwingLimits(max_uncertainty=0.02))
     assert verdict.grade is Grade.PASS
@@ -534,6 +565,7 @@ def test_copies_of_images_count_once(good: Calibration) -> None:
         good,
         reasons=good.reasons + (Reason.COPY,) * 150,
         used=np.concatenate([good.used, np.zeros(150, dtype=bool)]),
+        tips_cam=np.concatenate([good.tips_cam, np.full((150, 3), np.nan)]),
     )
     assert judge(doubled, SwingLimits(max_uncertainty=0.02)).grade is Grade.PASS
     limits = SwingLimits(max_uncertainty=0.02, min_images=200)
