@@ -6078,6 +6078,10 @@ mm</translation>
         <translation>下一步：压紧测头，重新摆动。</translation>
     </message>
     <message>
+        <source>Next: report the joint fit of the same images.</source>
+        <translation>下一步：改为报告同一组图像的联合拟合。</translation>
+    </message>
+    <message>
         <source>Next: seat the tip firmly, calibrate it again, and verify the new result.</source>
         <translation>下一步：装紧测头，重新标定，并验证新的结果。</translation>
     </message>
@@ -6604,6 +6608,10 @@ mm</translation>
     <message>
         <source>U (k = 2) of difference</source>
         <translation>差值的 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the two-stage tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm: it is {distance:.4f} mm off the joint fit, {bias:.4f} mm by the projection of the discs. Report the joint fit.</source>
+        <translation>两步法测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值为 {limit:.4f} mm：它与联合拟合相差 {distance:.4f} mm，其中 {bias:.4f} mm 来自发光面的投影。请报告联合拟合。</translation>
     </message>
     <message>
         <source>U {axis}</source>
