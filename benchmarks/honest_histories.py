@@ -17,28 +17,70 @@ import sys
 import tempfile
 import time
 from contextlib import closing
+from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.enter_until_cut import accept, change_library, note
-from benchmarks.hostile_records import make_data
+from benchmarks.hostile_records import NAMES, NOON, make_data
 from benchmarks.machine import description
 from benchmarks.postgres_server import Postgres, postgres_programs
 from benchmarks.rows import Row, table
+from msgspec import structs
 
+from lightpen.archive.chains.entries import Kind
 from lightpen.archive.checks.check import check_file
+from lightpen.archive.history.queries import EntryFilter, newest
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
 from lightpen.archive.replication.comparison import check_server, require_same
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
+from lightpen.formats.stored_messages import StoredMessage
+from lightpen.record.library.library_changes import Author, add_item, change_item
 from lightpen.record.library.signing.keys import KEYS
+from lightpen.record.library.tip_library import ItemKind, ListedCone, read_library
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.results.results import Result
 
 SEED = 25
 N_HISTORIES = 1000
 MOST_CUTS = 3
 LONGEST_LIFE_S = 1.5  # of a program until it is killed
+CONE = ListedCone(id="C-1")
+BY = Author("Bench", "Ann")
+LONGEST_RECORD = 280_000  # characters, of 300 images
+
+
+def accept(data: Path, logbook: Logbook, rng: random.Random) -> None:
+    """Put a tip in force, and enter it."""
+    results = FolderArchive(data)
+    before = results.in_force(NAMES.pen, NAMES.tip)
+    assert isinstance(before, Result)
+    filler = StoredMessage("filler", "x" * rng.randrange(LONGEST_RECORD), {})
+    at = before.accepted + timedelta(seconds=1)
+    calibration = structs.replace(before.calibration, warnings=(filler,))
+    results.store(replace(before, accepted=at, calibration=calibration))
+    logbook.enter_owed()
+
+
+def change_library(data: Path, logbook: Logbook, rng: random.Random) -> None:
+    """Change a cone, and enter it."""
+    note = f"seat {rng.random()}"
+    known = read_library(data).item(ItemKind.CONE, CONE.id)
+    add = add_item if known is None else change_item
+    add(data, ListedCone(id=CONE.id, note=note), BY, NOON)
+    logbook.enter_owed()
+
+
+def note(data: Path, logbook: Logbook, rng: random.Random) -> None:
+    """Have something to say of an entry."""
+    found = newest(logbook.database, EntryFilter(kinds=(Kind.ACCEPTED,)), 1)
+    for each in found:
+        logbook.enter_note(each, "word " * rng.randrange(1000), "Ann")
+
+
 WRITES = (accept, change_library, note)
 
 
@@ -87,7 +129,6 @@ def _live_until_cut(data: Path, address: str, rng: random.Random) -> None:
     child = os.fork()
     if child == 0:
         try:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what it acknowledges
             _write_and_deliver(data, address, random.Random(seed))
         finally:
             os._exit(0)

@@ -1,7 +1,6 @@
 """Malformed input to the program, and its reaction."""
 
 from benchmarks.hostile_files import hostile_file_rows
-from benchmarks.hostile_guard import hostile_guard_rows
 from benchmarks.hostile_kills import hostile_kill_rows
 from benchmarks.hostile_records import hostile_record_rows
 from benchmarks.rows import Row
@@ -9,7 +8,4 @@ from benchmarks.rows import Row
 
 def hostile_rows() -> list[Row]:
     """Return what becomes of spoiled files, of flipped bits and of kills."""
-    return [
-        *(*hostile_file_rows(), *hostile_record_rows(), *hostile_guard_rows()),
-        *hostile_kill_rows(),
-    ]
+    return [*hostile_file_rows(), *hostile_record_rows(), *hostile_kill_rows()]

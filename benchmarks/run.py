@@ -17,7 +17,6 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.archive import archive_rows
-from benchmarks.archive_cuts import cut_rows
 from benchmarks.archive_plant import plant_rows
 from benchmarks.camera_calibrations import camera_calibration_rows
 from benchmarks.cramer_rao import cramer_rao_rows
@@ -72,7 +71,6 @@ SECTIONS: dict[str, Section] = {
     "killed": lambda workers, data: killed_rows(),
     "hostile": lambda workers, data: hostile_rows(),
     "archive": lambda workers, data: archive_rows(),
-    "cuts": lambda workers, data: cut_rows(),
     "honest": lambda workers, data: [honest_row()],
     "plant": lambda workers, data: plant_rows(),
     "view": lambda workers, data: plant_view_rows(),

@@ -105,8 +105,7 @@ def test_a_copy_of_a_guarded_folder_without_its_limits_takes_no_change(
     shutil.copytree(data, copy)
     shutil.rmtree(copy / LIMITS_FOLDER)
 
-    for words in (("add", "cone", "C-1"), ("share",)):
-        refused = lightpen("tips", *words, "--data", copy)
-        assert refused.returncode != 0
-        assert f"{LIMITS_FOLDER}/000001.json" in refused.stderr
+    refused = lightpen("tips", "add", "cone", "C-1", "--data", copy)
+    assert refused.returncode != 0
+    assert f"{LIMITS_FOLDER}/000001.json" in refused.stderr
     assert not (copy / "library").exists()

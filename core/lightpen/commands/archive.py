@@ -26,7 +26,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     )
     listed = actions.add_parser("list", help="print the newest entries")
     export = actions.add_parser("export", help="export all entries to a file")
-    taken = actions.add_parser("import", help="import the entries of an exported file")
     delivered = actions.add_parser(
         "deliver", help="deliver the entries to the server set by LIGHTPEN_ARCHIVE"
     )
@@ -61,10 +60,9 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         help="supervisor who approves it, if the data folder has a supervisor "
         "password; the password is requested, or read from LIGHTPEN_PASSWORD",
     )
-    for action in (check, listed, export, taken, delivered, fetched, renewed):
+    for action in (check, listed, export, delivered, fetched, renewed):
         add_data(action, data_folder)
-    for action in (export, taken):
-        action.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
+    export.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
     for name in ("pen", "tip", "station"):
         listed.add_argument(
             f"--{name}", default="", help="list entries of this item only"

@@ -6,7 +6,7 @@ from contextlib import closing, contextmanager
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains.chains import chain_at_home, chain_head, note_delivered
+from lightpen.archive.chains.chains import chain_head, note_delivered
 from lightpen.archive.chains.entries import SHORT, Kind
 from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.checks.check import check_file
@@ -16,11 +16,7 @@ from lightpen.archive.history.queries import EntryFilter, newest
 from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
 from lightpen.archive.replication.comparison import check_server, require_same
-from lightpen.archive.replication.exchange import (
-    deliver,
-    export_entries,
-    import_entries,
-)
+from lightpen.archive.replication.exchange import deliver, export_entries
 from lightpen.archive.replication.fetching import fetch
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.replication.server_setup import server_sql
@@ -77,8 +73,7 @@ def _list(options: argparse.Namespace) -> None:
     )
     with _looked_into(data_of(options)) as database:
         if options.csv:
-            home = chain_at_home(database)
-            text = entries_csv(newest(database, wanted, options.most), home)
+            text = entries_csv(newest(database, wanted, options.most))
         else:
             found = lines(database, wanted, 0, options.most)
             text = "\n".join(map(_line, found))
@@ -90,13 +85,6 @@ def _export(options: argparse.Namespace) -> None:
     with _looked_into(data_of(options)) as database:
         n_entries = export_entries(database, options.file)
     print(shown(f"{n_entries} entries are in {options.file}."))
-
-
-@printing
-def _import(options: argparse.Namespace) -> None:
-    with _opened(data_of(options)) as database:
-        copied = import_entries(database, options.file)
-    print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
 
 
 @printing
@@ -148,7 +136,6 @@ ACTIONS: dict[str, Command] = {
     "check": _check,
     "list": _list,
     "export": _export,
-    "import": _import,
     "deliver": _deliver,
     "new-key": _new_key,
     "fetch": _fetch,
@@ -204,6 +191,4 @@ def _line(line: Line) -> str:
     words = [when, names.station, names.pen, names.tip, event.kind.value, event.grade]
     if tip is not None:
         words.append(" ".join(f"{value:.4f}" for value in tip))
-    if line.is_foreign:
-        words.append("(other station)")
     return "  ".join(filter(None, words))

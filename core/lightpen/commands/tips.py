@@ -35,7 +35,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
     shared = actions.add_parser(
         "share",
         help="take over the newest changes of other stations, from the server set by "
-        "LIGHTPEN_ARCHIVE and from imported archives",
+        "LIGHTPEN_ARCHIVE",
     )
     for action in (listed, added, changed, retired, returned, shared):
         add_data(action, data_folder)

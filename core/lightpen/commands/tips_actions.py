@@ -3,14 +3,14 @@
 import argparse
 import json
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 from msgspec import structs, to_builtins
 
 from lightpen.archive.chains.chains import chain_at_home
-from lightpen.archive.logbook.lazy_logbook import server_address
+from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.archive.logbook.logbook import ARCHIVE, Logbook, confirm_limits
 from lightpen.archive.logbook.shared_library import take_over
 from lightpen.archive.logbook.tip_status import folder_statuses
@@ -102,18 +102,16 @@ def _set_retired(options: argparse.Namespace) -> None:
 @printing
 def _share(options: argparse.Namespace) -> None:
     data, address = data_of(options), server_address()
+    if not address:
+        raise UsageError("archive.no-server", variable=SERVER)
     signature = supervisor_signature(options.supervisor)
-    with closing(Logbook(data)) as logbook, ExitStack() as stack:
+    with closing(Logbook(data)) as logbook, closing(open_server(address)) as server:
         logbook.confirm(read_supervision(data))
         logbook.enter_owed()
-        server = None
-        if address:
-            server = stack.enter_context(closing(open_server(address)))
-            deliver(logbook.database, logbook.chain, server)
+        deliver(logbook.database, logbook.chain, server)
         taken = take_over(data, logbook.database, local_now(), server, signature)
         faults = logbook.enter_owed()
-        if server is not None:
-            deliver(logbook.database, logbook.chain, server)
+        deliver(logbook.database, logbook.chain, server)
     for each in taken:
         print(shown(str(each.message)))
     for fault in faults:

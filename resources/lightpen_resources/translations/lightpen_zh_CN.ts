@@ -26,14 +26,6 @@
 <context>
     <name>ArchiveControl</name>
     <message>
-        <source>Entries of another station</source>
-        <translation>另一工位的条目</translation>
-    </message>
-    <message>
-        <source>{0} new entries, {1} already present.</source>
-        <translation>新增 {0} 个条目，已有 {1} 个。</translation>
-    </message>
-    <message>
         <source>{0} entries saved in {1}</source>
         <translation>{0} 个条目已保存到 {1}</translation>
     </message>
@@ -47,10 +39,6 @@
     <message>
         <source>Check the archive</source>
         <translation>检查档案库</translation>
-    </message>
-    <message>
-        <source>Import from another station...</source>
-        <translation>从其他工位导入...</translation>
     </message>
     <message>
         <source>Save...</source>
@@ -69,10 +57,6 @@
         <translation>所列条目 (JSON)...</translation>
     </message>
     <message>
-        <source>All entries for another station...</source>
-        <translation>供其他工位使用的全部条目...</translation>
-    </message>
-    <message>
         <source>Another operation is in progress.</source>
         <translation>另一项操作正在进行。</translation>
     </message>
@@ -81,12 +65,12 @@
         <translation>读取并核对每个条目、记录、结果和图像</translation>
     </message>
     <message>
-        <source>For other programs or another station</source>
-        <translation>供其他程序或其他工位使用</translation>
+        <source>All entries (JSON lines)...</source>
+        <translation>所有条目 (JSON 行)...</translation>
     </message>
     <message>
-        <source>Import the entries from a file saved at another station</source>
-        <translation>从其他工位保存的文件导入条目</translation>
+        <source>For other programs</source>
+        <translation>供其他程序使用</translation>
     </message>
     <message>
         <source>Entries not yet on the server; they are stored here and delivered when it responds. {0}</source>
@@ -1083,20 +1067,12 @@
         <translation>只有已接受的测头才能恢复使用。</translation>
     </message>
     <message>
-        <source>This tip was accepted at another station.</source>
-        <translation>此测头是在另一个工位接受的。</translation>
-    </message>
-    <message>
         <source>This tip is current.</source>
         <translation>该测头为当前测头。</translation>
     </message>
     <message>
         <source>Only accepted tips and verifications have a report.</source>
         <translation>只有已接受的测头和验证才有报告。</translation>
-    </message>
-    <message>
-        <source>The result is stored at its own station.</source>
-        <translation>结果保存在所属工位。</translation>
     </message>
     <message>
         <source>Pen {0}</source>
@@ -6674,10 +6650,6 @@ mm</translation>
         <translation>向下</translation>
     </message>
     <message>
-        <source>exported archive</source>
-        <translation>导出的档案库</translation>
-    </message>
-    <message>
         <source>file</source>
         <translation>文件</translation>
     </message>
@@ -6840,10 +6812,6 @@ mm</translation>
     <message>
         <source>{covered:.0f} of {needed:.0f}°</source>
         <translation>{covered:.0f}° / {needed:.0f}°</translation>
-    </message>
-    <message>
-        <source>{file} is not an exported archive, or was modified (line {line}). Export it again with this version of the program.</source>
-        <translation>{file} 不是导出的存档，或已被修改（第 {line} 行）。请用此版本程序重新导出。</translation>
     </message>
     <message>
         <source>{kind}, {side}</source>
@@ -7824,10 +7792,6 @@ mm</translation>
     <message>
         <source>Entry {number} is not an accepted tip. Choose the entry of an accepted tip.</source>
         <translation>条目 {number} 不是已接受的测头。请选择已接受测头的条目。</translation>
-    </message>
-    <message>
-        <source>Entry {number} is not of this station. Only a tip that was accepted here can be reinstated.</source>
-        <translation>第 {number} 条记录不属于本工位。只有在此接受的测头才能恢复。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
@@ -9606,10 +9570,6 @@ mm</translation>
         <translation>{count} 无效。请输入 1 至 {most} 天或次。</translation>
     </message>
     <message>
-        <source>{entry} belongs to the chain of this station, but was not entered here. Nothing was imported. If this data folder was replaced by an older copy, fetch the missing entries from the server; if not, the file was forged.</source>
-        <translation>{entry} 属于本工位的链，但并非在此登记。未导入任何内容。若本数据文件夹被较旧的副本替换，请从服务器取回缺失的记录；否则该文件是伪造的。</translation>
-    </message>
-    <message>
         <source>{file} is damaged: its verification cannot be continued. The images of its points stay where they are.</source>
         <translation>{file} 已损坏：无法继续它所属的验证。其测点图像保留在原处。</translation>
     </message>
@@ -10111,10 +10071,6 @@ mm</translation>
     <message>
         <source>rejected</source>
         <translation>已拒绝</translation>
-    </message>
-    <message>
-        <source>other station</source>
-        <translation>其他工位</translation>
     </message>
     <message>
         <source>current</source>

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from lightpen.archive.history.due import due_tips
 from lightpen.archive.history.history import TipState, known_names, lines, messages_on
 from lightpen.archive.history.listing import COLUMNS, save_entries
 from lightpen.archive.history.queries import EntryFilter, n_wanted
-from lightpen.archive.replication.exchange import export_entries, import_entries
 from lightpen.model.limits import DueRule
 from lightpen.model.origin import Origin
 
@@ -66,33 +64,6 @@ def test_a_simulated_or_another_tip_replaces_none(station: Station) -> None:
 
     assert states(station) == [IN_FORCE] * 3
     assert states(station, EntryFilter(is_simulated=True)) == [IN_FORCE]
-
-
-def test_an_entry_from_another_station_replaces_no_tip_here(
-    make_station: Callable[[str], Station], tmp_path: Path
-) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 3")
-    here.enter(1)
-    there.enter(1, first=5)
-    export_entries(there.database, tmp_path / "hall-3.jsonl")
-    import_entries(here.database, tmp_path / "hall-3.jsonl")
-
-    assert states(here) == [IN_FORCE, IN_FORCE]
-    assert known_names(here.database).stations == ("Hall 2", "Hall 3")
-    assert states(here, EntryFilter(station="Hall 3")) == [IN_FORCE]
-
-
-def test_an_entry_from_another_station_takes_no_tip_back_here(
-    make_station: Callable[[str], Station], tmp_path: Path
-) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 3")
-    (own,) = here.enter(1)
-    enter(there, about(own, Kind.TAKEN_BACK, 10))
-    export_entries(there.database, tmp_path / "hall-3.jsonl")
-    import_entries(here.database, tmp_path / "hall-3.jsonl")
-
-    assert states(here) == [IN_FORCE]
-    assert len(due_tips(here.database, here.chain, DueRule())) == 1
 
 
 def test_every_block_of_lines_follows_the_one_before(station: Station) -> None:

@@ -232,14 +232,6 @@ def test_a_tip_is_reinstated_with_a_reason_only(data: Path, logbook: Logbook) ->
         logbook.restore(entries(logbook)[0], BEA, " ")
 
 
-def test_a_tip_of_another_station_is_not_reinstated(
-    data: Path, logbook: Logbook, make_station: Callable[[str], Station]
-) -> None:
-    (foreign,) = make_station("Hall 9").enter(1)
-    with pytest.raises(ArchiveError, match="not of this station"):
-        logbook.restore(foreign, BEA, "It was better.")
-
-
 def test_a_tip_whose_file_was_changed_is_not_reinstated(
     data: Path, logbook: Logbook
 ) -> None:

@@ -17,11 +17,7 @@ from tests.core.archive.conftest import NOON
 from lightpen.archive.logbook.lazy_logbook import SERVER
 from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.logbook.shared_library import TakenOver, take_over
-from lightpen.archive.replication.exchange import (
-    deliver,
-    export_entries,
-    import_entries,
-)
+from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.errors import AcceptanceError
 from lightpen.model.limits import StationLimits
@@ -204,21 +200,6 @@ def test_a_password_needs_a_supervisor_to_take_over(
     assert read_library(guarded.data).tips == {}
     guarded.share(eve)
     assert guarded.tip() == TIP
-
-
-def test_an_imported_archive_shares_its_library_without_a_server(
-    site: Callable[[str], Site], tmp_path: Path
-) -> None:
-    one, other = site("one"), site("other")
-    add_item(one.data, TIP, one.by, NOON)
-    with closing(Logbook(one.data)) as logbook:
-        logbook.enter_owed()
-        export_entries(logbook.database, tmp_path / "one.jsonl")
-    with closing(Logbook(other.data)) as logbook:
-        import_entries(logbook.database, tmp_path / "one.jsonl")
-        (taken,) = take_over(other.data, logbook.database, LATER)
-
-    assert taken.change.item == other.tip() == TIP
 
 
 def test_a_change_of_a_clock_that_is_ahead_does_not_count(

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from sqlalchemy import update
@@ -12,9 +11,6 @@ from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
 from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.checks.check import check_archive
-from lightpen.archive.history.history import lines
-from lightpen.archive.history.queries import EntryFilter
-from lightpen.archive.replication.exchange import export_entries, import_entries
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError
 from lightpen.record.library.signing.keys import key_folder, make_station_key
@@ -52,25 +48,6 @@ def test_nobody_else_continues_the_chain_of_a_station(
     assert check_archive(here.database).findings == ()
 
 
-def test_a_file_adds_nothing_to_the_chain_at_home(
-    tmp_path: Path, station: Station, make_station: Callable[[str], Station]
-) -> None:
-    station.enter(2)
-    older = make_station("copy")
-    first = list(entries_of(station.database, station.chain))[:1]
-    copy_entries(
-        older.database, station.chain, first, records_of(station.database, first)
-    )
-    export_entries(station.database, tmp_path / "all.jsonl")
-    known = import_entries(station.database, tmp_path / "all.jsonl")
-    assert (known.n_new, known.n_known) == (0, 2)
-
-    entry, records = forged(station, 2)
-    with pytest.raises(ArchiveError, match="was not entered here"):
-        copy_entries(station.database, station.chain, [entry], records)
-    assert len(list(entries_of(station.database, station.chain))) == 2
-
-
 def test_a_signature_that_was_changed_is_found(station: Station) -> None:
     entry = station.enter(2)[0]
     other = ("0" if entry.signature[-1] != "0" else "1").join(
@@ -95,15 +72,3 @@ def test_nothing_is_entered_without_the_key_of_the_station(station: Station) -> 
     with pytest.raises(ArchiveError, match="not in this user account"):
         station.enter(1, 1)
     assert len(list(entries_of(station.database, station.chain))) == 1
-
-
-def test_entries_of_other_stations_are_marked(
-    make_station: Callable[[str], Station], tmp_path: Path
-) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 7")
-    here.enter(1)
-    there.enter(1, 1)
-    export_entries(there.database, tmp_path / "there.jsonl")
-    import_entries(here.database, tmp_path / "there.jsonl")
-    found = lines(here.database, EntryFilter(), 0, 9)
-    assert [line.is_foreign for line in found] == [True, False]

@@ -1,17 +1,15 @@
-"""Actions on the whole archive: check, save and import."""
+"""Actions on the whole archive: check and save."""
 
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtCore import QObject, Signal
 
-from lightpen.archive.chains.growth import CopyResult
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.history.listing import save_entries
-from lightpen.archive.replication.exchange import export_entries, import_entries
+from lightpen.archive.replication.exchange import export_entries
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
 from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.widgets.save_dialog import ask_file
@@ -29,7 +27,6 @@ class ArchiveControl(QObject):
     """
 
     checked = Signal()  # a check has ended
-    imported = Signal()  # there may be other entries
 
     def __init__(
         self, workbench: Workbench, panel: ArchivePanel, filter_bar: FilterBar
@@ -44,7 +41,6 @@ class ArchiveControl(QObject):
         # Connections
         panel.check_requested.connect(self._check)
         panel.cancel_requested.connect(self.shut_down)
-        panel.import_requested.connect(self._ask_import)
         panel.save_requested.connect(self._ask_save)
 
     def _check(self) -> None:
@@ -63,28 +59,6 @@ class ArchiveControl(QObject):
         """Cancel running jobs."""
         if self._work is not None:
             self._work.cancel()
-
-    def _ask_import(self) -> None:
-        dialog = QFileDialog(self._panel, self.tr("Entries of another station"))
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        suffix = SaveFormat.WHOLE.suffix
-        dialog.setNameFilter(f"{suffix[1:].upper()} (*{suffix})")
-        dialog.setDirectory(str(self._place.folder()))
-        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        dialog.fileSelected.connect(lambda path: self._import(Path(path)))
-        dialog.open()
-
-    def _import(self, path: Path) -> None:
-        logbook = self._logbook
-        self._place.remember(path.parent)
-        self._do(
-            lambda _: import_entries(logbook.opened().database, path), self._on_imported
-        )
-
-    def _on_imported(self, copied: CopyResult) -> None:
-        self.imported.emit()
-        text = self.tr("{0} new entries, {1} already present.")
-        self._notices.show_status(text.format(copied.n_new, copied.n_known))
 
     def _ask_save(self, saving: SaveFormat) -> None:
         name = f"lightpen-{self._clock():%Y-%m-%d}{saving.suffix}"

@@ -1,4 +1,4 @@
-"""Panel of the whole archive: check, save and import."""
+"""Panel of the whole archive: check and save."""
 
 from collections.abc import Sequence
 from enum import Enum, auto
@@ -42,7 +42,6 @@ class ArchivePanel(Translated, QWidget):
 
     check_requested = Signal()
     cancel_requested = Signal()
-    import_requested = Signal()
     save_requested = Signal(object)  # Saving
 
     def __init__(self) -> None:
@@ -52,7 +51,6 @@ class ArchivePanel(Translated, QWidget):
 
         # Widgets
         self._check = PushButton()
-        self._import = PushButton()
         self._save = PushButton()
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
@@ -69,7 +67,7 @@ class ArchivePanel(Translated, QWidget):
 
         # Layout
         self._layout = layout = vertical_layout(self, margins=(0, GRID, 0, 0))
-        horizontal_layout(layout, self._check, self._save, self._import, 1)
+        horizontal_layout(layout, self._check, self._save, 1)
         fill(layout, self._working, self._delivered, self._outcome, 1)
         horizontal_layout(
             self._working, (self._progress, 1), self._cancel, spacing=2 * GRID
@@ -78,7 +76,6 @@ class ArchivePanel(Translated, QWidget):
 
         # Connections
         self._check.clicked.connect(self.check_requested)
-        self._import.clicked.connect(self.import_requested)
         self._cancel.clicked.connect(self.cancel_requested)
         for saving, action in self._savings.items():
             action.triggered.connect(
@@ -118,13 +115,12 @@ class ArchivePanel(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._check.setText(self.tr("Check the archive"))
-        self._import.setText(self.tr("Import from another station..."))
         self._save.setText(self.tr("Save..."))
         self._cancel.setText(self.tr("Cancel"))
         for saving, text in (
             (SaveFormat.TABLE, self.tr("Listed entries (CSV)...")),
             (SaveFormat.JSON, self.tr("Listed entries (JSON)...")),
-            (SaveFormat.WHOLE, self.tr("All entries for another station...")),
+            (SaveFormat.WHOLE, self.tr("All entries (JSON lines)...")),
         ):
             self._savings[saving].setText(text)
         self._refresh_buttons()
@@ -136,10 +132,9 @@ class ArchivePanel(Translated, QWidget):
         why_not = self.tr("Another operation is in progress.") if is_working else ""
         tooltips = (
             self.tr("Read and compare every entry, record, result and image"),
-            self.tr("For other programs or another station"),
-            self.tr("Import the entries from a file saved at another station"),
+            self.tr("For other programs"),
         )
-        buttons = (self._check, self._save, self._import)
+        buttons = (self._check, self._save)
         for button, words in zip(buttons, tooltips, strict=True):
             button.set_why_not(why_not, words)
 

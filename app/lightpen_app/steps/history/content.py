@@ -104,7 +104,6 @@ class HistoryContent(Translated, QWidget):
         self._selection.report_requested.connect(self._report_study)
         self._due.rule_changed.connect(self._on_rule_changed)
         self._whole.checked.connect(self.checked)
-        self._whole.imported.connect(self.read_anew)
 
         workbench.selection.changed.connect(self._on_workbench_changed)
 
@@ -154,7 +153,6 @@ class HistoryContent(Translated, QWidget):
         self._filter.set_known(opening.names)
         self._trend, self._followed = Trend(), None
         self._entry.set_value(None)
-        self._entry.set_home(opening.home)
         self._archive.set_delivery(opening.delivery)
         self.table.set_stations(opening.names.stations)
         self.table.set_lines(opening.n_lines, opening.first)

@@ -46,7 +46,6 @@ class EntryPanel(Translated, QWidget):
         super().__init__()
         self._line: Line | None = None
         self._asked: StoredEntry | None = None
-        self._home = ""
         self._restores = self._is_guarded = False
         self._messages: tuple[StoredEntry, ...] = ()
 
@@ -94,10 +93,6 @@ class EntryPanel(Translated, QWidget):
         self._line, self._messages = line, ()
         self._reason.hide()
         self._retranslate()
-
-    def set_home(self, chain: str) -> None:
-        """Take over the own chain: the files of its results are here."""
-        self._home = chain
 
     def set_guarded(self, is_guarded: bool) -> None:
         """Ask for a supervisor before a tip is reinstated, or for none."""
@@ -222,8 +217,6 @@ class EntryPanel(Translated, QWidget):
             return ""
         if line.entry.entry.event.kind not in IN_FORCE_BY:
             return self.tr("Only an accepted tip can be reinstated.")
-        if line.is_foreign:
-            return self.tr("This tip was accepted at another station.")
         if line.state is TipState.IN_FORCE:
             return self.tr("This tip is current.")
         return ""
@@ -233,8 +226,6 @@ class EntryPanel(Translated, QWidget):
             return ""
         if line.entry.entry.event.kind not in (*IN_FORCE_BY, Kind.VERIFICATION):
             return self.tr("Only accepted tips and verifications have a report.")
-        if line.chain != self._home:
-            return self.tr("The result is stored at its own station.")
         return ""
 
 

@@ -34,7 +34,6 @@ class FirstEntries:
     """The first data read for a filter."""
 
     wanted: EntryFilter
-    home: str  # own chain
     n_lines: int
     first: tuple[Line, ...]  # the newest
     names: KnownNames
@@ -73,7 +72,6 @@ class HistoryReader(QObject):
             database = opened.database
             return FirstEntries(
                 wanted,
-                opened.chain,
                 n_wanted(database, wanted),
                 lines(database, wanted, 0, BLOCK),
                 known_names(database),

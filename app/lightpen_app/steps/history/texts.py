@@ -45,7 +45,6 @@ _OUTCOMES: dict[TrialOutcome, str] = {
     TrialOutcome.REFUSED: QT_TRANSLATE_NOOP("history", "rejected"),
     TrialOutcome.ABANDONED: QT_TRANSLATE_NOOP("history", "abandoned"),
 }
-_FOREIGN = QT_TRANSLATE_NOOP("history", "other station")
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "current"),
     TipState.REPLACED: QT_TRANSLATE_NOOP("history", "replaced"),
@@ -102,8 +101,6 @@ def type_and_state_text(line: Line) -> str:
     is_usual = (event.outcome, event.grade) == (TrialOutcome.ACCEPTED, Grade.PASS)
     if event.outcome is not None and not is_usual:
         words.append(_translated(_OUTCOMES[event.outcome]))
-    if line.is_foreign:
-        words.append(_translated(_FOREIGN))
     return listed(words)
 
 
@@ -175,7 +172,7 @@ def line_tone(line: Line, is_verdict: bool) -> Tone:
     if is_verdict:
         known = {grade.value: tone for grade, (_, tone) in GRADE_MARKS.items()}
         return known.get(event.grade, Tone.PLAIN)
-    if line.state is TipState.IN_FORCE and not line.is_foreign:
+    if line.state is TipState.IN_FORCE:
         return Tone.GOOD
     is_refused = event.outcome is TrialOutcome.REFUSED or (
         event.kind is Kind.REFUSED and event.grade != Grade.PASS

@@ -91,9 +91,9 @@ def copy_entries(
 ) -> CopyResult:
     """Let the copy of a chain grow by entries, in their order; known ones are passed.
 
-    The own chain of the database grows by `append` alone. Raises `ArchiveError` if they
-    do not continue the copy, are not signed by the station of the chain, are beyond the
-    head of the own chain, or the copy says otherwise.
+    The own chain of a database grows by `append` alone. Raises `ArchiveError` if they
+    do not continue the copy, are not signed by the station of the chain, or the copy
+    says otherwise.
     """
     with database.writing() as connection:
         if _is_server(connection):
@@ -105,7 +105,6 @@ def copy_entries(
         _require_same(connection, chain, known)
         _require_next(head, new)
         if new:
-            _require_elsewhere(connection, new[0])
             _require_signed(connection, chain, new)
         _keep_records(connection, _named(new, records))
         _put(connection, chain, new)
@@ -234,14 +233,6 @@ def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:
         if (each.entry.number, each.entry.previous) != (number + 1, sha256):
             raise ArchiveError(_forked(each))
         number, sha256 = each.entry.number, each.sha256
-
-
-def _require_elsewhere(connection: Connection, new: StoredEntry) -> None:
-    """Refuse an entry of the own chain that was not entered here."""
-    if _is_server(connection):
-        return
-    if connection.execute(AT_HOME).scalar_one_or_none() == new.entry.chain:
-        raise ArchiveError("archive.own-chain-ahead", entry=_named_entry(new))
 
 
 def _require_signed(

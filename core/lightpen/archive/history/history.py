@@ -12,7 +12,6 @@ from lightpen.archive.history.queries import (
     IN_ORDER,
     EntryFilter,
     condition_of,
-    is_at_home,
     replaced,
     revoked,
 )
@@ -37,7 +36,6 @@ class Line:
     number: int
     entry: StoredEntry | None  # None if it was changed
     state: TipState = TipState.NONE
-    is_foreign: bool = False  # copied from another station
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,6 @@ def lines(
             ENTRIES,
             revoked(ENTRIES).label("is_taken_back"),
             replaced(ENTRIES).label("is_replaced"),
-            is_at_home(ENTRIES).label("is_at_home"),
         )
         .join(
             places,
@@ -109,4 +106,4 @@ def _line(row: Row[Any]) -> Line:
     if entry is not None and entry.entry.event.kind in IN_FORCE_BY:
         state = TipState.REPLACED if row.is_replaced else TipState.IN_FORCE
         state = TipState.TAKEN_BACK if row.is_taken_back else state
-    return Line(row.chain, row.number, entry, state, not row.is_at_home)
+    return Line(row.chain, row.number, entry, state)

@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from lightpen.archive.chains.chains import chain_at_home
 from lightpen.archive.chains.entries import StoredEntry
 from lightpen.archive.history.queries import EntryFilter, newest
 from lightpen.archive.store.database import Database
@@ -17,7 +16,7 @@ COLUMNS = (
     *("pen", "tip", "cone"),
     *(f"tip_{axis}_mm" for axis in AXES),
     *(f"expanded_uncertainty_{axis}_mm" for axis in AXES),
-    *("reason", "chain", "number", "sha256", "is_foreign"),
+    *("reason", "chain", "number", "sha256"),
 )
 BATCH = 1000  # entries that are read at one time
 
@@ -29,27 +28,19 @@ def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
     """
     entries = tuple(_all(database, wanted))
     is_table = path.suffix.lower() == ".csv"
-    home = chain_at_home(database)
-    text = (entries_csv if is_table else entries_json)(entries, home)
+    text = (entries_csv if is_table else entries_json)(entries)
     write_whole(path, text.encode("utf-8", "backslashreplace"))
     return len(entries)
 
 
-def entries_csv(entries: Iterable[StoredEntry], home: str | None) -> str:
-    """Return entries as a table; those of another chain than ``home`` are foreign."""
-    return csv_table([COLUMNS, *(_row(each, home) for each in entries)])
+def entries_csv(entries: Iterable[StoredEntry]) -> str:
+    """Return entries as a table."""
+    return csv_table([COLUMNS, *map(_row, entries)])
 
 
-def entries_json(entries: Iterable[StoredEntry], home: str | None) -> str:
-    """Return stored entries with their hashes as JSON; see `entries_csv`."""
-    listed = [
-        {
-            "sha256": each.sha256,
-            "is_foreign": each.entry.chain != home,
-            **json.loads(each.text),
-        }
-        for each in entries
-    ]
+def entries_json(entries: Iterable[StoredEntry]) -> str:
+    """Return stored entries with their hashes as JSON."""
+    listed = [{"sha256": each.sha256, **json.loads(each.text)} for each in entries]
     return json.dumps(listed, indent=1) + "\n"
 
 
@@ -60,7 +51,7 @@ def _all(database: Database, wanted: EntryFilter) -> Iterator[StoredEntry]:
         last = batch[-1].entry
 
 
-def _row(entry: StoredEntry, home: str | None) -> list[object]:
+def _row(entry: StoredEntry) -> list[object]:
     event, nothing = entry.entry.event, ("", "", "")
     names = event.names
     return [
@@ -70,5 +61,4 @@ def _row(entry: StoredEntry, home: str | None) -> list[object]:
         *(event.tip_pen_mm or nothing),
         *(event.expanded_uncertainty_mm or nothing),
         *(event.reason, entry.entry.chain, entry.entry.number, entry.sha256),
-        entry.entry.chain != home,
     ]

@@ -23,7 +23,7 @@ from lightpen.archive.chains.entries import (
 )
 from lightpen.archive.chains.rows import READ, read_entries, searchable
 from lightpen.archive.store.database import Database
-from lightpen.archive.store.tables import CHAINS, ENTRIES
+from lightpen.archive.store.tables import ENTRIES
 
 IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
 _KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
@@ -118,18 +118,13 @@ def of_chain(chain: str) -> ColumnElement[bool]:
 
 
 def revoked(entries: FromClause) -> Exists:
-    """Return the condition that an entry was revoked since, by its own station."""
+    """Return the condition that an entry was revoked since."""
     back = ENTRIES.alias()
     return exists().where(
         back.c.concerns == entries.c.sha256,
         back.c.kind == Kind.TAKEN_BACK.value,
         func.coalesce(back.c.chain, "") == entries.c.chain,  # by the index of concerns
     )
-
-
-def is_at_home(entries: FromClause) -> Exists:
-    """Return the condition that an entry is of the own chain of its database."""
-    return exists().where(CHAINS.c.chain == entries.c.chain, CHAINS.c.is_own)
 
 
 def replaced(entries: FromClause) -> Exists:

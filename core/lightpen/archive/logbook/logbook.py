@@ -168,15 +168,15 @@ class Logbook:
         """Reinstate the tip of an entry, and enter that.
 
         ``by`` names the operator who reinstates it, and the station. Raises
-        `ArchiveError` if the entry made no tip current, is not of this station, its
-        files are not as they were entered, or it cannot be entered; it stays owed then.
+        `ArchiveError` if the entry made no tip current, its files are not as they were
+        entered, or it cannot be entered; it stays owed then.
         Raises `AcceptanceError` if the tip is retired, there is no reason, or there is
         a password and no supervisor signs.
         """
         require_in_use(self._results, entry.entry.event.names.tip)
         event, now = entry.entry.event, local_now()
         with self._lock:
-            require_restorable(self.database, self.chain, entry, self._data)
+            require_restorable(entry, self._data)
             text = records_of(self.database, [entry]).get(event.record_sha256 or "")
             result = restored_result(entry, text, self._data, by, reason, now)
             supervision = self._results.supervision()

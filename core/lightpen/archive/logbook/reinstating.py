@@ -5,7 +5,6 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from lightpen.archive.chains.chains import batch_of
 from lightpen.archive.chains.entries import IN_FORCE_BY, StoredEntry
 from lightpen.archive.checks.files_check import file_finding
 from lightpen.archive.history.queries import calibrating
@@ -21,18 +20,12 @@ from lightpen.record.results.results import Result, TipChange, parse_result
 from lightpen.record.swings.names import Names
 
 
-def require_restorable(
-    database: Database, chain: str, entry: StoredEntry, data: Path
-) -> None:
-    """Refuse an entry of another chain, or one whose result file has changed."""
-    number = entry.entry.number
-    there = batch_of(database, chain, number - 1)[:1]
-    if [each.sha256 for each in there] != [entry.sha256]:
-        raise ArchiveError("archive.of-other-station", number=number)
+def require_restorable(entry: StoredEntry, data: Path) -> None:
+    """Refuse an entry whose result file has changed."""
     result = entry.entry.event.result
     if result is None:
         return
-    finding = file_finding(data, number, result)
+    finding = file_finding(data, entry.entry.number, result)
     if finding is not None:
         raise ArchiveError(finding)
 

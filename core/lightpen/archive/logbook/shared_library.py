@@ -1,10 +1,10 @@
 """The library of all stations: the newest change of each item counts everywhere.
 
 Each change of a library is an entry with its file as the record. A station reads those
-of the others from the server, which shows them to every station, and from the archives
-that it imported. A change that is newer than its own change of the same item is taken
-over as a change of its own library, with the time, station and operator of the
-original: so it travels no further than once, and both stay in the archives.
+of the others from the server, which shows them to every station. A change that is newer
+than its own change of the same item is taken over as a change of its own library, with
+the time, station and operator of the original: so it travels no further than once, and
+both stay in the archives.
 """
 
 from collections.abc import Iterator
@@ -13,15 +13,12 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from msgspec import structs
-from sqlalchemy import select, text
+from sqlalchemy import text
 
-from lightpen.archive.chains.chains import chain_at_home, records_of
-from lightpen.archive.chains.entries import Kind, StoredEntry, read_entry, text_sha256
-from lightpen.archive.chains.rows import READ as OF_ENTRY
-from lightpen.archive.chains.rows import read_entries
+from lightpen.archive.chains.chains import chain_at_home
+from lightpen.archive.chains.entries import StoredEntry, read_entry, text_sha256
 from lightpen.archive.chains.signatures import ChainKeys
 from lightpen.archive.store.database import Database
-from lightpen.archive.store.tables import ENTRIES
 from lightpen.formats.own_json import DamagedError
 from lightpen.local_time import local_time
 from lightpen.messages import Message, message, printable
@@ -72,20 +69,18 @@ class TakenOver:
 
 
 def newer_elsewhere(
-    data: Path, database: Database, now: datetime, server: Database | None = None
+    data: Path, database: Database, now: datetime, server: Database
 ) -> tuple[TakenOver, ...]:
     """Return the changes of other stations that are newer than those of this one.
 
-    The database is the archive of the data folder, with copies of other chains; the
-    server that of the plant. A change dated later than ``now``, by a clock that is
+    The database is the archive of the data folder, the server that of the plant. A
+    change dated later than ``now``, by a clock that is
     ahead, does not count.
     """
-    home, found = chain_at_home(database), list(_copied(database))
-    if server is not None:
-        found += _on_server(server)
+    home = chain_at_home(database)
     newest = _newest(
         change
-        for entry, change in found
+        for entry, change in _on_server(server)
         if entry.entry.chain != home and change.at <= now + CLOCKS_AGREE
     )
     own = _newest(change for _, change in library_changes(data))
@@ -104,7 +99,7 @@ def take_over(
     data: Path,
     database: Database,
     now: datetime,
-    server: Database | None = None,
+    server: Database,
     signature: Signature | None = None,
 ) -> tuple[TakenOver, ...]:
     """Take over the changes of other stations that are newer than those of this one.
@@ -132,14 +127,6 @@ def _newest(
         if key not in found or change.at >= found[key].at:
             found[key] = change
     return found
-
-
-def _copied(database: Database) -> Iterator[tuple[StoredEntry, LibraryChange]]:
-    """Yield the changes in a database; copies were checked when they were imported."""
-    wanted = select(*OF_ENTRY).where(ENTRIES.c.kind == Kind.LIBRARY.value)
-    for entry in read_entries(database, wanted):
-        name = entry.entry.event.record_sha256 or ""
-        yield from _changes(entry, records_of(database, [entry]).get(name))
 
 
 def _on_server(server: Database) -> Iterator[tuple[StoredEntry, LibraryChange]]:

@@ -33,12 +33,11 @@ from tests.accepted_tip import accept_tip
 from tests.app.typed_numbers import type_number
 
 from lightpen.archive.chains.entries import Event, Kind
-from lightpen.archive.chains.growth import append, own_chain
+from lightpen.archive.chains.growth import append
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook.logbook import ARCHIVE
-from lightpen.archive.replication.exchange import export_entries, import_entries
-from lightpen.archive.store.database import Database, open_file
+from lightpen.archive.store.database import Database
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -733,16 +732,9 @@ def test_a_verification_has_a_report_of_its_own(desk: Desk) -> None:
     assert desk.notices == []
 
 
-def test_what_is_not_accepted_or_not_of_this_station_has_no_record_on_paper(
-    desk: Desk, tmp_path: Path
-) -> None:
-    with closing(open_file(tmp_path / "there" / ARCHIVE)) as there:
-        event = Event(Kind.ACCEPTED, NOON, names("T-11"), "lightpen 1")
-        append(there, own_chain(there), event)
-        export_entries(there, tmp_path / "there.jsonl")
+def test_what_is_not_accepted_has_no_record_on_paper(desk: Desk) -> None:
     desk.enter(1)
     logbook = desk.workbench.run.logbook.opened()
-    import_entries(logbook.database, tmp_path / "there.jsonl")
     append(logbook.database, logbook.chain, Event(Kind.NOTE, NOON, names(""), "1"))
     desk.open()
     desk.show_tab(ENTRY)
@@ -755,7 +747,6 @@ def test_what_is_not_accepted_or_not_of_this_station_has_no_record_on_paper(
     assert why_not == {
         "T-10": "",
         "": "Only accepted tips and verifications have a report.",
-        "T-11": "The result is stored at its own station.",
     }
 
 
@@ -839,9 +830,7 @@ def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None
 
 
 @pytest.mark.slow
-def test_entries_are_saved_and_taken_up_at_another_station(
-    desk: Desk, tmp_path: Path
-) -> None:
+def test_entries_are_saved(desk: Desk, tmp_path: Path) -> None:
     desk.enter(2)
     desk.open()
     desk.show_tab(WHOLE)
@@ -851,28 +840,10 @@ def test_entries_are_saved_and_taken_up_at_another_station(
     assert len(json.loads((tmp_path / "shown.json").read_text("utf-8"))) == 2
 
     desk.wait_idle()
-    desk.click("All entries for another station...")
+    desk.click("All entries (JSON lines)...")
     desk.choose_file(tmp_path / "hall-2.jsonl")
     desk.until(lambda: "hall-2.jsonl" in desk.statuses[-1])
-    desk.wait_idle()
-    desk.click("Import from another station...")
-    desk.choose_file(tmp_path / "hall-2.jsonl")
-    desk.until(lambda: "0 new entries, 2 already" in "".join(desk.statuses[-2:]))
     assert desk.notices == []
-
-
-def test_a_file_that_is_no_archive_is_refused_in_words(
-    desk: Desk, tmp_path: Path
-) -> None:
-    desk.enter(1)
-    desk.open()
-    (tmp_path / "other.jsonl").write_text("{}\n")
-    desk.show_tab(WHOLE)
-    desk.click("Import from another station...")
-    desk.choose_file(tmp_path / "other.jsonl")
-
-    desk.until(lambda: desk.notices)
-    assert "is not an exported archive, or was modified (line 2)." in desk.notices[0]
 
 
 @pytest.mark.slow
