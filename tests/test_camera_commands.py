@@ -165,3 +165,37 @@ def test_a_file_of_another_focus_is_contradicted_by_a_swing(
     assert "intrinsics file: principal point cy" in printed.out
     fx_of_file, u_of_file = printed.out.split("fx")[1].split()[:2]
     assert (float(fx_of_file), float(u_of_file)) == (4598.2, 1.0)
+
+
+def test_images_that_are_binned_use_a_camera_file_that_is_written(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = shared_data / "swing-clean"
+    (tmp_path / "images").mkdir()
+    for path in sorted((data / "images").iterdir())[::2]:
+        image = np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.float64)
+        binned = image.reshape(1024, 2, 1224, 2).mean(axis=(1, 3)).round()
+        cv2.imwrite(str(tmp_path / "images" / path.name), binned.astype(np.uint8))
+    camera = tmp_path / "camera.yaml"
+    camera.write_bytes((data / "camera.yaml").read_bytes())
+    given = ["calibrate", str(tmp_path / "images"), "--camera", str(camera)]
+    given += ["--pen", str(data / "leds.csv"), "--json", str(tmp_path / "tip.json")]
+
+    assert main([*given, "--binning", "2"]) == 0
+
+    said = capsys.readouterr()
+    assert "camera-binned-2.yaml" in said.err
+    assert "Images       30 of 30 used" in said.out
+    pen = json.loads((data / "truth.json").read_text())["pen"]
+    record = json.loads((tmp_path / "tip.json").read_text())
+    off = np.subtract(record["tip_pen_mm"], pen["tip_in_leds_csv_frame_bestfit"])
+    assert np.all(np.abs(off) < record["expanded_uncertainty_mm"])
+    assert main(given) != 0
+    assert "1224 x 1024 px" in capsys.readouterr().err
+
+
+def test_binning_needs_a_camera_file(capsys: pytest.CaptureFixture[str]) -> None:
+    given = ["calibrate", "images", "--rig", "r.json", "--pen", "p.csv"]
+
+    assert main([*given, "--binning", "2"]) == 2
+    assert "Give it by --camera." in capsys.readouterr().err

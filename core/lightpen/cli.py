@@ -20,6 +20,7 @@ from typing_extensions import override
 
 from lightpen import __version__
 from lightpen.commands.archive import add_archive, usual_data_folder
+from lightpen.commands.arguments import use_window
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
 from lightpen.commands.desktop import (
     Desktop,
@@ -114,6 +115,7 @@ def _write_log_to_existing(data: Path) -> None:
 def _run(options: argparse.Namespace) -> int:
     run: Command = options.run
     try:
+        use_window(options)
         return run(options)
     except CalibrationError as error:
         _complain(error.message)

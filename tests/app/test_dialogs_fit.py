@@ -9,10 +9,12 @@ from pytestqt.qtbot import QtBot
 from tests.app.room import clipped_words, scrolled_sideways
 
 from lightpen.record.library.tip_library import ItemKind
+from lightpen.simulator.swings import paper_camera
 from lightpen_app.shell.about import About
 from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.stream_dialog import StreamDialog
 from lightpen_app.steps.camera.board_window import BoardWindow
+from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
 from lightpen_app.steps.start.assumptions_panel import AssumptionsDialog
 from lightpen_app.steps.start.item_form import ItemForm
@@ -43,6 +45,7 @@ MADE: dict[str, Made] = {
     "help": lambda _: HelpWindow(),
     "board": lambda workbench: BoardWindow(workbench.live, workbench.save_place),
     "laboratory": lambda _: LaboratoryDialog(None),
+    "part of the sensor": lambda _: PartDialog(paper_camera()),
     "assumptions": lambda _: AssumptionsDialog(),
     "limits": lambda _: LimitsDialog(),
     "introduction": lambda _: Introduction(),

@@ -28,6 +28,7 @@ MESSAGES = {
     "document.given-twice": "{key} is given a second time in {name}. Keep the right one.",
     "xml.definition": "Line {line} of {name} begins a document type definition, which is not accepted for security. Remove it; intrinsics files of OpenCV have none.",
     "xml.invalid": "Line {line} of {name} is not valid XML ({problem}). The file may be cut short: copy or export it again.",
+    "toml.invalid": "{name} is not valid TOML ({problem}). The file may be cut short: copy or export it again.",
     "json.invalid": "Line {line} of {name} is not valid JSON ({problem}, column {column}). The file may be cut short: copy or export it again.",
     "entry.same-meaning": "{name} has {first} and {second}, which mean the same. Keep the right one.",
     "entry.missing": "{name} has no {entry}. Check that this is the right file and that it is complete.",

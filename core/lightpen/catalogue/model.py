@@ -2,6 +2,7 @@
 
 MESSAGES = {
     "camera.distortion-folds": "The distortion of the intrinsics file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.",
+    "camera-validity.fold": "The distortion of the intrinsics file has no inverse in {share:.1f} % of the image, at its corners. LEDs there are not used; calibrate the camera with views that reach into the corners.",
     "camera-validity.serial": "The intrinsics file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.",
     "camera-validity.age": "The camera was calibrated {age} days ago, on {day}. Check the camera by a swing, or calibrate it again.",
     "camera-validity.temperature": "The camera was calibrated at {stated:.1f} °C; the station is at {used:.1f} °C. Check the camera by a swing, or calibrate it at this temperature.",

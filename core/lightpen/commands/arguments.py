@@ -6,7 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from lightpen.commands.console import note
+from lightpen.errors import UsageError
+from lightpen.formats.camera_file_writing import write_window
 from lightpen.formats.pen_content import UNITS
+from lightpen.messages import message
 from lightpen.model.assumptions import COLDEST, WARMEST
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import LIMITS
@@ -108,15 +112,44 @@ def data_of(options: argparse.Namespace) -> Path:
     return folder
 
 
+def add_camera(
+    parser: argparse.ArgumentParser, meaning: str, *, is_required: bool = False
+) -> None:
+    """Add ``--camera``, and how the images differ from those that it is for."""
+    parser.add_argument(
+        "--camera", type=Path, required=is_required, metavar="FILE", help=meaning
+    )
+    parser.add_argument(
+        "--binning",
+        type=int,
+        choices=range(1, 9),
+        default=1,
+        metavar="N",
+        help="N x N pixels of the camera file are one of the images",
+    )
+    parser.add_argument(
+        "--roi",
+        type=whole_number,
+        nargs=4,
+        metavar=("X", "Y", "WIDTH", "HEIGHT"),
+        help="the images show this region of the camera file's, px before binning",
+    )
+
+
+def use_window(options: argparse.Namespace) -> None:
+    """Use the camera of binned or cut images, written beside the file of the whole."""
+    if not hasattr(options, "roi") or (options.roi is None and options.binning == 1):
+        return
+    if options.camera is None:
+        raise UsageError("cli.window-needs-camera")
+    roi = None if options.roi is None else tuple(options.roi)
+    options.camera = write_window(options.camera, options.binning, roi)
+    note(message("cli.window-written", file=options.camera))
+
+
 def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``--camera`` and ``--pen``, both required, and the options of the pen."""
-    parser.add_argument(
-        "--camera",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="intrinsics file of the camera",
-    )
+    add_camera(parser, "intrinsics file of the camera", is_required=True)
     parser.add_argument(
         "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
     )
@@ -125,7 +158,7 @@ def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
 
 def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
     """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen."""
-    add_file(parser, "--camera", "FILE", "intrinsics file of the camera")
+    add_camera(parser, "intrinsics file of the camera")
     parser.add_argument(
         "--rig",
         type=Path,
@@ -223,7 +256,7 @@ def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
         "--exit-by-verdict",
         action="store_true",
         help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
-        "if it is CHECK (not proven), 5 if it passes but does not verify the tip",
+        "if it is CHECK (not proven)",
     )
 
 

@@ -7,7 +7,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from lightpen.commands.arguments import above_zero, add_bits, add_file, add_json, finite
+from lightpen.commands.arguments import (
+    above_zero,
+    add_bits,
+    add_camera,
+    add_file,
+    add_json,
+    finite,
+)
 from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import (
     are_same,
@@ -125,7 +132,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
     )
-    add_file(parser, "--camera", "FILE", "intrinsics file, if there is one")
+    add_camera(parser, "intrinsics file, if there is one")
     rough = parser.add_mutually_exclusive_group()
     rough.add_argument(
         "--pen-sketch",

@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpen.commands.arguments import (
     above_zero,
+    add_camera,
     add_file,
     add_json,
     add_pen_options,
@@ -55,7 +56,7 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT",
         help="calibrations of one tip: RESULT.json, or LED centres as FILE.csv",
     )
-    add_file(parser, "--camera", "FILE", "intrinsics file for LED centres")
+    add_camera(parser, "intrinsics file for LED centres")
     add_file(parser, "--pen", "FILE", "LED file for LED centres")
     add_pen_options(parser)
     parser.add_argument(

@@ -21,7 +21,7 @@ from lightpen.cameras.worker import CameraWorker
 from lightpen.cameras.worker_events import Failed, FaultRaised, WorkerEvent
 from lightpen.commands.arguments import (
     above_zero,
-    add_file,
+    add_camera,
     add_pen_options,
     whole_number,
 )
@@ -68,7 +68,7 @@ def add_stream(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--producer", default="", metavar="FILE", help="GenTL producer of a camera"
     )
-    add_file(parser, "--camera", "FILE", "intrinsics file of the camera")
+    add_camera(parser, "intrinsics file of the camera")
     parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
     add_pen_options(parser)
     parser.add_argument(

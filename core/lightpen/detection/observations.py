@@ -149,8 +149,9 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
 
     Raises `FileError` if most are outside the image of the camera file.
     """
-    pixels = centers.pixels
-    _require_inside(pixels, camera)
+    _require_inside(centers.pixels, camera)
+    seen = camera.sees(centers.pixels)
+    pixels = np.where(seen[..., None], centers.pixels, np.nan)
     enough = np.isfinite(pixels[..., 0]).sum(axis=1) >= MIN_POSE_LEDS
     rotations = np.full((len(pixels), 3, 3), np.nan)
     translations = np.full((len(pixels), 3), np.nan)

@@ -59,7 +59,6 @@ from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
-from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.distortion import Choice
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -343,6 +342,6 @@ def _calibrated(
     for pull in choice.pulls:
         near = of_any if pull is None else pulled(camera, pull)
         found.append(calibrate(near, pen, observations, second=second))
-        if not folds(found[-1].bundle.state.rig.cameras[0]):
+        if not found[-1].bundle.state.rig.cameras[0].folded_share:
             return found[-1], replace(choice, pull=pull)
     return found[0], choice

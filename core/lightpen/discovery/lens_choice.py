@@ -20,7 +20,6 @@ from lightpen.discovery.starts import (
     any_covariance,
 )
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.distortion import (
     FEW,
     FISHEYE,
@@ -114,7 +113,7 @@ def _refitted(
         found = adjust_start(state, pixels, prior, N_STEPS, lengths)
         if found.sigma > (1 - worth) * start.sigma:
             return None
-        if not folds(found.state.rig.cameras[0]):
+        if not found.state.rig.cameras[0].folded_share:
             return _Trial(found, prior, pull)
     return None
 

@@ -16,7 +16,6 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration
-from lightpen.formats.camera_checks import folds
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of
@@ -130,7 +129,7 @@ def contradicting_distance(
 
 def require_lens(camera: Camera) -> None:
     """Refuse a lens that no camera file can state, as the corners were not seen."""
-    if folds(camera):
+    if camera.folded_share:
         raise CalibrationError("discover.lens-folds")
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.errors import CalibrationError, FileError
+from lightpen.errors import FileError
 from lightpen.formats.entries import Entries
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
@@ -12,7 +12,7 @@ from lightpen.model.fisheye import N_COEFFICIENTS
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
 LARGEST_ASPECT = 1.5  # of a pixel
-FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
+LARGEST_FOLD = 0.2  # of the image; one corner folds in many real files
 SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 
 
@@ -94,8 +94,8 @@ def checked_distortion(
 
 
 def check_fold(camera: Camera, entries: Entries) -> None:
-    """Refuse a distortion that is not invertible within the image."""
-    if folds(camera):
+    """Refuse a distortion that is not invertible in much of the image."""
+    if camera.folded_share > LARGEST_FOLD:
         raise FileError(
             "camera-file.fold",
             name=entries.name,
@@ -104,15 +104,22 @@ def check_fold(camera: Camera, entries: Entries) -> None:
         )
 
 
-def folds(camera: Camera) -> bool:
-    """Return whether the distortion folds the image before its corners."""
-    grid = np.meshgrid(
-        np.linspace(0, camera.width - 1, FOLD_SAMPLES),
-        np.linspace(0, camera.height - 1, FOLD_SAMPLES),
-    )
-    pixels = np.stack(grid, axis=-1)
-    try:
-        camera.unproject(pixels[camera.sees(pixels)])
-    except CalibrationError:
-        return True
-    return False
+def check_window(
+    camera: Camera,
+    roi: tuple[int, int, int, int] | None,
+    binning: tuple[int, int],
+    name: str | Message,
+) -> None:
+    """Refuse a region x y width height, px, or a binning that no image can have."""
+    x, y, width, height = roi or (0, 0, *camera.image_size)
+    is_inside = x + width <= camera.width and y + height <= camera.height
+    if not is_inside or width < binning[0] or height < binning[1]:
+        raise FileError(
+            "camera-file.window",
+            name=name,
+            roi=f"{x} {y} {width} {height}",
+            columns=binning[0],
+            lines=binning[1],
+            width=camera.width,
+            height=camera.height,
+        )

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import UsageError
+from lightpen.formats.camera_checks import check_window
+from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import write_whole
 from lightpen.messages import printable
 from lightpen.model.camera import Camera, LensModel
@@ -26,6 +28,28 @@ def write_camera(camera: Camera, path: Path) -> None:
         raise UsageError("camera-file.suffix", name=printable(path.name))
     lines = _opencv_lines(camera)
     write_whole(path, "".join(f"{line}\n" for line in lines).encode())
+
+
+def write_window(
+    path: Path, binning: int, roi: tuple[int, int, int, int] | None = None
+) -> Path:
+    """Write the camera of binned or cut images beside the file of the whole ones.
+
+    ``roi`` is x y width height, in pixels of the file, before binning. Returns the path
+    of the new file, or the given one for its own images. Raises `FileError` if these
+    have no such part.
+    """
+    camera, name = read_camera(path), path.stem
+    check_window(camera, roi, (binning, binning), printable(path.name))
+    if roi is not None and roi != (0, 0, *camera.image_size):
+        camera, name = camera.cropped(*roi), f"{name}-{'-'.join(map(str, roi))}"
+    if binning > 1:
+        camera, name = camera.binned(binning, binning), f"{name}-binned-{binning}"
+    if name == path.stem:
+        return path
+    written = path.with_name(f"{name}.yaml")
+    write_camera(camera, written)
+    return written
 
 
 def _opencv_lines(camera: Camera) -> list[str]:

@@ -1,4 +1,4 @@
-"""Intrinsics of a camera in the files of OpenCV, ROS, Kalibr and MATLAB.
+"""Intrinsics of a camera in the files of OpenCV, ROS, Kalibr, MATLAB and others.
 
 What a file is, is found from its content. Names are compared without regard to case
 and underscores, so that ``camera_matrix``, ``cameraMatrix`` and ``Camera_Matrix`` are
@@ -15,7 +15,14 @@ MATLAB       cameraParameters or cameraIntrinsics by ``jsonencode``:
              ``FocalLength`` and ``PrincipalPoint``, ``K`` or ``IntrinsicMatrix``;
              ``RadialDistortion``, ``TangentialDistortion``, ``ImageSize``. Its first
              pixel is (1, 1).
+caliscope    and anipose: TOML with one camera: ``size``, ``matrix``, ``distortions``,
+             ``fisheye``
+others       mrcal, COLMAP, Metashape, calib.io, PhotonVision, RealSense, camodocal:
+             `lightpen.formats.camera_layouts`
 ============ ==========================================================================
+
+The binning and the region of interest of a ROS file are applied: the camera is that of
+the images.
 
 A fisheye has ``distortion_model`` ``equidistant`` (or ``fisheye``, ``kannala_brandt``)
 and the 4 coefficients of OpenCV's module ``fisheye``, in the layouts of OpenCV, ROS and
@@ -50,12 +57,18 @@ from lightpen.formats.camera_checks import (
     check_fold,
     check_pinhole,
     check_skew,
+    check_window,
     checked_distortion,
     checked_size,
 )
-from lightpen.formats.documents import parse_document
+from lightpen.formats.camera_layouts import (
+    colmap_tree,
+    foreign_intrinsics,
+    refuse_foreign,
+)
+from lightpen.formats.documents import Tree, parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
-from lightpen.formats.files import MEGABYTE, quoted, read_text
+from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text
 from lightpen.messages import Message, message, printable
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.lens_field import MOST, LensField
@@ -71,11 +84,11 @@ FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
 
 _WIDTH = ("image_width", "width")
 _HEIGHT = ("image_height", "height")
-_SIZE = ("image_size", "resolution", "image_resolution", "img_size")
-_MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx")
+_SIZE = ("image_size", "resolution", "image_resolution", "img_size", "size")
+_MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx", "matrix")
 _DISTORTION = (
     *("distortion_coefficients", "dist_coeffs", "distortion_coeffs"),
-    *("dist_coefficients", "distortion", "dist", "D"),
+    *("dist_coefficients", "distortion", "distortions", "dist", "D"),
 )
 _COVARIANCE = ("intrinsics_covariance",)
 _DEVIATIONS = (
@@ -100,6 +113,7 @@ _MONTHS = [
 _ISO_DATE = r"(?a)(\d{4})[-/](\d\d)[-/](\d\d)(?!\d)"
 _C_DATE = rf"(?a)\w{{3}} ({'|'.join(_MONTHS)}) +(\d\d?) \d\d:\d\d:\d\d (\d{{4}})"
 _CAMERA_OF_CHAIN = r"(?a)cam\d+"
+_CAMERA_OF_ARRAY = r"(?a)cam\w*|\d+"
 
 
 def read_camera(path: Path) -> Camera:
@@ -110,21 +124,78 @@ def read_camera(path: Path) -> Camera:
     has no date or an ambiguous one, such as 03/04/25. Raises `FileError` unless it is
     the complete file of a camera.
     """
-    text = read_text(path, CAMERA_FILE, CAMERA_FILE_LIMIT)
     name = printable(path.name)
-    entries = Entries.of(parse_document(text, name), name)
+    refuse_foreign(read_bytes(path, CAMERA_FILE, CAMERA_FILE_LIMIT), name)
+    text = read_text(path, CAMERA_FILE, CAMERA_FILE_LIMIT)
+    tree = colmap_tree(text, name)
+    entries = Entries.of(parse_document(text, name) if tree is None else tree, name)
+    return _of_images(_sensor_camera(entries), entries)
+
+
+def _sensor_camera(entries: Entries) -> Camera:
+    """Return the camera of a file, of the size that its intrinsics are for."""
     chain = [key for key in entries.values if re.fullmatch(_CAMERA_OF_CHAIN, key)]
-    if chain:
+    if chain and not any(_is_of_array(entries.value(key)) for key in chain):
         return _from_kalibr(_only_camera(entries, chain))
+    listed = entries.part("cameras") if _has_mapping(entries, "cameras") else entries
+    array = [key for key in listed.values if re.fullmatch(_CAMERA_OF_ARRAY, key)]
+    array = [key for key in array if _is_of_array(listed.value(key))]
+    if array:
+        return _from_opencv(_only_camera(listed, array))
+    given = foreign_intrinsics(entries)
+    if given is not None:
+        return _camera(entries, *given)
+    if entries.has("xi"):
+        raise FileError(
+            "camera-file.foreign",
+            name=entries.name,
+            program=message("camera-file.omnidirectional"),
+            remedy=message("camera-file.by-images"),
+        )
     if entries.has("intrinsics") and entries.has("camera_model"):
         return _from_kalibr(entries)
-    if entries.has("Intrinsics") and isinstance(entries.value("Intrinsics"), dict):
+    if _has_mapping(entries, "Intrinsics"):
         entries = entries.part("Intrinsics")
     if entries.has("MappingCoefficients"):
         raise _fisheye(entries.name, "fisheyeIntrinsics")
     if entries.has("RadialDistortion") or entries.has("PrincipalPoint"):
         return _from_matlab(entries)
     return _from_opencv(entries)
+
+
+def _has_mapping(entries: Entries, name: str) -> bool:
+    return entries.has(name) and isinstance(entries.value(name), dict)
+
+
+def _is_of_array(value: Tree) -> bool:
+    """Return whether a part of a file is a camera of caliscope or anipose."""
+    return isinstance(value, dict) and {"matrix", "size"} <= set(value)
+
+
+def _of_images(camera: Camera, entries: Entries) -> Camera:
+    """Return a camera of ROS for the images that its driver cuts and bins."""
+    if _has_mapping(entries, "roi"):
+        roi = entries.part("roi")
+        names = ("x_offset", "y_offset", "width", "height")
+        x, y, width, height = (_whole(roi, name) for name in names)
+        if width and height:
+            check_window(camera, (x, y, width, height), (1, 1), entries.name)
+            camera = camera.cropped(x, y, width, height)
+    binning = [max(_whole(entries, f"binning_{axis}"), 1) for axis in "xy"]
+    if max(binning) > 1:
+        check_window(camera, None, (binning[0], binning[1]), entries.name)
+        camera = camera.binned(*binning)
+    return camera
+
+
+def _whole(entries: Entries, name: str) -> int:
+    """Return a whole number of at least 0, which is 0 where there is none."""
+    number = entries.counted(1, name)[0] if entries.has(name) else 0.0
+    if number != round(number) or number < 0:
+        raise FileError(
+            "camera-file.whole", entry=name, name=entries.name, number=number
+        )
+    return int(number)
 
 
 def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
@@ -186,6 +257,8 @@ def _from_matlab(entries: Entries) -> Camera:
 
 
 def _lens(entries: Entries) -> LensModel:
+    if entries.has("fisheye") and str(entries.value("fisheye")).casefold() == "true":
+        return LensModel.KANNALA_BRANDT
     model = entries.word("distortion_model").casefold().replace("-", "_")
     if model in _FISHEYE:
         return LensModel.KANNALA_BRANDT

@@ -1,4 +1,4 @@
-"""Parse untrusted YAML, XML and JSON files to trees of plain values.
+"""Parse untrusted YAML, XML, JSON and TOML files to trees of plain values.
 
 Everything that is not a mapping or a sequence stays text, so that a number is read to
 its last digit whatever the format. Nothing in a file is executed, expanded or followed:
@@ -8,6 +8,7 @@ entities are refused, and so are keys given twice and deep nesting.
 
 import json
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NoReturn, TypeAlias
@@ -32,16 +33,25 @@ _YAML_TAGS = {
     )
 }
 _YAML_DIRECTIVE = r"%YAML[: ].*"
+# A table or an entry after comments.
+_TOML = r"""(?a)(?:\s*(?:#.*\n)?)*+(?:\[[\w."'-]+\]\s*(?:#.*)?\n|[\w."'-]+[ \t]*=)"""
+# Flow mappings of YAML have comments, single quotes and last commas as Python has.
+_PYTHON = r"(?:\s*(?:#.*\n)?)*+\{(?:\s*(?:#.*\n)?)*+'"
 
 
 def parse_document(text: str, name: str) -> dict[str, Tree]:
-    """Return the mapping that a YAML, XML or JSON file holds, recognised by content.
+    """Return the mapping that a file holds, recognised by content.
 
-    The name of the file is for messages. Raises `FileError` for anything else.
+    It is YAML, XML, JSON, TOML, or a dictionary in the notation of Python. The name of
+    the file is for messages. Raises `FileError` for anything else.
     """
     start = text.lstrip()[:1]
     if start == "<":
         tree = parse_xml(text, name)
+    elif re.match(_TOML, text):
+        tree = parse_toml(text, name)
+    elif re.match(_PYTHON, text):
+        tree = parse_yaml(re.sub(r"\bb'[^'\n]*'", "''", text), name)
     elif start in ("{", "["):
         tree = parse_json(text, name)
     else:
@@ -105,6 +115,26 @@ def parse_yaml(text: str, name: str) -> Tree:
         ) from error
     except yaml.YAMLError as error:
         raise _no_yaml(name) from error
+
+
+def parse_toml(text: str, name: str) -> Tree:
+    """Return the tree of a TOML text; see `parse_document`."""
+    try:
+        tree = _as_text(tomllib.loads(text, parse_float=str))
+    except tomllib.TOMLDecodeError as error:
+        raise FileError("toml.invalid", name=name, problem=str(error)) from error
+    except (RecursionError, ValueError) as error:  # nested, or of too many digits
+        raise _too_deep(name) from error
+    _check_size(tree, name)
+    return tree
+
+
+def _as_text(value: Any) -> Tree:
+    if isinstance(value, dict):
+        return {str(key): _as_text(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_as_text(each) for each in value]
+    return value if isinstance(value, bool) else str(value)
 
 
 def parse_xml(text: str, name: str) -> Tree:

@@ -13,7 +13,6 @@ from datetime import date
 import numpy as np
 
 from lightpen.errors import CalibrationError
-from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.changes import (
@@ -194,7 +193,7 @@ def _fit_unfolded(
             if error.message.code != "camera.distortion-folds":
                 raise
             continue
-        if not folds(effects.adjustment.state.cameras[0]):
+        if not effects.adjustment.state.cameras[0].folded_share:
             return replace(choice, pull=pull), effects
     raise CalibrationError("intrinsics.folds")
 

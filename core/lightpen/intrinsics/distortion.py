@@ -13,7 +13,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.formats.camera_checks import folds
 from lightpen.intrinsics.adjustment import FINEST, adjust_board
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.effects import held_out_errors
@@ -152,7 +151,7 @@ def choose_distortion(
     """
     first = _Drawn(fitted, None)
     is_plain = first.camera.lens is LensModel.BROWN
-    if is_plain and folds(first.camera):
+    if is_plain and first.camera.folded_share:
         first = _unfolded(views, tolerances, first.camera) or first
     best, errors = first, held_out_errors(views, first.fitted)
     held_out = {best.n_coefficients: rms_together(errors, views)}
@@ -265,7 +264,7 @@ def _fit_whole(
     pulls: tuple[float, ...] = PULLS
     try:
         free = _Drawn(fit_camera(views, tolerances, near), None)
-        if not folds(free.camera):
+        if not free.camera.folded_share:
             return free
         pulls = PULLS if free.fitted.rms < most else PULLS[-1:]
     except CalibrationError:  # the views do not determine so many coefficients
@@ -328,7 +327,7 @@ def _unfolded(
             drawn = _Drawn(fit_camera(views, tolerances, near, pull), pull)
         except CalibrationError:  # no convergence with so weak a prior
             continue
-        if not folds(drawn.camera):
+        if not drawn.camera.folded_share:
             return drawn
     return None
 

@@ -41,6 +41,7 @@ UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
 # less than 1e-8 px at any sensible focal length.
 UNDISTORT_TOLERANCE = 1e-7
+FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
 
 
 class LensModel(StrEnum):
@@ -274,52 +275,113 @@ class Camera:
 
         Newton's method on `pixels_with_jacobian`; see `unproject`.
         """
+        plane, found = self._unprojected(pixels)
+        if not np.all(found | np.isnan(pixels[..., 0])):
+            raise CalibrationError("camera.distortion-folds")
+        return plane
+
+    def _unprojected(self, pixels: FloatArray) -> tuple[PointMap, BoolArray]:
+        """Return `unproject_with_jacobian`, and where it exists, (...)."""
         focal = np.array([self.fx, self.fy])
         normalised = (pixels - np.array([self.cx, self.cy])) / focal
         if self.lens is LensModel.KANNALA_BRANDT:
-            return self._unproject_fisheye(normalised)
+            return self._unprojected_fisheye(normalised)
         if self._is_for_opencv(pixels):
             near = cv2.undistortPoints(pixels.reshape(-1, 1, 2), *self._opencv)
             normalised = np.asarray(near, dtype=np.float64).reshape(pixels.shape)
         missing = np.isnan(pixels)
-        with np.errstate(all="ignore"):  # what diverges is refused below
+        with np.errstate(all="ignore"):  # of what diverges, there is none
             for _ in range(UNDISTORT_STEPS):
                 there = self.pixels_with_jacobian(normalised)
                 inverse = _inverse_2x2(there.jacobian)
                 step = np.einsum("...ij,...j->...i", inverse, pixels - there.points)
                 normalised = normalised + step
-                if np.all((np.abs(step) < UNDISTORT_TOLERANCE) | missing):
-                    if np.any(_is_folded(there.jacobian)):
-                        break
-                    return PointMap(normalised, inverse)
-        raise CalibrationError("camera.distortion-folds")
+                close = np.abs(step) < UNDISTORT_TOLERANCE
+                if np.all(close | missing):
+                    break
+            found = close.all(axis=-1) & ~_is_folded(there.jacobian)
+        return PointMap(normalised, inverse), found
 
-    def _unproject_fisheye(self, distorted: FloatArray) -> PointMap:
+    def _unprojected_fisheye(self, distorted: FloatArray) -> tuple[PointMap, BoolArray]:
         """Return undistorted points and derivative of distorted points of a fisheye."""
         distances = np.linalg.norm(distorted, axis=-1)
-        found = fisheye.angles(self.distortion, distances)
-        if np.any(np.isnan(found) & ~np.isnan(distances)):
-            raise CalibrationError("camera.distortion-folds")
+        angles = fisheye.angles(self.distortion, distances)
         scale = np.where(
             distances > 1e-12,
-            np.tan(found) / np.where(distances > 1e-12, distances, 1),
+            np.tan(angles) / np.where(distances > 1e-12, distances, 1),
             1,
         )
         normalised = distorted * scale[..., None]
-        return PointMap(
-            normalised, _inverse_2x2(self.pixels_with_jacobian(normalised).jacobian)
+        J = self.pixels_with_jacobian(normalised).jacobian
+        return PointMap(normalised, _inverse_2x2(J)), ~np.isnan(angles)
+
+    @cached_property
+    def folded_share(self) -> float:
+        """Share of the image where the distortion has no inverse."""
+        grid = np.meshgrid(
+            np.linspace(0, self.width - 1, FOLD_SAMPLES),
+            np.linspace(0, self.height - 1, FOLD_SAMPLES),
         )
+        return 1 - float(np.mean(self._unprojected(np.stack(grid, axis=-1))[1]))
 
     def sees(self, pixels: FloatArray) -> BoolArray:
         """Tell which pixels (..., 2) are images of directions before the camera.
 
-        The corners of a fisheye's image may not be.
+        The corners of a fisheye's image may not be, nor what lies beyond a fold of the
+        distortion.
         """
-        if self.lens is not LensModel.KANNALA_BRANDT:
+        if self.lens is LensModel.KANNALA_BRANDT:
+            focal = np.array([self.fx, self.fy])
+            distorted = (pixels - np.array([self.cx, self.cy])) / focal
+            distances = np.linalg.norm(distorted, axis=-1)
+            return fisheye.is_within(self.distortion, distances) & ~np.isnan(
+                fisheye.angles(self.distortion, distances)
+            )
+        if self.folded_share == 0:
             return np.ones(pixels.shape[:-1], dtype=np.bool_)
-        focal = np.array([self.fx, self.fy])
-        distorted = (pixels - np.array([self.cx, self.cy])) / focal
-        return fisheye.is_within(self.distortion, np.linalg.norm(distorted, axis=-1))
+        return np.asarray(self._unprojected(pixels)[1])
+
+    def cropped(self, x: int, y: int, width: int, height: int) -> "Camera":
+        """Return the camera of images that are cut from its own, px."""
+        return self._resampled(1, 1, width, height, np.array([x, y], dtype=float))
+
+    def binned(self, horizontal: int, vertical: int) -> "Camera":
+        """Return the camera of images whose pixels are so many of its own in one."""
+        width, height = self.width // horizontal, self.height // vertical
+        return self._resampled(horizontal, vertical, width, height, np.zeros(2))
+
+    def _resampled(
+        self, horizontal: int, vertical: int, width: int, height: int, first: FloatArray
+    ) -> "Camera":
+        """Return the camera of images whose first pixel begins at a pixel of its own.
+
+        What was measured of a lens field, and from which images it was found, are of
+        the whole images, and are lost.
+        """
+        ratio = np.array([horizontal, vertical])
+        centre = (np.array([self.cx, self.cy]) + 0.5 - first) / ratio - 0.5
+        scales = np.ones(len(self.intrinsics))
+        scales[:4] = 1 / np.tile(ratio, 2)
+        field = self.lens_field
+        if field is not None:
+            size = float(np.sqrt(horizontal * vertical))
+            field = LensField.of(
+                width, height, field.amplitude / size, field.length / size
+            )
+        return replace(
+            self,
+            width=width,
+            height=height,
+            fx=self.fx / horizontal,
+            fy=self.fy / vertical,
+            cx=float(centre[0]),
+            cy=float(centre[1]),
+            covariance=None
+            if self.covariance is None
+            else scales[:, None] * self.covariance * scales,
+            lens_field=field,
+            found=None,
+        )
 
 
 def _rational(distortion: FloatArray) -> FloatArray:

@@ -20,6 +20,9 @@ def unmodelled_effects_of(
     file or the station does not state is not checked.
     """
     doubts = []
+    if camera.folded_share:
+        share = 100 * camera.folded_share
+        doubts.append(message("camera-validity.fold", share=share))
     if camera.serial and serial and camera.serial.casefold() != serial.casefold():
         doubts.append(
             message("camera-validity.serial", stated=camera.serial, used=serial)

@@ -79,6 +79,7 @@ def _rays(
     R, t = poses.rotations, poses.translations
     normalised = np.full_like(pixels, np.nan)
     seen = np.isfinite(pixels[..., 0])
+    seen[seen] = camera.sees(pixels[seen])
     normalised[seen] = camera.unproject(pixels[seen])
     ahead = np.concatenate([normalised, np.ones((*pixels.shape[:2], 1))], axis=2)
     directions = ahead @ R

@@ -1801,8 +1801,8 @@
         <translation>相机与镜头的内参</translation>
     </message>
     <message>
-        <source>Intrinsics of OpenCV, ROS, Kalibr, MATLAB ({0})</source>
-        <translation>OpenCV、ROS、Kalibr、MATLAB 内参 ({0})</translation>
+        <source>Intrinsics files ({0})</source>
+        <translation>内参文件 ({0})</translation>
     </message>
     <message>
         <source>Intrinsics file</source>
@@ -1811,6 +1811,10 @@
     <message>
         <source>Open...</source>
         <translation>打开...</translation>
+    </message>
+    <message>
+        <source>Binned or cropped images...</source>
+        <translation>合并或裁剪的图像...</translation>
     </message>
     <message>
         <source>Calibrate camera...</source>
@@ -1857,8 +1861,8 @@
         <translation>与实时图像一致：{0}</translation>
     </message>
     <message>
-        <source>Image size is {0}; the intrinsics file is for {1}. Choose the file of this camera, set the region to the whole sensor, or turn off binning.</source>
-        <translation>图像尺寸为 {0}，内参文件适用于 {1}。请选择此相机的文件，将区域设为整个传感器，或关闭像素合并。</translation>
+        <source>Image size is {0}; the intrinsics file is for {1}. Choose the file of this camera, or say how the images are binned or cropped.</source>
+        <translation>图像尺寸为 {0}；内参文件适用于 {1}。请选择这台相机的文件，或说明图像如何合并像素或裁剪。</translation>
     </message>
     <message>
         <source>Checked by a swing: file and camera agree.</source>
@@ -3316,6 +3320,45 @@
     <message>
         <source>About Lightpen</source>
         <translation>关于 Lightpen</translation>
+    </message>
+</context>
+<context>
+    <name>PartDialog</name>
+    <message>
+        <source>Binned or cropped images</source>
+        <translation>合并或裁剪的图像</translation>
+    </message>
+    <message>
+        <source>An intrinsics file for these images is written beside the file of the whole sensor. The region is in pixels of that file, before binning.</source>
+        <translation>将在整个传感器的文件旁写入适用于这些图像的内参文件。区域以该文件的像素计，为像素合并之前。</translation>
+    </message>
+    <message>
+        <source>Binning</source>
+        <translation>像素合并</translation>
+    </message>
+    <message>
+        <source>Left edge</source>
+        <translation>左边缘</translation>
+    </message>
+    <message>
+        <source>Top edge</source>
+        <translation>上边缘</translation>
+    </message>
+    <message>
+        <source>Width</source>
+        <translation>宽度</translation>
+    </message>
+    <message>
+        <source>Height</source>
+        <translation>高度</translation>
+    </message>
+    <message>
+        <source>Write and use</source>
+        <translation>写入并使用</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>取消</translation>
     </message>
 </context>
 <context>
@@ -5531,10 +5574,6 @@ mm</translation>
         <translation>按空格键继续。</translation>
     </message>
     <message>
-        <source>Nothing moved</source>
-        <translation>没有移动</translation>
-    </message>
-    <message>
         <source>Hold still</source>
         <translation>握住不动</translation>
     </message>
@@ -6418,10 +6457,6 @@ mm</translation>
         <translation>锥孔间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
     </message>
     <message>
-        <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
-        <translation>{name} 的畸变系数使 {width} × {height} px 的图像折叠：有些像素没有视线方向，或有两个。请检查这些系数，或用覆盖到图像边角的视图重新标定相机。</translation>
-    </message>
-    <message>
         <source>The file has {n_leds} LEDs.</source>
         <translation>文件有 {n_leds} 个 LED。</translation>
     </message>
@@ -6610,6 +6645,10 @@ mm</translation>
         <translation>测头已验证：若测头误差达到 {detectable:.4f} mm 或更大，本次验证会显示出来（概率 95 %）。</translation>
     </message>
     <message>
+        <source>Write image size, camera matrix and distortion coefficients as text: by jsonencode in MATLAB, by cv2.FileStorage in Python.</source>
+        <translation>请将图像尺寸、相机矩阵和畸变系数写成文本：MATLAB 用 jsonencode，Python 用 cv2.FileStorage。</translation>
+    </message>
+    <message>
         <source>a Digital Calibration Certificate in the schema of PTB; it names the laboratory</source>
         <translation>符合 PTB 模式的数字校准证书；其中注明实验室</translation>
     </message>
@@ -6774,6 +6813,10 @@ mm</translation>
         <translation>文件同时含有小数点和小数逗号；另一种形式在第 {line} 行。请统一使用一种形式。</translation>
     </message>
     <message>
+        <source>the omnidirectional lens model (xi)</source>
+        <translation>全向镜头模型 (xi)</translation>
+    </message>
+    <message>
         <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the LED file is of this pen, and that LEDs are numbered from 1.</source>
         <translation>没有 LED {led}；光笔有 LED 1 至 {n_leds}。请检查 LED 文件是否属于这支光笔，以及 LED 是否从 1 开始编号。</translation>
     </message>
@@ -6816,6 +6859,10 @@ mm</translation>
     <message>
         <source>{covered:.0f} of {needed:.0f}°</source>
         <translation>{covered:.0f}° / {needed:.0f}°</translation>
+    </message>
+    <message>
+        <source>{entry} in {name} is {number:g}; a whole number of 0 or more is needed. Correct it.</source>
+        <translation>{name} 中的 {entry} 为 {number:g}；需要 0 或更大的整数。请更正。</translation>
     </message>
     <message>
         <source>{kind}, {side}</source>
@@ -6966,6 +7013,10 @@ mm</translation>
         <translation>{name} 的数值类型为 {value_type}；需要 8 或 16 位灰度值。请不经转换保存图像。</translation>
     </message>
     <message>
+        <source>{name} has {count} parameters of the model {model}, which has {names}. Export the file again.</source>
+        <translation>{name} 有模型 {model} 的 {count} 个参数，该模型的参数为 {names}。请重新导出文件。</translation>
+    </message>
+    <message>
         <source>{name} has {n_cells:,} cells; at most {most:,} are read. Check that this is the right file, or split it.</source>
         <translation>{name} 有 {n_cells:,} 个单元格；最多读取 {most:,} 个。请检查文件是否正确，或将其拆分。</translation>
     </message>
@@ -6986,12 +7037,28 @@ mm</translation>
         <translation>{name} 是压缩方式为 {compression} 的 TIFF，不受支持。请将图像保存为 PNG 或不压缩。</translation>
     </message>
     <message>
+        <source>{name} is a camera of {program} with the lens model {model}, which cannot be read. {remedy}</source>
+        <translation>{name} 是 {program} 的相机，镜头模型为 {model}，无法读取。{remedy}</translation>
+    </message>
+    <message>
+        <source>{name} is an intrinsics file of {program}, which cannot be read. {remedy}</source>
+        <translation>{name} 是 {program} 的内参文件，无法读取。{remedy}</translation>
+    </message>
+    <message>
         <source>{name} is damaged or not a supported image (PNG, JPEG, BMP, TIFF, PGM, WebP). Capture or copy it again.</source>
         <translation>{name} 已损坏或不是支持的图像（PNG、JPEG、BMP、TIFF、PGM、WebP）。请重新采集或复制。</translation>
     </message>
     <message>
+        <source>{name} is for images of {width} x {height} px, which have no region {roi} (x, y, width, height) binned {columns} x {lines}. Give the region in pixels of these images.</source>
+        <translation>{name} 适用于 {width} x {height} px 的图像，其中没有按 {columns} x {lines} 合并的区域 {roi}（x、y、宽、高）。请以这些图像的像素给出区域。</translation>
+    </message>
+    <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that this is the right file.</source>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
+    </message>
+    <message>
+        <source>{name} is not valid TOML ({problem}). The file may be cut short: copy or export it again.</source>
+        <translation>{name} 不是有效的 TOML（{problem}）。文件可能被截断：请重新复制或导出。</translation>
     </message>
     <message>
         <source>{name} is the raw image of a colour camera: its pixels repeat the pattern of a Bayer filter, which moves the centres of LEDs. Save the images in colour (demosaiced) or grey, or use a monochrome camera.</source>
@@ -8434,6 +8501,14 @@ mm</translation>
         <translation>到相机的链路丢失图像：{n_sent} 幅中有 {n_incomplete} 幅不完整，{n_missed} 幅未到达。请降低帧率，使用更小的区域或更大的数据包，或检查线缆和交换机。</translation>
     </message>
     <message>
+        <source>It is a whole project: save the calibration of the one camera by Tools, Camera Calibration, Save, as XML.</source>
+        <translation>它是整个项目：请通过 Tools、Camera Calibration、Save 将这一台相机的标定保存为 XML。</translation>
+    </message>
+    <message>
+        <source>Its distortion is not that of OpenCV or of Kannala and Brandt: calibrate the camera from the images of its board, here or with one of these models.</source>
+        <translation>其畸变不是 OpenCV 或 Kannala-Brandt 的模型：请用标定板图像标定相机，可在此处，或采用其中一种模型。</translation>
+    </message>
+    <message>
         <source>Next: clamp cone and camera, and repeat the press test.</source>
         <translation>下一步：夹紧锥座和相机，重做压力试验。</translation>
     </message>
@@ -8528,6 +8603,14 @@ mm</translation>
     <message>
         <source>The difference from the previous tip is accepted up to {gate:g} times U (k = 2) of the difference along each axis (an unchanged tip is accepted in 95 % of all cases); beyond it, or where the previous tip cannot be read, the verdict is CHECK. A CHECK can be accepted only with a reason, a REPEAT not at all.</source>
         <translation>与前一测头之差，各轴均不超过该差值 U (k = 2) 的 {gate:g} 倍时予以接受（测头未变时，接受的概率为 95 %）；超出此值，或无法读取前一测头时，判为“需检查”。“需检查”须说明理由才能接受，“重新摆动”不得接受。</translation>
+    </message>
+    <message>
+        <source>The distortion coefficients of {name} fold the image of {width} x {height} px: much of it has no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
+        <translation>{name} 的畸变系数使 {width} x {height} px 的图像折叠：其中很大部分没有视线方向，或有两个。请检查这些系数，或用伸入图像四角的视图重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The distortion of the intrinsics file has no inverse in {share:.1f} % of the image, at its corners. LEDs there are not used; calibrate the camera with views that reach into the corners.</source>
+        <translation>内参文件的畸变在图像四角处（图像的 {share:.1f} %）不可逆。那里的 LED 不予使用；请用伸入四角的视图标定相机。</translation>
     </message>
     <message>
         <source>The distortion of the intrinsics file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
@@ -11351,14 +11434,6 @@ mm</translation>
     <message>
         <source>PASS</source>
         <translation>合格</translation>
-    </message>
-    <message>
-        <source>SCALE OK</source>
-        <translation>比例合格</translation>
-    </message>
-    <message>
-        <source>STEADY</source>
-        <translation>稳定</translation>
     </message>
     <message>
         <source>CHECK</source>

@@ -160,6 +160,23 @@ def test_given_centres_show_the_same_alone_as_among_others(plan: ScenePlan) -> N
         np.testing.assert_allclose(detection.translation, translation, atol=0.01)
 
 
+def test_a_given_centre_beyond_the_fold_of_the_distortion_is_not_seen(
+    plan: ScenePlan,
+) -> None:
+    camera = replace(CAMERA, distortion=np.array([-1.3, 0, 0, 0, 0]))
+    swing = plan.swing
+    leds, normals = leds_in_camera(PEN, swing.rotations, swing.translations)
+    pixels = ellipse_centers(camera, leds, normals, PEN.diameter / 2)
+    pixels[0, 2] = 3.0  # px, a corner
+    found = observe_centers(
+        Centers(np.arange(6) + 1, pixels, Path("centers.csv")), camera, PEN
+    )
+
+    pixels[0, 2] = np.nan
+    np.testing.assert_array_equal(found.seen_pixels, pixels)
+    assert set(found.reasons) == {Reason.NONE}
+
+
 def test_centres_of_a_larger_image_are_refused(plan: ScenePlan) -> None:
     centers = Centers(np.arange(6) + 1, 3 * true_centers(plan), Path("centers.csv"))
 

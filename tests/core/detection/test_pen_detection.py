@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from tests.simulated_plans import live_plan
@@ -68,6 +69,21 @@ def test_a_pen_that_is_no_longer_there_is_sought_in_the_whole_image() -> None:
             *(image, SCENE.camera, SCENE.pen, None, before), is_followed=is_followed
         )
         np.testing.assert_allclose(detection.rotation, image_plan.rotation, atol=2e-4)
+
+
+def test_light_where_the_distortion_folds_is_not_used() -> None:
+    camera = replace(SCENE.camera, distortion=np.array([-1.3, 0, 0, 0, 0]))
+    scene = replace(SCENE, camera=camera)
+    image_plan = live_plan(scene, 0, 1.0)
+    image = render_plan(scene, image_plan)
+    cv2.circle(image, (14, 14), 9, 200, -1, cv2.LINE_AA)
+    assert camera.folded_share > 0
+    assert not camera.sees(np.array([14.0, 14.0]))
+
+    detection = detect_pen(image, camera, scene.pen)
+
+    assert detection.n_leds == scene.pen.n_leds
+    np.testing.assert_allclose(detection.rotation, image_plan.rotation, atol=2e-4)
 
 
 def test_masked_light_is_not_seen() -> None:

@@ -19,6 +19,7 @@ from lightpen.errors import FileError, LightpenError, UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera
 from lightpen.model.camera import Camera, LensModel
+from lightpen.model.camera_validity import unmodelled_effects_of
 from lightpen.model.lens_field import LensField
 from lightpen.model.self_calibration import FoundCamera
 
@@ -383,7 +384,7 @@ def test_a_temperature_that_no_camera_has_is_refused(tmp_path: Path) -> None:
         (", 0.33333333333333331 ]", ", 1, 2 ]", "6 numbers where its 1 rows of 5"),
         ("dt: d", "dt: !!python/object/apply:os.getcwd []", "tag .*For security"),
         ("camera_matrix", "camera", "has no camera_matrix"),
-        ("distortion_coefficients", "distortions", "has no distortion_coefficients"),
+        ("distortion_coefficients", "bending", "has no distortion_coefficients"),
         ("image_height:", "image_width:", 'image_width" is given a second time'),
         ("image_height:", "imageWidth: 5\nimage_height:", "which mean the same"),
         ("image_height:", "width: 5\nimage_height:", "which mean the same"),
@@ -575,9 +576,11 @@ def test_distortion_of_another_model_is_refused(
     assert sentence in refusal(tmp_path, json.dumps(entries))
 
 
-@pytest.mark.parametrize(("k1", "folds"), [(-1.2, False), (-1.3, True), (9.0, False)])
-def test_distortion_that_folds_within_the_image_is_refused(
-    tmp_path: Path, k1: float, folds: bool
+@pytest.mark.parametrize(
+    ("k1", "share"), [(-1.2, 0.0), (-1.3, 0.05), (-3.0, 0.5), (9.0, 0.0)]
+)
+def test_distortion_may_fold_the_image_in_its_corners_only(
+    tmp_path: Path, k1: float, share: float
 ) -> None:
     """The corner is at 0.346, the image of the fold at 2 / 3 sqrt(-1 / (3 k1))."""
     entries = {
@@ -585,11 +588,21 @@ def test_distortion_that_folds_within_the_image_is_refused(
         "K": camera().matrix.tolist(),
         "D": [k1, 0, 0, 0],
     }
-    if folds:
+    if share > 0.2:
         sentence = "of cam.yaml fold the image of 2448 x 2048 px"
         assert sentence in refusal(tmp_path, json.dumps(entries))
-    else:
-        assert read_camera(saved(tmp_path, json.dumps(entries))).distortion[0] == k1
+        return
+    found = read_camera(saved(tmp_path, json.dumps(entries)))
+    assert found.distortion[0] == k1
+    assert found.folded_share <= share
+    assert (found.folded_share > 0) == (share > 0)
+    fold = 2 / 3 * np.sqrt(-1 / (3 * k1)) if k1 < 0 else np.inf
+    pixels = np.random.default_rng(1).uniform(0, [2447, 2047], (2000, 2))
+    distances = np.linalg.norm((pixels - found.matrix[:2, 2]) / found.fx, axis=1)
+    clear = np.abs(distances - fold) > 1e-3
+    np.testing.assert_array_equal(found.sees(pixels[clear]), distances[clear] < fold)
+    doubts = unmodelled_effects_of(found, date(2026, 1, 1))
+    assert [each.code for each in doubts] == ["camera-validity.fold"] * (share > 0)
 
 
 @pytest.mark.parametrize(

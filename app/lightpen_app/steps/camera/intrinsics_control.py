@@ -1,20 +1,25 @@
 """Intrinsics of the step Camera: read from a file, or calibrated."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QWidget
 
+from lightpen.formats.camera_file_writing import write_window
 from lightpen.formats.opened_files import CameraFile
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
+from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
     from lightpen.record.folder.camera_calibrations import CameraTrial
     from lightpen_app.steps.camera.board_window import BoardWindow
+
+Region: TypeAlias = tuple[int, int, int, int]  # x, y, width and height, px
 
 
 class IntrinsicsControl(QObject):
@@ -35,6 +40,7 @@ class IntrinsicsControl(QObject):
         # Connections
         workbench.selection.station_changed.connect(self._forget_file)
         panel.path_chosen.connect(self._on_path_chosen)
+        panel.part_requested.connect(self._on_part_requested)
         panel.calibration_requested.connect(self._on_calibration_requested)
 
     def shut_down(self) -> None:
@@ -51,6 +57,22 @@ class IntrinsicsControl(QObject):
     def _on_path_chosen(self, path: str) -> None:
         self._reading.start(
             lambda _: CameraFile.read(Path(path)),
+            self._on_file_read,
+            self._panel.set_problem,
+        )
+
+    def _on_part_requested(self) -> None:
+        file = self._selection.preparation.camera_file
+        if file is None:
+            return
+        dialog = PartDialog(file.camera, self._page)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.given.connect(partial(self._on_part_given, file.path))
+        dialog.open()
+
+    def _on_part_given(self, path: Path, binning: int, region: Region) -> None:
+        self._reading.start(
+            lambda _: CameraFile.read(write_window(path, binning, region)),
             self._on_file_read,
             self._panel.set_problem,
         )

@@ -21,7 +21,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
-FILES = "*.yaml *.yml *.json *.xml"
+FILES = "*.yaml *.yml *.json *.xml *.toml *.cameramodel *.txt"
 N_FACTS = 5
 
 
@@ -30,6 +30,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
     path_chosen = Signal(str)  # path of the file to open
     calibration_requested = Signal()  # calibrate the camera with a board
+    part_requested = Signal()  # the images are binned or cropped
     discovery_requested = Signal()  # no such file: find the camera by a swing
 
     def __init__(self) -> None:
@@ -43,6 +44,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._path = PathField()
         self._open = PushButton()
         self._path.add_button(self._open)
+        self._part = PushButton()
         self._calibrate = PushButton()
         self._discover = PushButton()
         self._problem = SignLabel()
@@ -60,6 +62,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             self._check,
             self._doubt,
             self._by_pen,
+            self._part,
             self._calibrate,
             self._discover,
         )
@@ -74,6 +77,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
+        self._part.clicked.connect(self.part_requested)
         self._calibrate.clicked.connect(self.calibration_requested)
         self._discover.clicked.connect(self.discovery_requested)
 
@@ -119,7 +123,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._path.pick(
             QFileDialog.FileMode.ExistingFile,
             self.tr("Intrinsics of camera and lens"),
-            self.tr("Intrinsics of OpenCV, ROS, Kalibr, MATLAB ({0})").format(FILES),
+            self.tr("Intrinsics files ({0})").format(FILES),
         )
 
     def _retranslate(self) -> None:
@@ -128,6 +132,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         edit.setAccessibleName(self.tr("Intrinsics file"))
         edit.setPlaceholderText(self.tr("Intrinsics file"))
         self._open.setText(self.tr("Open..."))
+        self._part.setText(self.tr("Binned or cropped images..."))
         self._calibrate.setText(self.tr("Calibrate camera..."))
         self._discover.setText(self.tr("I have no such file..."))
         set_tooltip(
@@ -151,6 +156,9 @@ class IntrinsicsPanel(Translated, QGroupBox):
     def _refresh(self) -> None:
         camera = None if self._file is None else self._file.camera
         self._check.set_value(self._checked(camera))
+        self._part.setVisible(
+            camera is not None and self._image_size not in (None, camera.image_size)
+        )
         self._doubt.set_value(self._doubt_message(camera))
         self._by_pen.set_value(self._checked_by_pen(camera))
         facts = [""] * N_FACTS if camera is None else self._fact_texts(camera)
@@ -175,7 +183,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
             return StatusMessage.good(words.format(made_for))
         words = self.tr(
             "Image size is {0}; the intrinsics file is for {1}. Choose the file of "
-            "this camera, set the region to the whole sensor, or turn off binning."
+            "this camera, or say how the images are binned or cropped."
         )
         sent = self._size_text(*self._image_size)
         return StatusMessage(words.format(sent, made_for), Sign.WARNING, Tone.BAD)

@@ -66,15 +66,19 @@ def spot_arrays(
     flaws = np.zeros(there.shape, dtype=np.int64)
     flaws[there] = np.concatenate([s.flaws for s in spots])
     focal = float(np.sqrt(camera.fx * camera.fy))
-    plane = camera.unproject_with_jacobian(np.concatenate([s.centers for s in spots]))
+    centers = np.concatenate([s.centers for s in spots])
+    seen = there.copy()
+    seen[there] = camera.sees(centers)
+    centers[~seen[there]] = np.nan  # has no direction
+    plane = camera.unproject_with_jacobian(centers)
     J = focal * plane.jacobian
     points = np.full((*there.shape, 2), FAR)
-    points[there] = focal * plane.points
+    points[there] = np.where(seen[there][:, None], focal * plane.points, FAR)
     shapes = np.empty((*there.shape, 2, 2))
     shapes[:] = np.eye(2)
     shapes[there] = J @ np.concatenate([s.shapes for s in spots]) @ J.transpose(0, 2, 1)
-    unwhole = flaws & UNWHOLE != 0
-    usable = there & (use_unwhole | ~unwhole)
+    unwhole = seen & (flaws & UNWHOLE != 0)
+    usable = seen & (use_unwhole | ~unwhole)
     return SpotArrays(
         focal=focal,
         points=np.where(usable[..., None], points, FAR),

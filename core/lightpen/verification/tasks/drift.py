@@ -142,7 +142,7 @@ def _assessment(
     if limits.decision(distance, uncertainty, limit) is not Decision.ACCEPTED:
         return check(moved, TOUCH_LONGER)
     good = message("drift.good", distance=move, uncertainty=uncertainty, limit=limit)
-    return accepted(good, USE_TOUCHES, Grade.STEADY)
+    return accepted(good, USE_TOUCHES)
 
 
 def _screen(

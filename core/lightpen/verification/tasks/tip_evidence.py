@@ -202,7 +202,6 @@ def with_power(
     return accepted(
         message("tip.with-power", reason=reason, power=not_the_tip(found, limits)),
         BETTER_POSTURES,
-        Grade.SCALE,
     )
 
 

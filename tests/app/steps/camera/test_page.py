@@ -58,6 +58,7 @@ from lightpen_app.steps.camera.focus_meter import FocusMeter
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.page import CameraPage
+from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
@@ -448,14 +449,39 @@ def test_a_file_for_images_of_another_size_is_reported_and_stops_the_step(
 
     live.wait(
         "Image size is 1224 x 1024; the intrinsics file is for 612 x 512. Choose "
-        "the file of this camera, set the region to the whole sensor, or turn off "
-        "binning."
+        "the file of this camera, or say how the images are binned or cropped."
     )
     assert not live.page.is_complete()
     assert (
         "The intrinsics file is for another image size."
         in live.page.main_action().why_not
     )
+
+
+def test_a_file_of_the_whole_sensor_is_used_for_binned_images(
+    live: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    path = intrinsics(workbench, tmp_path, width=2448, height=2048)
+    live.enter("Intrinsics file", str(path))
+    live.wait("the intrinsics file is for 2448 x 2048")
+
+    live.click("Binned or cropped images...")
+    dialog = live.child(PartDialog)
+    binning = dialog.findChildren(NumberField)[0]
+    binning.selectAll()
+    QTest.keyClicks(binning, "2")
+    QTest.mouseClick(
+        next(b for b in dialog.findChildren(QPushButton) if "use" in b.text()),
+        Qt.MouseButton.LeftButton,
+    )
+
+    live.wait("Matches the live images: 1224 x 1024")
+    used = workbench.selection.preparation.camera_file
+    assert used is not None
+    assert used.path == path.with_name(f"{path.stem}-binned-2.yaml")
+    panel = live.child(IntrinsicsPanel)
+    shown = [b.text() for b in panel.findChildren(QPushButton) if b.isVisible()]
+    assert "Binned or cropped images..." not in shown
 
 
 @pytest.mark.parametrize(

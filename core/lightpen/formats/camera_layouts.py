@@ -1,0 +1,339 @@
+"""Intrinsics in the files of other programs, one description a layout.
+
+A layout says where a file has its numbers and what they are called here: fx fy cx cy, a
+focal length f of both, an aspect ratio fy / fx, k1 to k6, p1 p2, and OpenCV's s1 to s4,
+tx, ty of thin prism and tilt. ``dx dy`` is the principal point from the centre of the
+image, ``b1`` what fx has more than f, ``r8`` the coefficient of r^8, ``skew`` and ``-``
+a number that means nothing. What a file does not have is 0.
+"""
+
+import re
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.camera_checks import check_skew
+from lightpen.formats.documents import Tree
+from lightpen.formats.entries import Entries
+from lightpen.formats.files import quoted
+from lightpen.messages import message
+from lightpen.model.camera import LensModel
+
+BROWN, KANNALA_BRANDT = LensModel.BROWN, LensModel.KANNALA_BRANDT
+_FOCAL = "f"
+_RADIAL = "k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty"  # in the order of OpenCV
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where a program writes the intrinsics of a camera.
+
+    A path is names with ``/`` between them; ``|`` separates other spellings.
+    """
+
+    program: str
+    marks: str  # entries that tell the layout
+    size: str  # paths of width and height, or of both together
+    numbers: dict[str, str]  # by path: the names of the numbers there
+    part: str = ""  # path of the part that has all this
+    model: str = ""  # path of the name of the lens model
+    # Names of lens models without blanks and marks; of the last, if undistorted
+    brown: str = ""
+    fisheye: str = ""
+    undistorted: str = ""
+    of_fisheye: dict[str, str] = field(default_factory=dict)  # other `numbers` of it
+    first: float = 0.0  # coordinate of the centre of the first pixel
+
+
+class Given(NamedTuple):
+    """The numbers of a file, in the conventions of OpenCV."""
+
+    size: tuple[float, float]
+    pinhole: FloatArray  # fx fy cx cy
+    coefficients: FloatArray
+    lens: LensModel
+
+
+def _each(names: str, path: str = "{}") -> dict[str, str]:
+    """Return the numbers at paths, by names such as ``f cx:dx``: in the file, here."""
+    pairs = [name.partition(":") for name in names.split()]
+    return {path.format(name): here or name for name, _, here in pairs}
+
+
+LAYOUTS = (
+    Layout(
+        "mrcal",
+        marks="lensmodel imagersize",
+        size="imagersize",
+        numbers={"intrinsics": f"fx fy cx cy {_RADIAL}"},
+        model="lensmodel",
+        brown="lensmodelpinhole lensmodelopencv4 lensmodelopencv5 lensmodelopencv8 "
+        "lensmodelopencv12",
+    ),
+    Layout(
+        "COLMAP",
+        marks="colmap",
+        size="width height",
+        numbers=_each(f"f fx fy cx cy {_RADIAL}"),
+        model="colmap",
+        brown="simplepinhole pinhole simpleradial radial opencv fullopencv",
+        fisheye="simpleradialfisheye radialfisheye opencvfisheye",
+        first=0.5,
+    ),
+    Layout(
+        "Metashape",
+        marks="projection",
+        size="width height",
+        numbers=_each(
+            "f b1 b2:skew cx:dx cy:dy k1 k2 k3 k4:r8 p1:p2 p2:p1 p3:s1 p4:s2"
+        ),
+        model="projection",
+        brown="frame",
+        fisheye="fisheye",
+        first=0.5,
+    ),
+    Layout(
+        "calib.io",
+        marks="Calibration",
+        part="Calibration/cameras/model",
+        size="ptr_wrapper/data/CameraModelCRT/CameraModelBase/imageSize",
+        numbers=_each(
+            f"f ar:aspect cx cy {_RADIAL} tauX:tx tauY:ty",
+            "ptr_wrapper/data/parameters/{}/val",
+        ),
+        model="polymorphic_name",
+        brown="libcalibcameramodelopencv",
+    ),
+    Layout(
+        "PhotonVision",
+        marks="cameraIntrinsics",
+        size="resolution",
+        numbers={
+            "cameraIntrinsics": "fx skew cx - fy cy - - -",
+            "distCoeffs|cameraExtrinsics": _RADIAL,
+        },
+    ),
+    Layout(
+        "RealSense",
+        marks="ppx ppy",
+        size="width height",
+        numbers=_each("fx fy ppx:cx ppy:cy") | {"coeffs": "k1 k2 p1 p2 k3"},
+        model="model|distortion_model",
+        brown="none brownconrady",
+        fisheye="kannalabrandt4",
+        undistorted="inversebrownconrady modifiedbrownconrady",
+        of_fisheye={"coeffs": "k1 k2 k3 k4 -"},
+    ),
+    Layout(
+        "camodocal",
+        marks="model_type projection_parameters",
+        size="image_width image_height",
+        numbers=_each(
+            "fx fy cx cy mu:fx mv:fy u0:cx v0:cy k2:k1 k3:k2 k4:k3 k5:k4",
+            "projection_parameters/{}",
+        )
+        | _each("k1 k2 p1 p2", "distortion_parameters/{}"),
+        model="model_type",
+        brown="pinhole",
+        fisheye="kannalabrandt",
+    ),
+)
+COLMAP_MODELS = {
+    "SIMPLE_PINHOLE": "f cx cy",
+    "PINHOLE": "fx fy cx cy",
+    "SIMPLE_RADIAL": "f cx cy k1",
+    "RADIAL": "f cx cy k1 k2",
+    "OPENCV": "fx fy cx cy k1 k2 p1 p2",
+    "FULL_OPENCV": "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
+    "OPENCV_FISHEYE": "fx fy cx cy k1 k2 k3 k4",
+    "SIMPLE_RADIAL_FISHEYE": "f cx cy k1",
+    "RADIAL_FISHEYE": "f cx cy k1 k2",
+}
+_COLMAP_LINE = (
+    r"(?am)^[ \t]*\d+[ \t]+([A-Z][A-Z_0-9]+)((?:[ \t]+[-+.\deE]+){3,})[ \t]*$"
+)
+_BY_IMAGES = message("camera-file.by-images")
+_OF_PROJECT = message("camera-file.of-project")
+_AS_TEXT = message("camera-file.as-text")
+FOREIGN = (
+    (r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):", "Halcon", _BY_IMAGES),
+    (r"#\s*polynomial coefficients for the DIRECT", "OCamCalib", _BY_IMAGES),
+    (r"<document[^>]*>\s*<chunk", "Metashape", _OF_PROJECT),
+    (r"\AMATLAB 5\.0 MAT-file", "MATLAB (.mat)", _AS_TEXT),
+    (r"\A(\x89HDF|.{512}\x89HDF)", "HDF5 (.mat, .h5)", _AS_TEXT),
+    (r"\A(\x93NUMPY|PK\x03\x04.{26,40}\.npy)", "numpy", _AS_TEXT),
+    (r"\A\x80[\x02-\x05].{1,12}(\x8c|\}|c)", "Python (pickle)", _AS_TEXT),
+)
+
+
+def refuse_foreign(data: bytes, name: str) -> None:
+    """Refuse the file of a program whose lens model or form is not read, by name."""
+    text = data[:100_000].decode("latin-1")
+    for pattern, program, remedy in FOREIGN:
+        if re.search(pattern, text, re.DOTALL):
+            raise FileError(
+                "camera-file.foreign", name=name, program=program, remedy=remedy
+            )
+
+
+def colmap_tree(text: str, name: str) -> dict[str, Tree] | None:
+    """Return the only camera of a ``cameras.txt`` of COLMAP; None of another file."""
+    lines = re.findall(_COLMAP_LINE, text)
+    if not lines or re.search(r"(?m)^\s*[^#\s\d]", text):
+        return None
+    if len(lines) > 1:
+        raise FileError("camera-file.several-cameras", name=name, n_cameras=len(lines))
+    model, cells = lines[0]
+    names = ["width", "height", *COLMAP_MODELS.get(model, "").split()]
+    values = cells.split()
+    if model in COLMAP_MODELS and len(values) != len(names):
+        raise FileError(
+            "camera-file.colmap-count",
+            name=name,
+            model=model,
+            count=len(values) - 2,
+            names=COLMAP_MODELS[model],
+        )
+    return {"colmap": model, **dict(zip(names, values, strict=False))}
+
+
+def foreign_intrinsics(entries: Entries) -> Given | None:
+    """Return the intrinsics in the layout of another program; None in no such layout.
+
+    Raises `FileError` for a lens model that is not read, or if a number is missing.
+    """
+    for layout in LAYOUTS:
+        if all(entries.has(mark) for mark in layout.marks.split()):
+            return _given(layout, entries)
+    return None
+
+
+def _given(layout: Layout, entries: Entries) -> Given:
+    part = _descend(entries, layout.part)
+    lens, stated = _lens(layout, part)
+    size = np.concatenate([_numbers(part, path) for path in layout.size.split()])
+    if len(size) != 2:
+        raise FileError("camera-file.no-size", name=entries.name)
+    named: dict[str, float] = {}
+    others = layout.of_fisheye if lens is KANNALA_BRANDT else {}
+    for path, names in (layout.numbers | others).items():
+        values = _numbers(part, path)
+        if len(values) > len(names.split()):
+            raise FileError(
+                "entry.wrong-count",
+                entry=path,
+                name=entries.name,
+                counted=message("count.numbers", count=len(values)),
+                needed=len(names.split()),
+            )
+        named |= dict(zip(names.split(), values.tolist(), strict=False))
+    pinhole = _pinhole(named, size, layout, entries)
+    if lens is None and any(named.get(name) for name in _RADIAL.split()):
+        raise _unread(layout, stated, entries)
+    lens = lens or BROWN
+    return Given((size[0], size[1]), pinhole, _coefficients(named, lens), lens)
+
+
+def _pinhole(
+    named: dict[str, float], size: FloatArray, layout: Layout, entries: Entries
+) -> FloatArray:
+    f = named.get(_FOCAL, named.get("fx"))
+    if f is None:
+        raise FileError("entry.missing", name=entries.name, entry=_FOCAL)
+    check_skew(named.get("skew", 0.0), entries)
+    fx = f + named.get("b1", 0.0)
+    fy = named.get("fy", f * named.get("aspect", 1.0))
+    centre = np.zeros(2)
+    for i, (own, off) in enumerate((("cx", "dx"), ("cy", "dy"))):
+        if own not in named and off not in named:
+            raise FileError("entry.missing", name=entries.name, entry=own)
+        centre[i] = named.get(own, size[i] / 2 + named.get(off, 0.0)) - layout.first
+    return np.array([fx, fy, *centre])
+
+
+def _coefficients(named: dict[str, float], lens: LensModel) -> FloatArray:
+    """Return coefficients as of OpenCV, with no more zeros than needed."""
+    if lens is KANNALA_BRANDT:
+        own = [named.get(name, 0.0) for name in ("k1", "k2", "k3")]
+        last = named.get("r8", named.get("k4", 0.0))
+        rest = [named.get(name, 0.0) for name in ("p1", "p2", "s1", "s2")]
+        return np.array([*own, last, *(rest if any(rest) else ())])
+    values = np.array([named.get(name, 0.0) for name in _RADIAL.split()])
+    values[-1] += named.get("r8", 0.0)  # as little a part of the model as the tilt
+    used = max(np.flatnonzero(values), default=0)
+    return values[: next(n for n in (5, 8, 12, 14) if used < n)]
+
+
+def _lens(layout: Layout, part: Entries) -> tuple[LensModel | None, str]:
+    """Return the lens model, None without distortion, and its name in the file."""
+    if not layout.model:
+        return BROWN, ""
+    holder, key = _holder(part, layout.model)
+    stated = "" if holder is None else holder.word(key)
+    plain = re.sub(r"[\W_]|rs2|distortion", "", stated.casefold())
+    for lens, names in (
+        (BROWN, layout.brown),
+        (KANNALA_BRANDT, layout.fisheye),
+        (None, layout.undistorted),
+    ):
+        if plain in names.split():
+            return lens, stated
+    raise _unread(layout, stated, part)
+
+
+def _unread(layout: Layout, model: str, entries: Entries) -> FileError:
+    return FileError(
+        "camera-file.foreign-model",
+        name=entries.name,
+        program=layout.program,
+        model=quoted(model),
+        remedy=_BY_IMAGES,
+    )
+
+
+def _numbers(entries: Entries, path: str) -> FloatArray:
+    """Return the numbers at a path; none if it is not there."""
+    holder, key = _holder(entries, path)
+    if holder is None:
+        return np.zeros(0)
+    value = holder.value(key)
+    if isinstance(value, dict) and "width" in value and "height" in value:
+        size = Entries.of(value, entries.name)
+        return np.array([size.counted(1, side)[0] for side in ("width", "height")])
+    return holder.numbers(key)
+
+
+def _holder(entries: Entries, path: str) -> tuple[Entries | None, str]:
+    """Return the mapping that has the entry of a path, and the entry's name."""
+    for spelling in path.split("|"):
+        *above, key = spelling.split("/")
+        holder: Entries | None = entries
+        for each in above:
+            if holder is None or not holder.has(each):
+                holder = None
+                break
+            holder = _descend(holder, each)
+        if holder is not None and holder.has(key):
+            return holder, key
+    return None, path
+
+
+def _descend(entries: Entries, path: str) -> Entries:
+    """Return the mapping at a path; a list on the way must be of one camera."""
+    for key in filter(None, path.split("/")):
+        value = entries.value(key)
+        if isinstance(value, list):
+            if len(value) != 1:
+                raise FileError(
+                    "camera-file.several-cameras",
+                    name=entries.name,
+                    n_cameras=len(value),
+                )
+            value = value[0]
+        if not isinstance(value, dict):
+            raise FileError("entry.nothing-below", entry=key, name=entries.name)
+        entries = Entries.of(value, entries.name)
+    return entries

@@ -1,0 +1,432 @@
+"""Tests of reading the camera files of other programs."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.camera_file_writing import write_window
+from lightpen.formats.camera_files import read_camera
+from lightpen.model.camera import Camera, LensModel
+from lightpen.model.lens_field import LensField
+
+# f 1320.5, centre (652.25, 355.75) from the centre of the first pixel, k1 k2 p1 p2
+PINHOLE = (1320.5, 1318.25, 652.25, 355.75)
+BROWN = (-0.21, 0.09, 0.0007, -0.0004)
+FISHEYE = (-0.02, 0.01, -0.006, 0.001)
+SIZE = (1280, 720)
+MATRIX: list[list[float]] = [[1320.5, 0, 652.25], [0, 1318.25, 355.75], [0, 0, 1]]
+CALISCOPE = f"""# cameras
+[cam_0]
+port = 0
+size = [1280, 720]
+rotation_count = 0
+error = 0.21
+matrix = {MATRIX}
+distortions = {[*BROWN, 0.0]}
+exposure = -7
+grid_count = 20
+ignore = false
+translation = [0.0, 0.0, 0.0]
+rotation = [0.0, 0.0, 0.0]
+"""
+ANIPOSE = f"""[cam_0]
+name = "A"
+size = [ 1280, 720,]
+matrix = [ [ 1320.5, 0.0, 652.25,], [ 0.0, 1318.25, 355.75,], [ 0.0, 0.0, 1.0,],]
+distortions = [ {", ".join(map(str, BROWN))}, 0.0,]
+rotation = [ 0.01, 0.02, 0.03,]
+translation = [ 1.0, 2.0, 3.0,]
+
+[metadata]
+adjusted = false
+error = 0.8
+"""
+CALISCOPE_NOW = CALISCOPE.replace("[cam_0]", "[cameras.0]").replace(
+    "port = 0", "cam_id = 0\nfisheye = false"
+)
+MRCAL = """# generated on 2024-05-06 with mrcal-calibrate-cameras
+{
+    # how the lens is modelled
+    'lensmodel':  'LENSMODEL_OPENCV8',
+
+    'intrinsics': [ 1320.5, 1318.25, 652.25, 355.75, -0.21, 0.09, 7.e-4, -4.e-4,
+                    0., 0., 0., 0.,],
+    'valid_intrinsics_region': [ [ 1, 2 ], [ 3, 4 ], ],
+    'extrinsics': [ 0., -0., 0., 0., 0., 0.,],
+    'imagersize': [ 1280, 720,],
+    'icam_intrinsics': 0,
+    'optimization_inputs': b'P)h>@6aWAK2mk;8K>(!&{x}[1,`~'
+}
+"""
+COLMAP = f"""# Camera list with one line of data per camera:
+#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]
+# Number of cameras: 1
+1 OPENCV 1280 720 1320.5 1318.25 652.75 356.25 {" ".join(map(str, BROWN))}
+"""
+METASHAPE = """<?xml version="1.0" encoding="UTF-8"?>
+<calibration>
+  <projection>frame</projection>
+  <width>1280</width>
+  <height>720</height>
+  <f>1318.25</f>
+  <cx>12.75</cx>
+  <cy>-3.75</cy>
+  <b1>2.25</b1>
+  <k1>-0.21</k1>
+  <k2>0.09</k2>
+  <p1>-0.0004</p1>
+  <p2>0.0007</p2>
+  <date>2024-05-06T07:08:09Z</date>
+</calibration>
+"""
+
+
+def calib_io(**changes: float) -> dict[str, Any]:
+    values = {"f": 1320.5, "ar": 1318.25 / 1320.5, "cx": 652.25, "cy": 355.75}
+    values |= dict(zip(("k1", "k2", "p1", "p2"), BROWN, strict=True))
+    values |= dict.fromkeys(("k3", "k4", "k5", "k6", "s1", "tauX", "tauY"), 0.0)
+    parameters = {k: {"state": 0, "val": v} for k, v in (values | changes).items()}
+    size = {"imageSize": {"width": 1280, "height": 720}}
+    data = {"CameraModelCRT": {"CameraModelBase": size}, "parameters": parameters}
+    model = {
+        "polymorphic_id": 2147483649,
+        "polymorphic_name": "libCalib::CameraModelOpenCV",
+        "ptr_wrapper": {"valid": 1, "data": data},
+    }
+    camera = {"model": model, "transform": {"rotation": {"rx": 0}}}
+    return {"Calibration": {"cereal_class_version": 0, "cameras": [camera]}}
+
+
+FLAT = [each for row in MATRIX for each in row]
+PHOTONVISION: dict[str, Any] = {
+    "resolution": {"width": 1280.0, "height": 720.0},
+    "cameraIntrinsics": {"rows": 3, "cols": 3, "type": 6, "data": FLAT},
+    "distCoeffs": {"rows": 1, "cols": 5, "type": 6, "data": [*BROWN, 0.0]},
+    "calobjectWarp": [0.0, 0.0],
+    "observations": [{"reprojectionErrors": [{"x": 0.1, "y": 0.2}]}],
+}
+REALSENSE: dict[str, Any] = {
+    **dict(zip(("fx", "fy", "ppx", "ppy"), PINHOLE, strict=True)),
+    "width": 1280,
+    "height": 720,
+    "model": "distortion.brown_conrady",
+    "coeffs": [*BROWN, 0.0],
+}
+CAMODOCAL = """%YAML:1.0
+---
+model_type: PINHOLE
+camera_name: cam0
+image_width: 1280
+image_height: 720
+distortion_parameters:
+   k1: -0.21
+   k2: 0.09
+   p1: 0.0007
+   p2: -0.0004
+projection_parameters:
+   fx: 1320.5
+   fy: 1318.25
+   cx: 652.25
+   cy: 355.75
+"""
+
+
+def read(folder: Path, text: str | dict[str, Any]) -> Camera:
+    path = folder / "camera.file"
+    path.write_text(text if isinstance(text, str) else json.dumps(text), "utf-8")
+    return read_camera(path)
+
+
+def refusal(folder: Path, text: str | dict[str, Any]) -> str:
+    with pytest.raises(FileError) as info:
+        read(folder, text)
+    return str(info.value)
+
+
+def without(layout: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in layout.items() if name != key}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(CALISCOPE, id="caliscope"),
+        pytest.param(CALISCOPE_NOW, id="caliscope array"),
+        pytest.param(ANIPOSE, id="anipose"),
+        pytest.param(MRCAL, id="mrcal"),
+        pytest.param(MRCAL.split("\n", 1)[1], id="mrcal without comment"),
+        pytest.param(MRCAL.replace("0., 0., 0., 0.,]", "]"), id="mrcal OPENCV4"),
+        pytest.param(COLMAP, id="COLMAP"),
+        pytest.param(METASHAPE, id="Metashape"),
+        pytest.param(calib_io(), id="calib.io"),
+        pytest.param(PHOTONVISION, id="PhotonVision"),
+        pytest.param(
+            without(PHOTONVISION, "distCoeffs")
+            | {"cameraExtrinsics": PHOTONVISION["distCoeffs"]},
+            id="PhotonVision before 2024",
+        ),
+        pytest.param(REALSENSE, id="RealSense"),
+        pytest.param(CAMODOCAL, id="camodocal"),
+    ],
+)
+def test_one_camera_is_the_same_in_all_layouts(
+    tmp_path: Path, text: str | dict[str, Any]
+) -> None:
+    found = read(tmp_path, text)
+
+    assert found.image_size == SIZE
+    expected = [*PINHOLE, *BROWN, 0.0]
+    np.testing.assert_allclose(found.intrinsics, expected, rtol=1e-14)
+    assert found.lens is LensModel.BROWN
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        CALISCOPE.replace("port = 0", "fisheye = true").replace(
+            str([*BROWN, 0.0]), str([*FISHEYE])
+        ),
+        f"1 OPENCV_FISHEYE 1280 720 1320.5 1318.25 652.75 356.25 "
+        f"{' '.join(map(str, FISHEYE))}\n",
+        METASHAPE.replace("frame", "fisheye")
+        .replace("-0.21", "-0.02")
+        .replace("0.09", "0.01")
+        .replace("<p1>-0.0004</p1>", "<k3>-0.006</k3>")
+        .replace("<p2>0.0007</p2>", "<k4>0.001</k4>"),
+        REALSENSE | {"model": "Kannala Brandt4", "coeffs": [*FISHEYE, 0]},
+    ],
+    ids=["caliscope", "COLMAP", "Metashape", "RealSense"],
+)
+def test_a_fisheye_is_read(tmp_path: Path, text: str | dict[str, Any]) -> None:
+    found = read(tmp_path, text)
+
+    assert found.lens is LensModel.KANNALA_BRANDT
+    np.testing.assert_allclose(found.intrinsics, [*PINHOLE, *FISHEYE], rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("line", "intrinsics"),
+    [  # the first two of the documentation of COLMAP
+        ("SIMPLE_PINHOLE 3072 2304 2559.81 1536 1152", (2559.81, 2559.81, 0, 0)),
+        (
+            "SIMPLE_RADIAL 3072 2304 2559.69 1536 1152 -0.0218531",
+            (2559.69, 2559.69, -0.0218531, 0),
+        ),
+        ("RADIAL 3072 2304 2500 1536 1152 -0.1 0.02", (2500, 2500, -0.1, 0.02)),
+    ],
+)
+def test_the_first_pixel_of_colmap_is_at_a_half(
+    tmp_path: Path, line: str, intrinsics: tuple[float, ...]
+) -> None:
+    found = read(tmp_path, f"# of COLMAP\n7 {line}\n")
+
+    fx, fy, k1, k2 = intrinsics
+    expected = [fx, fy, 1535.5, 1151.5, k1, k2, 0, 0, 0]
+    np.testing.assert_allclose(found.intrinsics, expected, rtol=1e-15)
+
+
+def test_metashape_projects_as_its_manual_says(tmp_path: Path) -> None:
+    found = read(tmp_path, METASHAPE.replace("<k2>", "<k3>-0.03</k3><k2>"))
+    X, Y, Z = 0.21, -0.14, 1.0
+    x, y = X / Z, Y / Z
+    r2 = x * x + y * y
+    radial = 1 - 0.21 * r2 + 0.09 * r2**2 - 0.03 * r2**3
+    p1, p2 = -0.0004, 0.0007
+    xd = x * radial + p1 * (r2 + 2 * x * x) + 2 * p2 * x * y
+    yd = y * radial + p2 * (r2 + 2 * y * y) + 2 * p1 * x * y
+    # from the corner of the image, not from the centre of the first pixel
+    u = 1280 / 2 + 12.75 + xd * 1318.25 + xd * 2.25
+    v = 720 / 2 - 3.75 + yd * 1318.25
+
+    pixel = found.project(np.array([X, Y, Z]))
+
+    np.testing.assert_allclose(pixel, [u - 0.5, v - 0.5], rtol=1e-13)
+
+
+def test_rational_coefficients_are_kept(tmp_path: Path) -> None:
+    eight = (-0.0127, 0.0359, -0.000255, 0.000528, 0.0197, 0.0148, -0.0562, 0.05)
+    found = read(
+        tmp_path,
+        {"lensmodel": "LENSMODEL_OPENCV8", "imagersize": [4000, 2200]}
+        | {"intrinsics": [1761.18, 1761.25, 1965.71, 1087.52, *eight]},
+    )
+    np.testing.assert_allclose(found.distortion, eight, rtol=1e-15)
+
+
+def test_a_realsense_without_distortion_is_read_whatever_its_model(
+    tmp_path: Path,
+) -> None:
+    inverse = REALSENSE | {"model": "Inverse Brown Conrady"}
+
+    found = read(tmp_path, inverse | {"coeffs": [0.0] * 5})
+
+    np.testing.assert_array_equal(found.distortion, 0.0)
+    assert "Inverse Brown Conrady" in refusal(tmp_path, inverse)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("ParGroup: Camera: Parameter;\n\nFocus:foc: 0.016;\n", "Halcon"),
+        ("#polynomial coefficients for the DIRECT mapping function\n\n5 -46", "OCam"),
+        ("<document version='1.2.0'>\n<chunk label='a'></chunk></document>", "project"),
+        (CAMODOCAL.replace("PINHOLE", "MEI"), '"MEI"'),
+        (f"image_width: 9\nimage_height: 9\nxi: 1.2\nK: {MATRIX}\n", "omnidirect"),
+        (MRCAL.replace("OPENCV8", "SPLINED_STEREOGRAPHIC_order=3"), "SPLINED"),
+        (COLMAP.replace("OPENCV", "THIN_PRISM_FISHEYE"), "THIN_PRISM_FISHEYE"),
+        (METASHAPE.replace("frame", "spherical"), "spherical"),
+        (METASHAPE.replace("<k2>", "<k4>0.2</k4><k2>"), "thin prism or a tilted"),
+        (METASHAPE.replace("<b1>2.25</b1>", "<b2>0.3</b2>"), "skew of 0.3 px"),
+        (json.dumps(calib_io(tauX=0.1)), "thin prism or a tilted sensor"),
+    ],
+)
+def test_what_cannot_be_read_is_named(tmp_path: Path, text: str, named: str) -> None:
+    assert named in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("data", "named"),
+    [
+        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200), "jsonencode"),
+        (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'}" + bytes(80), "cv2.FileStorage"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(80), "HDF5"),
+        (b"\x80\x04\x95\x10\x00\x00\x00\x00\x00\x00\x00}\x94(", "pickle"),
+    ],
+)
+def test_a_binary_file_is_named(tmp_path: Path, data: bytes, named: str) -> None:
+    path = tmp_path / "camera.bin"
+    path.write_bytes(data)
+
+    with pytest.raises(FileError, match=named):
+        read_camera(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        CALISCOPE + CALISCOPE.replace("cam_0", "cam_1"),
+        COLMAP + "2 PINHOLE 1280 720 1320.5 1318.25 652.75 356.25\n",
+        {"Calibration": {"cameras": calib_io()["Calibration"]["cameras"] * 2}},
+    ],
+    ids=["caliscope", "COLMAP", "calib.io"],
+)
+def test_several_cameras_are_counted(
+    tmp_path: Path, text: str | dict[str, Any]
+) -> None:
+    assert "describes 2 cameras" in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            CALISCOPE.replace("size = [1280, 720]", "size = [1280, 720"),
+            "not valid TOML",
+        ),
+        ("a = " + "[" * 5000 + "]" * 5000 + "\n", "a = |nest|deep|not valid"),
+        (COLMAP.replace(" -0.0004", ""), "7 parameters of the model OPENCV"),
+        (without(PHOTONVISION, "resolution"), "does not state the image size"),
+        (without(REALSENSE, "fx"), "no f"),
+        (METASHAPE.replace("<cx>12.75</cx>", ""), "no cx"),
+        (MRCAL.replace("0., 0., 0., 0.,]", "1, " * 20 + "]"), "numbers where 18"),
+    ],
+)
+def test_a_flaw_is_named(
+    tmp_path: Path, text: str | dict[str, Any], sentence: str
+) -> None:
+    path = tmp_path / "camera.file"
+    path.write_text(text if isinstance(text, str) else json.dumps(text), "utf-8")
+    with pytest.raises(FileError, match=sentence):
+        read_camera(path)
+
+
+def ros(*lines: str) -> str:
+    return "\n".join(
+        [
+            "image_width: 2448",
+            "image_height: 2048",
+            "distortion_model: plumb_bob",
+            "camera_matrix: [4640, 0, 1231, 0, 4640, 1018, 0, 0, 1]",
+            "distortion_coefficients: [-0.08, 0.1, 0.0001, -0.0002, 0]",
+            *lines,
+        ]
+    )
+
+
+def bins(image: FloatArray) -> FloatArray:
+    """Return an image of half as many rows and columns."""
+    return np.asarray(image.reshape(len(image) // 2, 2, -1, 2).mean(axis=(1, 3)))
+
+
+def test_binning_and_region_of_ros_are_applied(tmp_path: Path) -> None:
+    roi = "roi: {x_offset: 200, y_offset: 100, width: 1600, height: 1200}"
+    found = read(tmp_path, ros("binning_x: 2", "binning_y: 2", roi))
+    whole = read(tmp_path, ros())
+
+    point = np.array([10.0, -20.0, 300.0])
+    # A light spot on the sensor, and what the driver makes of it.
+    v, u = np.mgrid[:2048, :2448]
+    x, y = whole.project(point)
+    sensor = np.exp(-((u - x) ** 2 + (v - y) ** 2) / (2 * 9.0**2))
+    image = bins(sensor[100:1300, 200:1800])
+    v, u = np.mgrid[: len(image), : image.shape[1]]
+    centre = [np.sum(u * image), np.sum(v * image)] / image.sum()
+
+    assert found.image_size == (800, 600)
+    np.testing.assert_allclose(found.project(point), centre, atol=1e-6)
+
+
+def test_a_file_is_written_for_binned_and_cropped_images(tmp_path: Path) -> None:
+    driver = "roi: {x_offset: 200, y_offset: 100, width: 1600, height: 1200}"
+    expected = read(tmp_path, ros("binning_x: 2", "binning_y: 2", driver))
+    (tmp_path / "cam.yaml").write_text(ros())
+
+    written = write_window(tmp_path / "cam.yaml", 2, (200, 100, 1600, 1200))
+
+    assert written == tmp_path / "cam-200-100-1600-1200-binned-2.yaml"
+    found = read_camera(written)
+    assert found.image_size == expected.image_size
+    np.testing.assert_array_equal(found.intrinsics, expected.intrinsics)
+    with pytest.raises(FileError, match="have no region 2000 0 1600 1200"):
+        write_window(tmp_path / "cam.yaml", 1, (2000, 0, 1600, 1200))
+
+
+def test_the_covariance_is_that_of_the_binned_images(tmp_path: Path) -> None:
+    camera = replace(
+        read(tmp_path, ros()),
+        covariance=np.diag(np.arange(1.0, 10.0)),
+        lens_field=LensField.of(2448, 2048, 0.02, 700.0),
+    )
+    binned = camera.binned(2, 2)
+
+    assert binned.covariance is not None
+    np.testing.assert_array_equal(
+        np.diag(binned.covariance), [0.25, 0.5, 0.75, 1, 5, 6, 7, 8, 9]
+    )
+    assert binned.lens_field is not None
+    assert (binned.lens_field.amplitude, binned.lens_field.length) == (0.01, 350.0)
+
+
+def test_ros_without_binning_is_the_whole_sensor(tmp_path: Path) -> None:
+    roi = "roi: {x_offset: 0, y_offset: 0, width: 0, height: 0, do_rectify: false}"
+    found = read(tmp_path, ros("binning_x: 0", "binning_y: 1", roi))
+    assert found.image_size == (2448, 2048)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "roi: {x_offset: 2000, y_offset: 0, width: 1600, height: 1200}",
+        "binning_x: 5000",
+    ],
+)
+def test_a_region_outside_the_sensor_is_refused(tmp_path: Path, line: str) -> None:
+    assert "images of 2448 x 2048 px, which have no region" in refusal(
+        tmp_path, ros(line)
+    )
