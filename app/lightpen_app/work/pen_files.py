@@ -78,7 +78,8 @@ class PenFiles(QObject):
         if self._selection.supervision.is_guarded:
             return
         led_file = LedFile(str(file.path), file.sha256, file.units or "")
-        listed = library.pens.get(names.pen)
+        found = library.item(ItemKind.PEN, names.pen)
+        listed = found if isinstance(found, ListedPen) else None
         pen = structs.replace(listed or ListedPen(id=names.pen), led_file=led_file)
         if pen == listed:
             return

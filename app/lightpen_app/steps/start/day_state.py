@@ -122,7 +122,7 @@ def tip_details(now: Preparation, statuses: StationStatus) -> str:
     names = now.names
     if not names.tip:
         return ""
-    tip, point = statuses.library.tips.get(names.tip), now.nominal_tip
+    tip, point = statuses.library.tip(names.tip), now.nominal_tip
     if point is None and now.pen is not None:
         point = now.pen.nominal_tip
     parts = [translate("DayPage", "Tip {0}, pen {1}").format(names.tip, names.pen)]
@@ -142,7 +142,7 @@ def tip_details(now: Preparation, statuses: StationStatus) -> str:
 
 
 def _row(pen: str, tip: str, statuses: StationStatus, *, is_simulated: bool) -> TipRow:
-    found, status = statuses.in_force.get((pen, tip)), statuses.of_tip(pen, tip)
+    found, status = statuses.current(pen, tip), statuses.of_tip(pen, tip)
     if found is None:
         mark = status_message(None if is_simulated else status)
         is_due = status is TipStatus.UNCALIBRATED and not is_simulated

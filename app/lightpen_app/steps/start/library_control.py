@@ -75,7 +75,7 @@ class LibraryControl(QObject):
         statuses, pen = self._watch.statuses, self._selection.preparation.names.pen
         for kind in SWUNG:
             self._names.set_choices(kind, self._choices(kind, pen))
-        if self._watch.library.tip_of_code(self._unknown) is not None:
+        if self._watch.library.tip(self._unknown) is not None:
             self._question.hide()
         is_guarded = self._selection.supervision.is_guarded
         if self._dialog is not None:
@@ -92,7 +92,7 @@ class LibraryControl(QObject):
 
     def tip(self, name: str) -> ListedTip | None:
         """Return a tip of the library."""
-        return self._watch.library.tips.get(name)
+        return self._watch.library.tip(name)
 
     def _made_dialog(self) -> LibraryDialog:
         dialog = LibraryDialog(self._folder, self._page)
@@ -118,7 +118,7 @@ class LibraryControl(QObject):
 
     def take_code(self, code: str) -> None:
         """Choose the tip of a barcode; offer to add one that is not known."""
-        tip = self._watch.library.tip_of_code(code)
+        tip = self._watch.library.tip(code)
         if tip is None:
             self._unknown = code
             self._question.refresh()

@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from enum import StrEnum
+from functools import cached_property
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_time
 from lightpen.messages import Message, message
+from lightpen.model.names import folded_name
 from lightpen.record.library.tip_library import Item, ItemKind, Library
 
 
@@ -44,14 +46,25 @@ class StationStatus:
         """Return the status of a tip of a pen; None while unknown."""
         if self.now is None or not (pen and tip):
             return None
-        listed = self.library.tips.get(tip)
+        listed = self.library.tip(tip)
         if self.library.has_retired(tip):
             return TipStatus.RETIRED
-        found = self.in_force.get((pen, tip))
+        found = self.current(pen, tip)
         if found is None:
             return TipStatus.UNCALIBRATED
         is_over = listed is not None and listed.is_overdue(self._today(self.now))
         return TipStatus.OVERDUE if is_over or found.is_due else TipStatus.VALID
+
+    def current(self, pen: str, tip: str) -> CurrentResult | None:
+        """Return the current result of a pen and a tip, however they are typed."""
+        return self._by_name.get((folded_name(pen), folded_name(tip)))
+
+    @cached_property
+    def _by_name(self) -> Mapping[tuple[str, str], CurrentResult]:
+        return {
+            (folded_name(pen), folded_name(tip)): each
+            for (pen, tip), each in self.in_force.items()
+        }
 
     def overdue(self, pen: str, tip: str) -> Message | None:
         """Return the message that a calibration has expired; None if it has not."""
@@ -81,13 +94,14 @@ class StationStatus:
 
     def pens_of(self, tip: str) -> tuple[str, ...]:
         """Return the pens with a current tip."""
-        return tuple(pen for pen, each in self.in_force if each == tip)
+        folded = folded_name(tip)
+        return tuple(p for p, each in self.in_force if folded_name(each) == folded)
 
     def due(self, pen: str, tip: str) -> date | None:
         """Return the last day of validity of a current tip."""
-        found = self.in_force.get((pen, tip))
+        found = self.current(pen, tip)
         days = [] if found is None else [self._today(found.due)]
-        listed = self.library.tips.get(tip)
+        listed = self.library.tip(tip)
         if listed is not None and listed.due is not None:
             days.append(listed.due)
         return min(days, default=None)

@@ -72,7 +72,7 @@ def add_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
     item = _sensible(item)
     while True:
         number = newest_number(data / LIBRARY) + 1
-        there = read_library(data).alike(item.kind, item.id)
+        there = read_library(data).item(item.kind, item.id)
         if there is not None:
             raise UsageError(_in_use(there))
         with suppress(NameTakenError):  # another program changed the library meanwhile

@@ -5,8 +5,6 @@ see `lightpen.record.library.guard_files`. All of them must be there, unchanged 
 signed; else nothing is accepted.
 """
 
-import re
-import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -15,6 +13,7 @@ from pathlib import Path
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.formats.files import read_bytes
 from lightpen.model.limits import StationLimits
+from lightpen.model.names import same_name
 from lightpen.record.library.guard_files import (
     LIMIT,
     LIMITS_FOLDER,
@@ -76,11 +75,8 @@ class Supervision:
         return self.is_guarded and self._limits_of(station) is None
 
     def _limits_of(self, station: str) -> StationLimits | None:
-        folded = folded_name(station)
-        same = (
-            each for name, each in self.limits.items() if folded_name(name) == folded
-        )
-        return next(same, None)
+        name = same_name(station, self.limits)
+        return None if name is None else self.limits[name]
 
     def signers(self, supervisor: SigningKey | None = None) -> Signers:
         """Return the keys by which a new file is signed; see `station_key`."""
@@ -106,12 +102,6 @@ class Supervision:
         )
         if not is_signed_so:
             raise FileError("signing.unsigned-file", file=file)
-
-
-def folded_name(station: str) -> str:
-    """Return a station name without case, width and additional spaces."""
-    normal = unicodedata.normalize("NFKC", station)
-    return re.sub(r"\s+", " ", normal).strip().casefold()
 
 
 def read_supervision(data: Path) -> Supervision:
@@ -215,8 +205,8 @@ def _with_limits(
 ) -> Mapping[str, StationLimits]:
     if change.limits is None:
         return limits
-    folded = folded_name(change.station)
-    others = {n: each for n, each in limits.items() if folded_name(n) != folded}
+    same = same_name(change.station, limits)
+    others = {name: each for name, each in limits.items() if name != same}
     return {**others, change.station: StationLimits().with_values(change.limits)}
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 from msgspec import Meta, Struct, to_builtins
@@ -32,6 +32,7 @@ from lightpen.formats.own_json import (
 from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
 from lightpen.messages import Message, message
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
+from lightpen.model.names import same_name
 from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.supervision import Supervision, read_supervision
 
@@ -45,7 +46,6 @@ LARGEST_REFERENCE = 10_000.0  # mm
 LARGEST_EXPANSION = 1e-3  # 1/K
 
 Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
-ItemT = TypeVar("ItemT", bound="Item")
 
 
 class ItemKind(StrEnum):
@@ -207,22 +207,24 @@ class Library:
         return of_kind[kind]
 
     def item(self, kind: ItemKind, name: str) -> AnyItem | None:
-        """Return an item by its id, if it is in the library."""
-        return self.items(kind).get(name)
+        """Return an item by its id, if it is in the library; see `same_name`."""
+        items = self.items(kind)
+        same = name if name in items else same_name(name, items)
+        return None if same is None else items[same]
 
-    def tip_of_code(self, code: str) -> ListedTip | None:
-        """Return the tip of a barcode; a scanner may have turned its case round."""
-        exact = self.tips.get(code)
-        return exact or _alike(self.tips, code)
+    def tip(self, name: str) -> ListedTip | None:
+        """Return a tip, as `item`."""
+        found = self.item(ItemKind.TIP, name)
+        return found if isinstance(found, ListedTip) else None
 
     def has_retired(self, tip: str) -> bool:
         """Return whether a tip is in the library and retired."""
-        listed = self.tips.get(tip)
+        listed = self.tip(tip)
         return listed is not None and listed.is_retired
 
     def rule_of(self, tip: str, usual: DueRule) -> DueRule:
         """Return the calibration interval of a tip."""
-        listed = self.tips.get(tip)
+        listed = self.tip(tip)
         return usual if listed is None else listed.rule(usual)
 
     def pen_of_leds(self, sha256: str) -> ListedPen | None:
@@ -231,10 +233,6 @@ class Library:
             if pen.led_file is not None and pen.led_file.sha256 == sha256:
                 return pen
         return None
-
-    def alike(self, kind: ItemKind, name: str) -> AnyItem | None:
-        """Return the item whose name differs in case only."""
-        return _alike(self.items(kind), name)
 
 
 def read_library(data: Path) -> Library:
@@ -300,8 +298,3 @@ def read_change(file: Path, supervision: Supervision | None = None) -> LibraryCh
 def parse_change(content: bytes) -> LibraryChange:
     """Return the change that a file of the library of any station holds."""
     return parse_upgraded(content, LibraryChange, upgrades.LIBRARY)
-
-
-def _alike(items: Mapping[str, ItemT], name: str) -> ItemT | None:
-    folded = name.casefold()
-    return next((item for i, item in items.items() if i.casefold() == folded), None)

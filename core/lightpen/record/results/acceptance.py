@@ -160,7 +160,7 @@ def _result(
     if last is not None and change is not None:
         since = TipChange.of(last, change, assessment.max_change)
     return Result(
-        names=recorded_names(record),
+        names=assessment.names,
         accepted=now,
         grade=assessment.verdict.grade,
         record=record.folder,

@@ -26,7 +26,7 @@ from lightpen.messages import Message, message
 from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.library.tip_library import KIND_WORDS, Library
+from lightpen.record.library.tip_library import KIND_WORDS, SWUNG, ItemKind, Library
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
@@ -51,6 +51,7 @@ class SwingAssessment:
     doubts: tuple[Message, ...]  # besides the verdict, the worst first
     max_change: float | None = None  # limit of the tip, mm, if it has one
     limits: SwingLimits = field(default_factory=SwingLimits)
+    names: Names = field(default_factory=Names)  # as the library or `last` spells them
 
 
 def assess(
@@ -63,7 +64,7 @@ def assess(
     try:
         limits = _limits_in_force(archive, names, limits)
         library = archive.library()
-        listed = library.tips.get(names.tip)
+        listed = library.tip(names.tip)
         limit = None if listed is None else listed.max_change_mm
         is_simulated = origin is Origin.SIMULATED
         last = archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
@@ -92,7 +93,24 @@ def assess(
         warnings_of(solution.calibration),
     )
     doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
-    return SwingAssessment(verdict, last, change, doubts, limit, limits)
+    return SwingAssessment(
+        verdict, last, change, doubts, limit, limits, _spelled(names, library, last)
+    )
+
+
+def _spelled(names: Names, library: Library, last: Result | None) -> Names:
+    """Return names as the library spells them, or else the current result."""
+    before = names if last is None else last.names
+    pen, tip, cone = (
+        library.item(kind, name)
+        for kind, name in zip(SWUNG, (names.pen, names.tip, names.cone), strict=True)
+    )
+    return replace(
+        names,
+        pen=before.pen if pen is None else pen.id,
+        tip=before.tip if tip is None else tip.id,
+        cone=names.cone if cone is None else cone.id,
+    )
 
 
 def _limits_in_force(
@@ -110,9 +128,9 @@ def _limits_in_force(
 def overdue_items(library: Library, names: Names, day: date) -> Iterator[Message]:
     """Return the items that were overdue on the day of the swing."""
     for item in (
-        library.pens.get(names.pen),
-        library.tips.get(names.tip),
-        library.cones.get(names.cone),
+        library.item(ItemKind.PEN, names.pen),
+        library.item(ItemKind.TIP, names.tip),
+        library.item(ItemKind.CONE, names.cone),
     ):
         if item is not None and item.is_overdue(day):
             yield message(

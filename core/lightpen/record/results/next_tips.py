@@ -39,7 +39,7 @@ def next_tips(archive: FolderArchive, present: Result) -> tuple[NextTip, ...]:
             with suppress(FileError):
                 last = archive.in_force(pen, tip, is_simulated=is_simulated)
                 if last is not None:
-                    found.append(NextTip(pen, tip, last, library.tips.get(tip)))
+                    found.append(NextTip(pen, tip, last, library.tip(tip)))
         if not is_simulated:
             new = [tip for tip in library.tips if tip not in known]
             found = [

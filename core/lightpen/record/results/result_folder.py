@@ -16,6 +16,7 @@ from pathlib import Path
 from lightpen.errors import FileError
 from lightpen.formats.files import LARGEST_RECORD, opened, read_bytes
 from lightpen.messages import message
+from lightpen.model.names import folded_name
 from lightpen.record.library.numbered_files import add_numbered, numbered_files
 from lightpen.record.library.signing.keys import SigningKey
 from lightpen.record.library.signing.signed_text import place_in
@@ -136,7 +137,7 @@ class FolderArchive:
     ) -> Path | None:
         """Return the file of what `in_force` returns."""
         for file, heading in self._unrevoked(self._root(is_simulated)):
-            if heading.pen in (pen, None) and heading.tip in (tip, None):
+            if _may_be(heading.pen, pen) and _may_be(heading.tip, tip):
                 return file
         return None
 
@@ -149,7 +150,7 @@ class FolderArchive:
         found = [
             heading.tip
             for _, heading in self._unrevoked(root, passes_over_damage=True)
-            if heading.pen == pen
+            if heading.pen is not None and _may_be(heading.pen, pen)
         ]
         return tuple(filter(None, dict.fromkeys(found)))
 
@@ -159,7 +160,7 @@ class FolderArchive:
         return tuple(
             file
             for file, heading in self._unrevoked(root, passes_over_damage=True)
-            if heading.pen == pen
+            if heading.pen is not None and _may_be(heading.pen, pen)
         )
 
     def supervision(self) -> Supervision:
@@ -270,6 +271,11 @@ def signed_heading(
         data, file, head_of(start), has_supervisor=bool(heading.supervisor)
     )
     return heading
+
+
+def _may_be(stated: str | None, name: str) -> bool:
+    """Return whether a name is the stated one; every name is if none is stated."""
+    return stated is None or folded_name(stated) == folded_name(name)
 
 
 def _is_same(one: Result, other: Result) -> bool:

@@ -135,8 +135,8 @@ def test_a_tip_has_a_rule_of_its_own_or_that_of_the_station() -> None:
 def test_a_barcode_is_known_whatever_case_the_scanner_types(tmp_path: Path) -> None:
     library = add_item(tmp_path, TIP, ANN, NOON)
 
-    assert library.tip_of_code("T-10") == library.tip_of_code("t-10") == TIP
-    assert library.tip_of_code("T-1") is None
+    assert library.tip("T-10") == library.tip("t-10") == TIP
+    assert library.tip("T-1") is None
 
 
 def test_with_a_password_only_a_supervisor_changes_the_library(tmp_path: Path) -> None:

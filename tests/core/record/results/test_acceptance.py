@@ -355,15 +355,41 @@ def test_an_overdue_cone_is_reported_with_the_result(case: Case) -> None:
     assert reported["doubt.overdue"].startswith(f"The cone {cone} expired on")
 
 
-def test_a_retired_tip_is_not_put_in_force(case: Case) -> None:
+# As it is, in small letters, with a Unicode hyphen, a Cyrillic T, a width of its own.
+SPELLINGS = ("T-10", "t-10", "T\u201010", "\u0422-10", "\uff34\uff0d\uff11\uff10")
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_a_retired_tip_is_not_put_in_force_however_it_is_typed(
+    case: Case, spelling: str
+) -> None:
     passing = _passing(case)
-    name = recorded_names(open_record(passing.source.folder)).tip
+    assert recorded_names(open_record(passing.source.folder)).tip == "T-10"
+    _retitled(case, spelling)
     data = case.archive.folder.parent
-    add_item(data, ListedTip(id=name), Author(), NOON)
-    retire_item(data, ItemKind.TIP, name, Author(), NOON)
+    add_item(data, ListedTip(id="T-10"), Author(), NOON)
+    retire_item(data, ItemKind.TIP, "T-10", Author(), NOON)
 
     with pytest.raises(AcceptanceError, match="is retired and cannot be accepted"):
         accept(case.archive, passing, LATER, REASON)
+
+
+@pytest.mark.parametrize("is_listed", [True, False])
+def test_a_tip_is_accepted_by_the_name_that_is_known(
+    case: Case, *, is_listed: bool
+) -> None:
+    _retitled(case, "\u0422\u201010")
+    if is_listed:
+        add_item(case.data, ListedTip(id="T-10"), Author(), NOON)
+    result = case.accept()
+    assert (result.names.tip, case.in_force().accepted) == ("T-10", LATER)
+    assert result.change is not None  # it has the earlier one to be compared with
+
+
+def _retitled(case: Case, tip: str) -> None:
+    """Write another spelling of the tip into the header of the swing."""
+    header = structs.replace(read_header(case.folder), tip=tip)
+    (case.folder / HEADER).write_bytes(header_bytes(header))
 
 
 def test_a_tip_of_a_damaged_library_is_to_be_checked(case: Case) -> None:
