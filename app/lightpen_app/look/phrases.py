@@ -73,6 +73,7 @@ _SHORTS: dict[Code, str] = {
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.CHANGE_BEYOND_LIMIT: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "No comparison possible"),
+    Code.TWO_STAGE_OFF: QT_TRANSLATE_NOOP("phrases", "Two-stage tip uncertain"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Within limits"),
 }
@@ -94,6 +95,7 @@ _SHARES: dict[ContributionName, str] = {
     ContributionName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "disc diameter"),
     ContributionName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
     ContributionName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
+    ContributionName.METHOD: QT_TRANSLATE_NOOP("phrases", "two-stage method"),
     ContributionName.LENS: QT_TRANSLATE_NOOP("phrases", "lens"),
     ContributionName.COMPLIANCE: QT_TRANSLATE_NOOP("phrases", "compliance"),
     ContributionName.LOOSE: QT_TRANSLATE_NOOP("phrases", "loose stylus"),

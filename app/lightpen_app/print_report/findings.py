@@ -250,6 +250,9 @@ def _share_name(name: ContributionName) -> str:
         ContributionName.DIAMETER: translate("paper", "Diameter of the LED discs"),
         ContributionName.CAMERA: translate("paper", "Intrinsics of the camera"),
         ContributionName.EXTRINSICS: translate("paper", "Extrinsics of the cameras"),
+        ContributionName.METHOD: translate(
+            "paper", "Two-stage method, difference from the joint fit"
+        ),
         ContributionName.LENS: translate("paper", "Lens beyond its distortion model"),
         ContributionName.COMPLIANCE: translate(
             "paper", "Compliance of stylus, seat and stand"

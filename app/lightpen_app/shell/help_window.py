@@ -54,6 +54,7 @@ class HelpWindow(FittedWindow, Translated, QWidget):
     def set_topic(self, key: str, language: str) -> None:
         """Show the help about a step or a method."""
         self._key, self._language = key, language
+        self._browser.setSearchPaths([str(HELP / SOURCE_LANGUAGE)])  # of figures
         self._browser.setMarkdown(help_text(key, language))
         _space_out(self._browser.document())
 

@@ -334,7 +334,6 @@ class Preparation:
             and self.names == other.names
             and self.limits == other.limits
             and self.assumptions_today == other.assumptions_today
-            and self.method == other.method
             and _same(self.nominal_tip, other.nominal_tip)
             and np.array_equal(self.mask, other.mask)
             and self._has_second_of(other)

@@ -3050,16 +3050,20 @@
         <translation>两步法与联合拟合</translation>
     </message>
     <message>
+        <source>Report this method</source>
+        <translation>报告该方法</translation>
+    </message>
+    <message>
         <source>U (k = 2)</source>
         <translation>U (k = 2)</translation>
     </message>
     <message>
-        <source>U (k = 2), noise only</source>
-        <translation>U (k = 2)，仅含噪声</translation>
-    </message>
-    <message>
         <source>Difference</source>
         <translation>差值</translation>
+    </message>
+    <message>
+        <source>of it by projected discs</source>
+        <translation>其中由圆面投影引起</translation>
     </message>
     <message>
         <source>RMS / mm</source>
@@ -3068,6 +3072,10 @@
     <message>
         <source>Joint fit</source>
         <translation>联合拟合</translation>
+    </message>
+    <message>
+        <source>Also for later swings here</source>
+        <translation>也用于此工位以后的摆动</translation>
     </message>
     <message>
         <source>Two-stage (paper)</source>
@@ -4025,6 +4033,10 @@ needed</source>
     <message>
         <source>Tip accepted.</source>
         <translation>测头已接受。</translation>
+    </message>
+    <message>
+        <source>Report joint fit</source>
+        <translation>报告联合拟合</translation>
     </message>
     <message>
         <source>Check settings</source>
@@ -10853,6 +10865,10 @@ mm</translation>
         <translation>相机内参</translation>
     </message>
     <message>
+        <source>Two-stage method, difference from the joint fit</source>
+        <translation>两步法，与联合拟合之差</translation>
+    </message>
+    <message>
         <source>Lens beyond its distortion model</source>
         <translation>镜头畸变模型之外的残差</translation>
     </message>
@@ -11288,6 +11304,10 @@ mm</translation>
         <translation>无法比较</translation>
     </message>
     <message>
+        <source>Two-stage tip uncertain</source>
+        <translation>两步法测头不确定</translation>
+    </message>
+    <message>
         <source>Within limits</source>
         <translation>在限值内</translation>
     </message>
@@ -11314,6 +11334,10 @@ mm</translation>
     <message>
         <source>disc diameter</source>
         <translation>发光面直径</translation>
+    </message>
+    <message>
+        <source>two-stage method</source>
+        <translation>两步法</translation>
     </message>
     <message>
         <source>lens</source>

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QUrl
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QTextDocument
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -609,6 +609,8 @@ def test_the_help_of_review_links_how_the_tip_is_found(
     title, method = METHOD[language]
     assert title in window.text().splitlines()[0]
     assert method in window.text()
+    figure = QTextDocument.ResourceType.ImageResource.value
+    assert browser.loadResource(figure, QUrl("method.png")) is not None
 
 
 def test_f11_works_while_the_help_is_in_front(shell: Shell) -> None:

@@ -84,6 +84,29 @@ def test_how_far_the_tip_is_computed_is_reported_from_0_to_1(solved: "Station") 
 
 
 @pytest.mark.slow
+def test_a_tip_that_is_reported_by_the_two_stage_method_is_accepted_so(
+    solved: "Station",
+) -> None:
+    solved.runner.ask(lambda workflow: workflow.report_by("two-stage"))
+    solved.wait_until_solved()
+    paper = solved.solution.calibration.two_stage.tip_pen.tolist()
+    solved.runner.ask(lambda workflow: workflow.exclude([2]))
+    solved.wait_until_solved()
+    assert solved.solution.calibration.method == "two-stage"
+    solved.runner.ask(lambda workflow: workflow.include([2]))
+    solved.wait_until_solved()
+    solved.wait_until_solved()
+    solved.accept()
+
+    assert solved.status.result is not None
+    record = solved.status.result.calibration
+    assert record.method == "two-stage"
+    assert record.tip_pen_mm == pytest.approx(paper)
+    joint = record.methods["joint"].expanded_uncertainty_mm
+    assert np.all(np.array(record.expanded_uncertainty_mm) > np.array(joint))
+
+
+@pytest.mark.slow
 def test_images_taken_out_in_quick_succession_all_count(
     solved: "Station", command: Command
 ) -> None:

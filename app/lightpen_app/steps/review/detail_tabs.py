@@ -22,6 +22,8 @@ class DetailTabs(QTabWidget):
 
     # ImagesPanel: the tab of the images is seen for the first time
     images_made = Signal(object)
+    # MethodsPanel: the tab of the methods is seen for the first time
+    methods_made = Signal(object)
     # Message on a saved plot, or on a failure to save it.
     saved = Signal(str)
     failed = Signal(str)
@@ -32,11 +34,12 @@ class DetailTabs(QTabWidget):
         self._place = place
         self._images = LazyWidget(_make_images_panel)
         self._residuals = LazyWidget(_make_residuals_panel)
+        self._methods: LazyWidget[PlotsPanel] = LazyWidget(_make_methods_panel)
         self._panels: tuple[LazyWidget[ImagesPanel] | LazyWidget[PlotsPanel], ...] = (
             self._images,
             self._residuals,
             LazyWidget(_make_uncertainty_panel),
-            LazyWidget(_make_methods_panel),
+            self._methods,
         )
         self._tab_of = {panel: PageScroll() for panel in self._panels}
         for panel, tab in self._tab_of.items():
@@ -45,6 +48,7 @@ class DetailTabs(QTabWidget):
 
         # Connections
         self._images.made.connect(self.images_made)
+        self._methods.made.connect(self.methods_made)
         for panel in self._panels:
             panel.made.connect(self._on_panel_made)
         self.currentChanged.connect(self.fill)

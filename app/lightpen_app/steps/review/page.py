@@ -1,5 +1,6 @@
 """The step Review: the tip, its uncertainty, and the next step."""
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
+from lightpen.model.method import Method
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.layouts import vertical_layout
@@ -35,6 +37,7 @@ from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
     from lightpen_app.steps.review.images_panel import ImagesPanel
+    from lightpen_app.steps.review.plots_panel import MethodsPanel
 
 READING_MS = 1000  # from the first sight of a result to its acceptance, at least
 
@@ -55,6 +58,7 @@ class ReviewPage(Page):
         self._view = view = ReviewView(self._run, place)
         self._accepted = QTimer(self, singleShot=True)
         self._reading = QTimer(self, singleShot=True)
+        self._methods: MethodsPanel | None = None
         self._painted: SwingAssessment | None = None  # since it is shown
         self._next = NextTipsControl(
             self._selection, self._run, workbench.library, view.next_tips
@@ -76,6 +80,7 @@ class ReviewPage(Page):
         view.capture_more.clicked.connect(self._capture_more)
         view.verify.clicked.connect(self._on_verify_clicked)
         view.tabs.images_made.connect(self._on_images_made)
+        view.tabs.methods_made.connect(self._on_methods_made)
         view.tabs.saved.connect(notices.show_status)
         view.tabs.failed.connect(partial(notices.notify, self.key))
         self._along.follow(view.tools)
@@ -128,6 +133,8 @@ class ReviewPage(Page):
                 self._runner.ask(lambda workflow: workflow.accept())
             case NextStep.CAPTURE_MORE if not status.is_recording:
                 self._capture_more()
+            case NextStep.REPORT_JOINT:
+                self._report_by("joint")
             case NextStep.SEE_TO_CAUSE:
                 self.step_requested.emit("start")
             case step if step in OF_FILES:
@@ -202,9 +209,10 @@ class ReviewPage(Page):
 
     def _refresh_words(self) -> None:
         names = self._selection.preparation.names
-        self._view.set_state(
-            review_page_state(self._run.status, names, self.main_action())
-        )
+        state = review_page_state(self._run.status, names, self.main_action())
+        self._view.set_state(state)
+        if self._methods is not None:
+            self._methods.set_locked(state.why_locked)
 
     def _show_result(self, status: SwingStatus) -> None:
         outcome = None
@@ -216,6 +224,17 @@ class ReviewPage(Page):
         self._refresh_words()
         images.exclude_requested.connect(self._exclude)
         images.include_requested.connect(self._include)
+
+    def _on_methods_made(self, methods: "MethodsPanel") -> None:
+        self._methods = methods
+        self._refresh_words()
+        methods.method_chosen.connect(self._report_by)
+
+    def _report_by(self, method: Method) -> None:
+        """Report this swing and later ones at the station by a method."""
+        self._runner.ask(lambda workflow: workflow.report_by(method))
+        chosen = replace(self._selection.preparation, method=method)
+        self._selection.set_preparation(chosen)
 
     def _on_cancel_clicked(self) -> None:
         self._runner.ask(lambda workflow: workflow.cancel())

@@ -4,20 +4,25 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.reports.methods import result_of
+from lightpen.estimation.reports.methods import (
+    reported,
+    result_of,
+    two_stage_difference,
+)
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rig import Rig
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.failed_swing import FailedSwing
-from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, micrometres_text, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
@@ -251,7 +256,7 @@ class UncertaintyPanel(PlotsPanel):
             self._show_budget(self._solution)
 
     def _show_budget(self, solution: Solution) -> None:
-        budget = solution.calibration.budget
+        budget = reported(solution.calibration).budget
         parts = {
             share_text(share.name) + (" *" if share.assumed else ""): share.covariance
             for share in budget.shares
@@ -275,6 +280,8 @@ class UncertaintyPanel(PlotsPanel):
 class MethodsPanel(PlotsPanel):
     """Convergence of the paper's method, compared with the joint fit."""
 
+    method_chosen = Signal(str)  # `Method` to be reported
+
     def __init__(self) -> None:
         # Widgets
         self._objective = LinePlot(Axes(""), [Curve("objective_mm2")])
@@ -286,14 +293,27 @@ class MethodsPanel(PlotsPanel):
             ]
         )
         self._table = NumberTable()
+        self._reports = QCheckBox()
 
         # Layout
-        self._layout.addWidget(self._table)
+        fill(self._layout, self._table, self._reports)
+
+        # Connections
+        self._reports.clicked.connect(self._on_reports_clicked)
 
         self._retranslate()
 
+    def set_locked(self, why: str) -> None:
+        """Set why the method cannot be changed; empty if it can."""
+        self._reports.setEnabled(not why)
+        set_tooltip(self._reports, why or self.tr("Also for later swings here"))
+
+    def _on_reports_clicked(self, is_on: bool) -> None:
+        self.method_chosen.emit("two-stage" if is_on else "joint")
+
     @override
     def _show(self, solution: Solution) -> None:
+        self._reports.setChecked(solution.calibration.method == "two-stage")
         fit = solution.calibration.two_stage
         steps = np.arange(len(fit.objectives), dtype=np.float64)
         settled = float(np.sum(fit.increments > SETTLED) + 1)
@@ -311,19 +331,22 @@ class MethodsPanel(PlotsPanel):
             Axes(self.tr("Difference from final value / µm"), self.tr("iteration"))
         )
         self._table.setAccessibleName(self.tr("Two-stage method and joint fit"))
+        self._reports.setText(self.tr("Report this method"))
         if self._solution is not None:
             self._table.set_value(self._figures(self._solution))
 
     def _figures(self, solution: Solution) -> Figures:
-        joint = result_of(solution.calibration, "joint")
-        paper = result_of(solution.calibration, "two-stage")
+        calibration = solution.calibration
+        joint = result_of(calibration, "joint")
+        paper = result_of(calibration, "two-stage")
         joint_u, paper_u = joint.expanded_uncertainty, paper.expanded_uncertainty
         rows = (
             (self.tr("Joint fit"), joint.tip_pen, joint.rms_mm),
             (self.tr("U (k = 2)"), joint_u, None),
             (self.tr("Two-stage (paper)"), paper.tip_pen, paper.rms_mm),
-            (self.tr("U (k = 2), noise only"), paper_u, None),
-            (self.tr("Difference"), paper.tip_pen - joint.tip_pen, None),
+            (self.tr("U (k = 2)"), paper_u, None),
+            (self.tr("Difference"), two_stage_difference(calibration), None),
+            (self.tr("of it by projected discs"), calibration.projection_bias, None),
         )
         columns = (*(f"{axis} / mm" for axis in AXES), self.tr("RMS / mm"))
         cells = tuple(

@@ -142,6 +142,7 @@ class UncertaintyRecord(Struct, frozen=True):
     disc_diameter_mm: Triple | None
     camera_mm: Triple | None
     rig_mm: Triple | None
+    method_mm: Triple | None
     lens_mm: Triple | None
     compliance_mm: Triple | None
     loose_stylus_mm: Triple | None

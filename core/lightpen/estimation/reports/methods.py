@@ -1,12 +1,16 @@
 """Tip and cone by each method from the same images."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import Calibration
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty.budget import (
+    Budget,
+    ContributionName,
+    UncertaintyContribution,
+)
 from lightpen.model.method import Method
 
 
@@ -16,7 +20,7 @@ class MethodResult:
 
     tip_pen: FloatArray  # (3,), mm
     cone_cam: FloatArray  # (3,), mm
-    covariance: FloatArray  # (6, 6), of both, systematic errors included, mm^2
+    budget: Budget  # of both, systematic errors included
     # (N, 3), of the tip of each used image from the cone point, mm
     deviations: FloatArray
 
@@ -26,22 +30,14 @@ class MethodResult:
         return float(np.sqrt(np.mean(np.sum(self.deviations**2, axis=1))))
 
     @property
+    def covariance(self) -> FloatArray:
+        """Combined covariance of (tip_pen, cone_cam), (6, 6), mm^2."""
+        return self.budget.covariance
+
+    @property
     def expanded_uncertainty(self) -> FloatArray:
         """U (k = 2) of tip and cone, (6,), mm."""
-        return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance))
-
-    @property
-    def weakest_direction(self) -> FloatArray:
-        """Unit vector of the pen frame along which the tip is most uncertain, (3,)."""
-        _, vectors = np.linalg.eigh(self.covariance[:3, :3])
-        weakest = vectors[:, -1]
-        return np.asarray(weakest * np.sign(weakest[np.argmax(np.abs(weakest))]))
-
-    @property
-    def weakest_uncertainty(self) -> float:
-        """U (k = 2) along the weakest direction, mm."""
-        values = np.linalg.eigvalsh(self.covariance[:3, :3])
-        return COVERAGE_FACTOR * float(np.sqrt(values[-1]))
+        return self.budget.expanded_uncertainty
 
 
 def reported(calibration: Calibration) -> MethodResult:
@@ -56,15 +52,15 @@ def result_of(calibration: Calibration, method: Method) -> MethodResult:
     contains the projection bias of the discs, and by U of the joint fit: equation (22)
     of method.md.
     """
-    joint, covariance = calibration.joint, calibration.budget.covariance
+    joint, budget = calibration.joint, calibration.budget
     if method == "two-stage":
-        fit = calibration.two_stage
-        off = two_stage_difference(calibration)
-        covariance = covariance + np.outer(off, off)
-        return MethodResult(fit.tip_pen, fit.cone_cam, covariance, fit.residuals)
+        fit, off = calibration.two_stage, two_stage_difference(calibration)
+        share = UncertaintyContribution(ContributionName.METHOD, np.outer(off, off))
+        budget = replace(budget, shares=(*budget.shares, share))
+        return MethodResult(fit.tip_pen, fit.cone_cam, budget, fit.residuals)
     tips_cam = calibration.tips_cam[calibration.used]
     return MethodResult(
-        joint.tip_pen, joint.cone_cam, covariance, tips_cam - joint.cone_cam
+        joint.tip_pen, joint.cone_cam, budget, tips_cam - joint.cone_cam
     )
 
 

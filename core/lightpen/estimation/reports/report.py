@@ -99,8 +99,8 @@ def calibration_record(
         second_cone=_second_cone(calibration.second),
         instrument=_instrument(calibration.instrument),
         weakest_direction=DirectionRecord(
-            vector_pen=plain(result.weakest_direction),
-            expanded_uncertainty_mm=plain(result.weakest_uncertainty),
+            vector_pen=plain(result.budget.weakest_direction),
+            expanded_uncertainty_mm=plain(result.budget.weakest_uncertainty),
         ),
         coverage=_coverage(calibration),
         leds=_leds(calibration),
@@ -166,7 +166,7 @@ def _method(calibration: Calibration, name: Method) -> MethodRecord:
 
 
 def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
-    budget, halves = calibration.budget, calibration.halves
+    budget, halves = reported(calibration).budget, calibration.halves
     found = {share.name: share.standard_uncertainty for share in budget.shares}
     by_name = {
         f"{name.value.replace(' ', '_')}_mm": plain(found.get(name))
@@ -194,7 +194,7 @@ def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
         lag1_autocorrelation=plain(budget.autocorrelation),
         led_sigma_mm=plain(calibration.led_sigma),
         distance_repeatability=distance_repeatability(
-            calibration.bundle, budget, calibration.priors
+            calibration.bundle, calibration.budget, calibration.priors
         ),
         halves_difference_mm=plain(halves.difference),
         halves_expanded_uncertainty_mm=plain(halves.expanded_uncertainty),

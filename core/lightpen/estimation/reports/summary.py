@@ -130,14 +130,14 @@ def _image_lines(calibration: Calibration) -> list[str]:
 
 
 def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
-    budget, halves = calibration.budget, calibration.halves
+    budget, halves = chosen.budget, calibration.halves
     joint = calibration.joint
     tilt = np.degrees(calibration.coverage.tilts)
     lines = [
         f"Residuals    {joint.rms:.4f} px rms, tip of single images "
         f"{chosen.rms_mm:.4f} mm rms",
-        f"Weakest      {_direction(chosen.weakest_direction)}, "
-        f"U = {chosen.weakest_uncertainty:.4f} mm",
+        f"Weakest      {_direction(budget.weakest_direction)}, "
+        f"U = {budget.weakest_uncertainty:.4f} mm",
         _numbers("Odd - even images", halves.difference),
         _numbers("  U (k = 2)", halves.expanded_uncertainty),
     ]

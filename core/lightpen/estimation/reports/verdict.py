@@ -21,7 +21,6 @@ from lightpen.estimation.uncertainty.budget import (
 )
 from lightpen.messages import Message, message
 from lightpen.model.coverage import dial_counts
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import SwingLimits
 from lightpen.swing_messages import (
     NO_TEMPERATURE,
@@ -252,7 +251,7 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     Only images that show the pen count, copies once. What else there is depends on how
     long a camera ran before and after, and a swing that is captured does not keep it.
     """
-    uncertainty = reported(calibration).weakest_uncertainty
+    uncertainty = reported(calibration).budget.weakest_uncertainty
     if uncertainty > FAR_OFF * limits.max_uncertainty:
         return Verdict(Grade.REPEAT, _why_uncertain(calibration, limits))
     for finding in _findings(calibration, limits):
@@ -262,18 +261,16 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
 
 def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
     """Return what makes U large: too few images, or a contribution that stays."""
-    budget, limit = calibration.budget, limits.max_uncertainty
-    uncertainty = reported(calibration).weakest_uncertainty
-    off = float(np.linalg.norm(two_stage_difference(calibration)[:3]))
-    if calibration.method == "two-stage" and COVERAGE_FACTOR * off > limit:
+    budget, limit = reported(calibration).budget, limits.max_uncertainty
+    uncertainty, largest = budget.weakest_uncertainty, budget.largest_share
+    if largest.name is ContributionName.METHOD:
         return message(
             Code.TWO_STAGE_OFF,
             uncertainty=uncertainty,
             limit=limit,
-            distance=off,
+            distance=float(np.linalg.norm(two_stage_difference(calibration)[:3])),
             bias=float(np.linalg.norm(calibration.projection_bias[:3])),
         )
-    largest = budget.largest_share
     is_same_in_more = (
         largest.name is ContributionName.CENTERS and calibration.used.sum() >= POSTURES
     )
@@ -320,7 +317,7 @@ def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message
         if 2 * n_excluded > n_dropped:
             yield message(Code.MANY_EXCLUDED, n_excluded=n_excluded)
         yield message(Code.MANY_DROPPED, n_dropped=n_dropped, n_images=n_images)
-    if reported(calibration).weakest_uncertainty > limit:
+    if reported(calibration).budget.weakest_uncertainty > limit:
         yield _why_uncertain(calibration, limits)
     if limits.requires_temperature and calibration.assumptions.temperature_c is None:
         yield NO_TEMPERATURE

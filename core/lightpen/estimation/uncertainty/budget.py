@@ -87,6 +87,7 @@ class ContributionName(StrEnum):
     DIAMETER = "disc diameter"
     CAMERA = "camera"
     EXTRINSICS = "rig"
+    METHOD = "method"  # its difference from the joint fit
     LENS = "lens"
     COMPLIANCE = "compliance"
     LOOSE = "loose stylus"

@@ -20,6 +20,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
+    QCheckBox,
     QComboBox,
     QFileDialog,
     QLabel,
@@ -40,6 +41,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.methods import result_of
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.laboratory import Laboratory
@@ -1394,6 +1396,38 @@ def test_the_two_stage_method_stands_beside_the_joint_fit(
     assert float(rows["Two-stage (paper)"][3]) == pytest.approx(
         calibration.two_stage.rms, abs=1e-4
     )
+
+
+@pytest.mark.slow
+def test_the_two_stage_tip_can_be_reported_and_stays_chosen_at_the_station(
+    bed: Bed,
+) -> None:
+    solution = bed.solve().run.status.solution
+    assert solution is not None
+    found = solution.calibration
+    paper = result_of(found, "two-stage").budget.weakest_uncertainty
+    run = bed.solve(0.9 * paper).run
+    page, choices = bed.show(), bed.workbench.selection
+    look_at_all_tabs(page)
+    box = the(the(page, MethodsPanel), QCheckBox)
+    assert not box.isChecked()
+
+    box.click()
+
+    bed.qtbot.waitUntil(lambda: banner(page).word == "CHECK: Two-stage tip uncertain")
+    shown = the(page, ResultPanel).value()
+    assert shown is not None
+    np.testing.assert_allclose(shown.tip_pen, found.two_stage.tip_pen)
+    station = choices.preparation.names.station
+    assert bed.workbench.settings.station(station).method == "two-stage"
+
+    assert page.main_action().text == "Report joint fit"
+    page.run_main_action()
+
+    bed.qtbot.waitUntil(lambda: not box.isChecked())
+    assert run.status.solution is not None
+    assert run.status.solution.calibration.method == "joint"
+    assert choices.preparation.method == "joint"
 
 
 # What next
