@@ -6,11 +6,9 @@ import json
 import os
 import re
 import shutil
-import struct
 import subprocess
 import sys
-import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -177,11 +175,6 @@ def run_with(run: Run, swing: Swing, role: str, file: Path) -> CompletedProcess[
     return swing.calibrate(run, **{role: file})
 
 
-@pytest.mark.slow
-def test_the_unspoiled_files_give_the_tip(swing: Swing, lightpen: Run) -> None:
-    assert_tip(swing.calibrate(lightpen), swing)
-
-
 @pytest.mark.parametrize("role", ROLES)
 @pytest.mark.parametrize("name", ANY_TEXT)
 def test_a_file_of_other_text_is_refused_by_name(
@@ -222,17 +215,6 @@ def test_a_folder_in_place_of_a_file_is_refused_by_name(
     assert_refused(run_with(lightpen, swing, role, folder), "some-folder")
 
 
-def test_a_distortion_that_folds_the_image_is_refused(
-    swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "bad-camera.yaml"
-    text = swing.camera.read_text(encoding="utf-8")
-    file.write_text(replace(r"-0\.082", "-8.2e9")(text), encoding="utf-8")
-    for options in ({}, {"images": swing.images}):
-        outcome = swing.calibrate(lightpen, camera=file, **options)
-        assert_refused(outcome, "camera", "distortion")
-
-
 @pytest.mark.parametrize(
     ("size", "words"), [(("1024", "1224"), "1024"), (("612", "512"), "612")]
 )
@@ -251,16 +233,6 @@ def test_a_camera_of_another_image_size_is_refused_with_both_sizes(
     assert_refused(outcome, words, "1224")
 
 
-def swap(first: int, second: int) -> Edit:
-    """Give each of two LEDs the place of the other."""
-
-    def change(table: list[list[str]]) -> None:
-        one, two = table[first - 1], table[second - 1]
-        one[1:], two[1:] = two[1:], one[1:]
-
-    return rows(change)
-
-
 def scale(*factors: float) -> Edit:
     """Scale x, y and z."""
 
@@ -275,27 +247,10 @@ def scale(*factors: float) -> Edit:
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (constant(""), ["empty"]),
-        (replace("60|59", "6O"), ["is not a number"]),
-        (swap(2, 3), ["LEDs 2 and 3"]),
-        (swap(5, 8), ["LEDs 5 and 8"]),
         (scale(1e-3, 1e-3, 1e-3), ["metres", "--units m"]),
-        (scale(-1, 1, 1), ["mirrored", "in x"]),
         (scale(-1, -1, 1), ["in the pen frame", r"lightpen pen RAW\.csv OUT\.csv"]),
-        (rows(lambda table: table.reverse()), ["order"]),
-        (rows(lambda table: table.append(table[-1])), ["LED 10"]),
     ],
-    ids=[
-        "empty",
-        "letter",
-        "back",
-        "columns",
-        "metres",
-        "mirror",
-        "turned",
-        "order",
-        "twice",
-    ],
+    ids=["metres", "turned"],
 )
 def test_what_is_wrong_with_a_pen_file_is_reported(
     edit: Edit, words: list[str], swing: Swing, lightpen: Run, tmp_path: Path
@@ -304,27 +259,6 @@ def test_what_is_wrong_with_a_pen_file_is_reported(
     file.write_text(edit(swing.pen.read_text(encoding="utf-8")), encoding="utf-8")
     outcome = swing.calibrate(lightpen, pen=file)
     assert_refused(outcome, r"bad-pen\.csv", *words)
-
-
-def test_a_displaced_led_is_named(swing: Swing, lightpen: Run, tmp_path: Path) -> None:
-    file = tmp_path / "bent-pen.csv"
-    text = swing.pen.read_text(encoding="utf-8")
-    y = float(text.splitlines()[6].split(",")[2])
-    file.write_text(cells(5, 2, f"{y + 0.5}")(text), encoding="utf-8")
-    outcome = swing.calibrate(lightpen, pen=file)
-    assert re.search(r"LED 6\b", outcome.stdout + outcome.stderr)
-
-
-def test_a_pen_file_without_units_is_refused_and_asks_for_them(
-    swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "bad-pen.csv"
-    text = swing.pen.read_text(encoding="utf-8")
-    bare = "\n".join(",".join(line.split(",")[:4]) for line in text.splitlines()[1:])
-    for content in (bare, "led,x,y,z\n" + bare):
-        file.write_text(content, encoding="utf-8")
-        outcome = swing.calibrate(lightpen, pen=file)
-        assert_refused(outcome, r"bad-pen\.csv", "unit", "--units mm")
 
 
 @pytest.mark.parametrize("x", ["1e300", "-1e9", "99999", "-50.0"])
@@ -341,40 +275,6 @@ def test_a_center_outside_the_image_is_refused_or_not_used(
     assert_tip(outcome, swing)
     frame = json.loads(out.read_text(encoding="utf-8"))["frames"][0]
     assert not any(led["used"] for led in frame["leds"] if led["led"] == 5)
-
-
-def test_frame_numbers_need_not_be_consecutive(
-    swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "centers.csv"
-    text = swing.centers.read_text(encoding="utf-8")
-    file.write_text(
-        rows(lambda table: [row.__setitem__(0, row[0] + "00000") for row in table])(
-            text
-        ),
-        encoding="utf-8",
-    )
-    assert_tip(swing.calibrate(lightpen, centers=file), swing)
-
-
-@pytest.mark.parametrize("role", ["centers", "poses"])
-def test_a_table_without_header_is_read_as_documented_or_refused(
-    role: str, swing: Swing, poses_text: str, lightpen: Run, tmp_path: Path
-) -> None:
-    text = (
-        swing.centers.read_text(encoding="utf-8") if role == "centers" else poses_text
-    )
-    head, body = text.split("\n", 1)
-    outputs = []
-    for content in (text, body):
-        file = tmp_path / "table.csv"
-        file.write_text(content, encoding="utf-8")
-        outcome = run_with(lightpen, swing, role, file)
-        if outcome.returncode:
-            assert_refused(outcome, r"table\.csv", "header")
-            return
-        outputs.append(outcome.stdout)
-    assert outputs[0] == outputs[1], head
 
 
 def test_centers_of_another_camera_are_refused(
@@ -398,50 +298,6 @@ def poses_text(truth: Truth, scene: Scene) -> str:
         numbers = [*np.ravel(frame["R"]), *frame["T"]]
         lines.append(",".join([str(i), *(f"{number:.10f}" for number in numbers)]))
     return "\n".join(lines) + "\n"
-
-
-def one_axis(table: list[list[str]]) -> None:
-    """Swing about the x axis of the camera only, the tip at the origin."""
-    for i, row in enumerate(table):
-        c, s = np.cos(0.02 * i), np.sin(0.02 * i)
-        rotation = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-        translation = -rotation @ [0, 100, 0]
-        row[1:] = [repr(float(n)) for n in (*rotation.ravel(), *translation)]
-
-
-def test_the_unspoiled_poses_give_the_tip(
-    poses_text: str, swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "poses.csv"
-    file.write_text(poses_text, encoding="utf-8")
-    outcome = lightpen("pivot", file)
-    assert outcome.returncode == 0, outcome.stderr
-
-
-@pytest.mark.parametrize("options", [(), ("--least-squares",)])
-def test_poses_about_one_axis_are_refused_and_the_axis_named(
-    options: tuple[str, ...], poses_text: str, lightpen: Run, tmp_path: Path
-) -> None:
-    file = tmp_path / "poses.csv"
-    file.write_text(rows(one_axis)(poses_text), encoding="utf-8")
-    outcome = lightpen("pivot", file, *options)
-    assert_refused(outcome, "axis|direction")
-    assert outcome.returncode == 1
-
-
-@pytest.mark.parametrize("options", [(), ("--least-squares",)])
-def test_equal_poses_are_refused(
-    options: tuple[str, ...], poses_text: str, lightpen: Run, tmp_path: Path
-) -> None:
-    def equal(table: list[list[str]]) -> None:
-        for row in table:
-            row[1:] = table[0][1:]
-
-    file = tmp_path / "poses.csv"
-    file.write_text(rows(equal)(poses_text), encoding="utf-8")
-    outcome = lightpen("pivot", file, *options)
-    assert_refused(outcome, "tilt|turn|lean|move|alike")
-    assert outcome.returncode == 1
 
 
 @pytest.fixture
@@ -509,18 +365,16 @@ def test_a_folder_of_nothing_but_corrupt_images_is_refused(
     assert "spots" not in outcome.stderr  # nobody has seen any
 
 
-def test_an_image_of_another_size_is_refused_or_dropped_by_name(
-    swing: Swing, images: Path, lightpen: Run
+@pytest.mark.parametrize("name", ["frame_0001.png", "frame_0020.png"])
+def test_an_image_of_another_size_is_dropped_by_name(
+    swing: Swing, images: Path, lightpen: Run, name: str
 ) -> None:
-    odd = images / "frame_0020.png"
+    odd = images / name
     write(odd, read(odd)[:512, :612])
     outcome = swing.calibrate(lightpen, images=images)
-    assert "frame_0020.png" in outcome.stdout + outcome.stderr
-    if outcome.returncode:
-        assert_refused(outcome, "612")
-    else:
-        assert_tip(outcome, swing)
-        assert "39 of 40 used" in outcome.stdout
+    assert_tip(outcome, swing)
+    assert name in outcome.stdout
+    assert "39 of 40 used" in outcome.stdout
 
 
 def test_cropped_colour_and_deep_images_in_one_folder_are_distinguished(
@@ -534,18 +388,6 @@ def test_cropped_colour_and_deep_images_in_one_folder_are_distinguished(
     assert_tip(outcome, swing)
     assert "39 of 40 used" in outcome.stdout
     assert "1 wrong size: frame_0001.png" in outcome.stdout
-
-
-def test_the_first_image_does_not_set_the_size_of_the_others(
-    swing: Swing, images: Path, lightpen: Run
-) -> None:
-    odd = images / "frame_0001.png"
-    write(odd, read(odd)[:512, :612])
-    outcome = swing.calibrate(lightpen, images=images)
-    if outcome.returncode:
-        assert_refused(outcome, "612")
-    else:
-        assert_tip(outcome, swing)
 
 
 def test_a_turned_image_is_refused_or_dropped(
@@ -565,23 +407,6 @@ def test_images_that_do_not_exist_are_refused_by_name(
     assert outcome.returncode == 2
 
 
-def test_a_folder_that_may_not_be_looked_into_is_refused_by_name(
-    obedient: Sequence[str], tmp_path: Path
-) -> None:
-    folder = tmp_path / "swing"
-    folder.mkdir(mode=0)
-    program = Path(sys.executable).with_name("lightpen")
-    outcome = subprocess.run(
-        [*obedient, program, "calibrate", folder],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert_refused(outcome, re.escape(f"{folder} cannot be read: Permission denied."))
-    assert "printed" not in outcome.stderr
-    assert outcome.returncode == 2
-
-
 def test_other_files_beside_the_images_do_no_harm(
     swing: Swing, images: Path, lightpen: Run
 ) -> None:
@@ -592,46 +417,6 @@ def test_other_files_beside_the_images_do_no_harm(
     outcome = swing.calibrate(lightpen, images=images)
     assert_tip(outcome, swing)
     assert "40 of 40 used" in outcome.stdout
-
-
-@pytest.mark.slow
-def test_a_cut_video_is_refused_or_its_whole_images_are_used(
-    swing: Swing, lightpen: Run, tmp_path: Path
-) -> None:
-    video = tmp_path / "swing.avi"
-    codec = cv2.VideoWriter.fourcc(*"FFV1")
-    writer = cv2.VideoWriter(str(video), codec, 20.0, (1224, 1024), isColor=False)
-    if not writer.isOpened():
-        pytest.skip("OpenCV has no lossless video here")
-    for path in sorted(swing.images.iterdir()):
-        writer.write(read(path))
-    writer.release()
-    video.write_bytes(video.read_bytes()[: int(0.7 * video.stat().st_size)])
-    outcome = swing.calibrate(lightpen, images=video)
-    if outcome.returncode:
-        assert_refused(outcome, r"swing\.avi")
-    else:
-        assert_tip(outcome, swing)
-
-
-def png_of_zeros(width: int, height: int) -> bytes:
-    """Return a small PNG file of a grey image that is huge in memory."""
-
-    def chunk(kind: bytes, content: bytes) -> bytes:
-        check = struct.pack(">I", zlib.crc32(kind + content))
-        return struct.pack(">I", len(content)) + kind + content + check
-
-    packer = zlib.compressobj(1, wbits=-15)
-    lines = packer.compress(bytes(100 * (width + 1))) + packer.flush(zlib.Z_FULL_FLUSH)
-    adler = height * (width + 1) % 65521 << 16 | 1
-    pixels = b"\x78\x01" + height // 100 * lines + b"\x03\0" + struct.pack(">I", adler)
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", header)
-        + chunk(b"IDAT", pixels)
-        + chunk(b"IEND", b"")
-    )
 
 
 def peak_megabytes(arguments: list[str | Path]) -> tuple[CompletedProcess[str], int]:
@@ -678,19 +463,6 @@ def test_a_huge_file_is_refused_before_it_fills_the_memory(
 
 @pytest.mark.slow
 @needs_linux
-def test_a_huge_image_in_a_small_file_does_not_fill_the_memory(
-    swing: Swing, images: Path
-) -> None:
-    file = images / "frame_0020.png"
-    file.write_bytes(png_of_zeros(40_000, 20_000))
-    outcome, peak = peak_megabytes(swing.arguments(images=images))
-    assert "Traceback" not in outcome.stderr
-    assert file.name in outcome.stdout + outcome.stderr
-    assert peak < 500
-
-
-@pytest.mark.slow
-@needs_linux
 @pytest.mark.parametrize("role", ROLES)
 def test_an_endless_file_is_refused(role: str, swing: Swing, script: Run) -> None:
     import resource
@@ -731,21 +503,6 @@ def test_a_full_disk_leaves_the_old_record_whole(
     assert outcome.stderr.rstrip().endswith(".")
     assert file.read_text(encoding="utf-8") == "the old record"
     assert list(folder.iterdir()) == [file], "a torso is left behind"
-
-
-@pytest.mark.slow
-@needs_posix
-def test_a_full_disk_leaves_the_old_pivot_record_whole(
-    poses_text: str, script: Run, tmp_path: Path
-) -> None:
-    poses, file = tmp_path / "poses.csv", tmp_path / "pivot.json"
-    poses.write_text(poses_text, encoding="utf-8")
-    file.write_text("the old record", encoding="utf-8")
-    outcome = with_disk_of(500, script)("pivot", poses, "--json", file)
-    assert outcome.returncode == 2
-    assert "pivot.json" in outcome.stderr
-    assert "Traceback" not in outcome.stderr
-    assert file.read_text(encoding="utf-8") == "the old record"
 
 
 @pytest.mark.slow
@@ -935,12 +692,3 @@ def test_an_uncertainty_that_nothing_has_is_refused(
     assert outcome.returncode == 2
     assert f"argument {option}: {number} " in outcome.stderr
     assert outcome.stderr.rstrip().endswith(".")
-
-
-def test_a_nominal_tip_that_no_record_holds_is_refused(
-    swing: Swing, lightpen: Run
-) -> None:
-    outcome = swing.calibrate(lightpen, "--nominal-tip", "1e9", "0", "0")
-
-    assert outcome.returncode == 2
-    assert "1e9 is too large a number" in outcome.stderr

@@ -159,39 +159,6 @@ def test_300_images_fit_into_400_mb(swing_full: Path) -> None:
     assert int(peak[1]) <= 400_000
 
 
-def test_the_record_has_the_documented_shapes(clean: Path, record: Record) -> None:
-    fields = record(clean)
-    shapes = {
-        name: np.array(fields[name], dtype=float).shape
-        for name in (
-            "tip_pen_mm",
-            "cone_cam_mm",
-            "covariance",
-            "expanded_uncertainty_mm",
-            "rms_px",
-        )
-    }
-    assert shapes == {
-        "tip_pen_mm": (3,),
-        "cone_cam_mm": (3,),
-        "covariance": (6, 6),
-        "expanded_uncertainty_mm": (3,),
-        "rms_px": (),
-    }
-
-
-def test_the_expanded_uncertainty_is_twice_the_root_of_the_variance(
-    clean: Path, record: Record
-) -> None:
-    fields = record(clean)
-    covariance = np.array(fields["covariance"])
-    np.testing.assert_allclose(covariance, covariance.T, rtol=1e-6)
-    assert np.all(np.linalg.eigvalsh((covariance + covariance.T) / 2) > 0)
-    np.testing.assert_allclose(
-        fields["expanded_uncertainty_mm"], 2 * np.sqrt(np.diag(covariance))[:3]
-    )
-
-
 def test_the_record_lists_every_image_in_order(clean: Path, record: Record) -> None:
     frames = record(clean)["frames"]
     files = sorted(path.name for path in (clean / "images").iterdir())
@@ -203,23 +170,6 @@ def test_the_record_lists_every_image_in_order(clean: Path, record: Record) -> N
         assert [led["led"] for led in frame["leds"]] == list(range(1, 11))
         for led in frame["leds"]:
             assert set(led) >= {"led", "x_px", "y_px", "used"}
-
-
-def test_the_record_gives_led_centers_to_0_006_px(
-    clean: Path, record: Record, truth: Truth
-) -> None:
-    found = [
-        [led["x_px"], led["y_px"]]
-        for frame in record(clean)["frames"]
-        for led in frame["leds"]
-    ]
-    true = [
-        led["ellipse_center"]
-        for frame in truth(clean)["frames"]
-        for led in frame["leds"]
-    ]
-    errors = np.array(found) - np.array(true)
-    assert np.sqrt(np.mean(errors**2)) <= 0.006
 
 
 def test_single_images_put_the_tip_at_the_cone(clean: Path, record: Record) -> None:
@@ -376,15 +326,6 @@ def test_a_pattern_that_the_shell_has_expanded_selects_images(
     assert re.search(r"\b20 used", outcome.stdout.replace("20 of ", ""))
 
 
-def test_a_folder_with_pattern_characters_is_a_folder(
-    simulated: Path, lightpen: Run, tmp_path: Path
-) -> None:
-    folder = tmp_path / "swing [1]"
-    shutil.copytree(simulated / "images", folder)
-    outcome = lightpen("calibrate", folder, *input_options(simulated))
-    assert outcome.returncode == 0, outcome.stderr
-
-
 @pytest.mark.slow
 def test_a_video_gives_the_tip_of_its_images(
     simulated: Path, record: Record, lightpen: Run, tmp_path: Path
@@ -422,22 +363,6 @@ def test_the_centers_of_a_record_give_its_tip_again(
     assert len(again["frames"]) == 60
     digest = hashlib.sha256(clean_centers.read_bytes()).hexdigest()
     assert digest in json.dumps(again)
-
-
-@pytest.mark.slow
-def test_centers_in_any_order_give_the_same_tip(
-    shared_data: Path, record: Record, tmp_path: Path
-) -> None:
-    folder = shared_data / "repeat"
-    head, *rows = (folder / "calib_01.csv").read_text(encoding="utf-8").split()
-    np.random.default_rng(5).shuffle(rows)
-    file = tmp_path / "shuffled.csv"
-    file.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
-    np.testing.assert_allclose(
-        record(folder, "--centers", str(file))["tip_pen_mm"],
-        record(folder, "--centers", str(folder / "calib_01.csv"))["tip_pen_mm"],
-        atol=1e-9,
-    )
 
 
 @pytest.mark.slow
@@ -543,25 +468,6 @@ def read_terminal(controller: FileIO) -> str:
         return ""
 
 
-@pytest.mark.slow
-def test_calibrating_twice_writes_the_same_record(
-    shared_data: Path, lightpen: Run, tmp_path: Path
-) -> None:
-    folder = shared_data / "fixed-point"
-    records = []
-    for name in ("first.json", "second.json"):
-        outcome = lightpen(
-            "calibrate", folder / "images", *input_options(folder),
-            "--json", tmp_path / name,
-        )  # fmt: skip
-        assert outcome.returncode == 0
-        fields = json.loads((tmp_path / name).read_text(encoding="utf-8"))
-        for changing in ("created", "checksum"):
-            fields.pop(changing, None)
-        records.append(fields)
-    assert records[0] == records[1]
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -589,16 +495,19 @@ def test_wrong_usage_ends_with_status_2_and_words(
     assert not outcome.stdout
 
 
-@pytest.mark.parametrize("tip", ["nan 0 0", "0 inf 0"])
+@pytest.mark.parametrize(
+    ("tip", "said"),
+    [("nan 0 0", "tip"), ("0 inf 0", "tip"), ("1e9 0 0", "1e9 is too large a number")],
+)
 def test_a_nominal_tip_that_is_no_number_is_refused(
-    tip: str, clean: Path, lightpen: Run
+    tip: str, said: str, clean: Path, lightpen: Run
 ) -> None:
     outcome = lightpen(
         "calibrate", clean / "images", *input_options(clean),
         "--nominal-tip", *tip.split(),
     )  # fmt: skip
     assert outcome.returncode == 2
-    assert "tip" in outcome.stderr
+    assert said in outcome.stderr
 
 
 @pytest.fixture(scope="module")
@@ -639,80 +548,10 @@ def test_a_pivot_record_is_complete(lightpen: Run, poses: Path) -> None:
     assert len(fields["frames"]) == 1151
 
 
-def write_poses_with_outliers(source: Path, target: Path, share: float) -> None:
-    """Throw a share of the poses off by tens to hundreds of millimetres."""
-    rng = np.random.default_rng(30)
-    head, *rows = source.read_text(encoding="utf-8").split()
-    table = [row.split(",") for row in rows]
-    for i in rng.permutation(len(table))[: round(share * len(table))]:
-        for column in (10, 11, 12):
-            off = rng.choice([-1, 1]) * rng.uniform(30, 500)
-            table[i][column] = str(float(table[i][column]) + off)
-    text = "\n".join([head, *(",".join(row) for row in table)])
-    target.write_text(text + "\n", encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_30_percent_gross_outliers_leave_the_tip_where_the_rest_puts_it(
-    lightpen: Run, poses: Path, tmp_path: Path
-) -> None:
-    spoiled = tmp_path / "spoiled.csv"
-    write_poses_with_outliers(poses, spoiled, 0.3)
-    rest = tmp_path / "rest.csv"
-    lines = poses.read_text(encoding="utf-8").split()
-    bad = spoiled.read_text(encoding="utf-8").split()
-    kept = [line for line, other in zip(lines, bad, strict=True) if line == other]
-    assert len(kept) == 1 + 806
-    rest.write_text("\n".join(kept) + "\n", encoding="utf-8")
-    wanted = pivoted(lightpen, rest)
-    fields = pivoted(lightpen, spoiled)
-    # A hundredth of U = 0.5 mm: the outliers must leave no trace to speak of.
-    np.testing.assert_allclose(fields["tip_pen_mm"], wanted["tip_pen_mm"], atol=5e-3)
-    np.testing.assert_allclose(
-        fields["pivot_cam_mm"], wanted["pivot_cam_mm"], atol=5e-3
-    )
-    plain = pivoted(lightpen, spoiled, "--least-squares")
-    away = np.array(plain["tip_pen_mm"]) - wanted["tip_pen_mm"]
-    assert np.linalg.norm(away) > 1.0  # or the outliers were no test
-
-
-def test_outliers_that_agree_with_each_other_do_not_win(
-    lightpen: Run, poses: Path, tmp_path: Path
-) -> None:
-    head, *rows = poses.read_text(encoding="utf-8").split()
-    table = [row.split(",") for row in rows]
-    for row in table[::10] + table[3::10] + table[6::10]:
-        row[10] = str(float(row[10]) + 200.0)
-    shifted = tmp_path / "shifted.csv"
-    text = "\n".join([head, *(",".join(row) for row in table)])
-    shifted.write_text(text + "\n", encoding="utf-8")
-    away = np.array(pivoted(lightpen, shifted)["tip_pen_mm"]) - TRACKER_TIP
-    assert np.linalg.norm(away) < 1.0
-
-
 def written_poses(rotations: FloatArray, translations: FloatArray, file: Path) -> Path:
     """Write poses as a table without header."""
     np.savetxt(file, np.column_stack([rotations.reshape(-1, 9), translations]))
     return file
-
-
-def test_outliers_of_a_few_standard_deviations_that_agree_are_left_out_and_named(
-    lightpen: Run, poses: Path, tmp_path: Path
-) -> None:
-    table = read_poses(poses)
-    others = np.random.default_rng(3).random(len(table.translations)) < 0.3
-    shifted = table.translations + others[:, None] * [0.0, 0.0, 12.0]
-    fields = pivoted(
-        lightpen, written_poses(table.rotations, shifted, tmp_path / "shifted.csv")
-    )
-
-    away = np.abs(np.array(fields["tip_pen_mm"]) - TRACKER_TIP)
-    assert np.all(away < fields["expanded_uncertainty_mm"])
-    group = np.array([frame["group"] for frame in fields["frames"]])
-    assert np.mean((group == 2) != others) < 0.01
-    (warning,) = fields["warnings"]
-    assert warning["code"] == "pivot.two-pivots"
-    assert warning["text"] in fields["text"]
 
 
 @pytest.mark.parametrize(
@@ -746,23 +585,6 @@ def test_poses_that_have_no_one_tip_are_refused_with_the_reason(
     assert not outcome.stdout
 
 
-def test_the_robust_pivot_hardly_differs_where_no_pose_is_bad(
-    lightpen: Run, poses: Path
-) -> None:
-    fields = pivoted(lightpen, poses)
-    away = np.abs(np.array(fields["tip_pen_mm"]) - TRACKER_TIP)
-    assert np.all(away < fields["expanded_uncertainty_mm"])
-
-
-def keys_of(value: Any, path: str = "") -> set[str]:
-    if isinstance(value, dict):
-        inner = [keys_of(entry, f"{path}.{name}") for name, entry in value.items()]
-        return {f"{path}.{name}" for name in value}.union(*inner)
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return keys_of(value[0], f"{path}[]")
-    return set()
-
-
 @pytest.fixture(scope="module")
 def small(scene: Scene) -> Path:
     return scene("--images", "12", "--seed", "4")
@@ -781,12 +603,6 @@ def test_a_simulated_set_has_the_files_of_the_shared_sets(
     assert image.dtype == np.uint8
 
 
-def test_a_simulated_truth_has_the_keys_of_the_shared_sets(
-    small: Path, clean: Path, truth: Truth
-) -> None:
-    assert keys_of(truth(clean)) <= keys_of(truth(small))
-
-
 def test_a_simulated_camera_and_pen_have_the_format_of_the_shared_sets(
     small: Path, clean: Path
 ) -> None:
@@ -802,42 +618,6 @@ def test_a_simulated_camera_and_pen_have_the_format_of_the_shared_sets(
         for folder in (small, clean)
     ]
     assert headers[0].startswith(headers[1])
-
-
-def test_a_seed_gives_the_same_set_again_and_another_seed_another(
-    scene: Scene, lightpen: Run, tmp_path: Path
-) -> None:
-    options = ("--binning", "4", "--images", "12", "--seed")
-    before = scene(*options, "4")
-    hashes = {}
-    for name, seed in (("again", "4"), ("other", "5")):
-        folder = tmp_path / name / before.name
-        lightpen("simulate", folder, *options, seed)
-        hashes[name] = contents_of(folder)
-    assert hashes["again"] == contents_of(before)
-    for name, content in contents_of(before).items():
-        if name not in ("camera.yaml", "SIMULATED.txt"):
-            assert hashes["other"][name] != content, name
-
-
-def contents_of(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
-def test_a_new_set_holds_no_images_of_an_old_one(
-    lightpen: Run, tmp_path: Path, truth: Truth
-) -> None:
-    folder = tmp_path / "set"
-    size = ("--binning", "4")
-    assert lightpen("simulate", folder, "--images", "4", *size).returncode == 0
-    outcome = lightpen("simulate", folder, "--images", "2", "--seed", "9", *size)
-    n_images = len(list((folder / "images").iterdir()))
-    assert len(truth(folder)["frames"]) == n_images
-    assert n_images == (2 if outcome.returncode == 0 else 4)
 
 
 @pytest.mark.parametrize(
@@ -859,15 +639,6 @@ def test_a_senseless_simulation_is_refused(
     assert outcome.returncode == 2
     assert outcome.stderr.strip()
     assert not (tmp_path / "set" / "truth.json").exists()
-
-
-def test_simulating_onto_a_file_is_refused(lightpen: Run, tmp_path: Path) -> None:
-    file = tmp_path / "thesis.docx"
-    file.write_text("precious")
-    outcome = lightpen("simulate", file, "--images", "2")
-    assert outcome.returncode == 2
-    assert "thesis.docx" in outcome.stderr
-    assert file.read_text() == "precious"
 
 
 # The window and the output

@@ -53,9 +53,12 @@ def wrong_leds(fields: dict[str, Any], truth: dict[str, Any]) -> list[str]:
     return wrong
 
 
-def calibrate_set(lightpen: Run, folder: Path, *options: str) -> CompletedProcess[str]:
+def calibrate_set(
+    lightpen: Run, folder: Path, *options: str, images: Path | None = None
+) -> CompletedProcess[str]:
+    """Calibrate from the images of a set, or from others, by its files."""
     return lightpen(
-        "calibrate", folder / "images",
+        "calibrate", images or folder / "images",
         "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv", *options,
     )  # fmt: skip
 
@@ -118,28 +121,6 @@ def test_a_hard_scene_gives_an_uncertainty_that_covers_the_error(
     assert np.all(np.abs(error) <= 2 * np.array(fields["expanded_uncertainty_mm"]))
 
 
-@pytest.mark.slow
-def test_noise_hardly_changes_the_covariance_of_a_hard_scene(
-    scene: Scene, record: Record, tmp_path: Path
-) -> None:
-    folder = scene(*HARD, "24")
-    fields = record(folder)
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        file = tmp_path / f"centers_{seed}.csv"
-        rows = ["frame,led,x_px,y_px"]
-        for i, frame in enumerate(fields["frames"], 1):
-            for led in frame["leds"]:
-                x, y = rng.normal([led["x_px"], led["y_px"]], 1e-4)
-                rows.append(f"{i},{led['led']},{x},{y}")
-        file.write_text("\n".join(rows) + "\n", encoding="utf-8")
-        covariance = np.array(record(folder, "--centers", str(file))["covariance"])
-        scale = np.sqrt(np.abs(np.diag(covariance)))
-        correlation = covariance / np.outer(scale, scale)
-        np.testing.assert_allclose(correlation, correlation.T, atol=1e-6)
-        assert np.linalg.eigvalsh(correlation).min() > 0
-
-
 def test_useless_images_of_a_hard_scene_are_dropped_with_their_reason(
     hard: Path, record: Record, truth: Truth
 ) -> None:
@@ -200,31 +181,6 @@ def test_two_leds_exchanged_in_one_image_would_be_noticed(
 
 
 @pytest.mark.slow
-def test_hard_images_in_any_order_give_the_same_labels(
-    scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
-) -> None:
-    folder = scene(*HARD, "3", *SMALL)
-    mixed = tmp_path / "images"
-    mixed.mkdir()
-    answer = truth(folder)
-    order = np.random.default_rng(3).permutation(60)
-    for i, j in enumerate(order):
-        name = f"frame_{i + 1:04d}.png"
-        shutil.copy(folder / answer["frames"][j]["file"], mixed / name)
-    frames = [answer["frames"][j] | {"file": f"frame_{i + 1:04d}.png"}
-              for i, j in enumerate(order)]  # fmt: skip
-    file = tmp_path / "out.json"
-    outcome = lightpen(
-        "calibrate", mixed, "--camera", folder / "camera.yaml",
-        "--pen", folder / "leds.csv", "--json", file,
-    )  # fmt: skip
-    assert outcome.returncode == 0, outcome.stderr
-    fields = json.loads(file.read_text(encoding="utf-8"))
-    assert wrong_leds(fields, answer | {"frames": frames}) == []
-    assert tip_error_um(fields, answer) <= 8.0
-
-
-@pytest.mark.slow
 def test_images_with_three_whole_leds_are_dropped_with_their_reason(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
@@ -241,10 +197,7 @@ def test_images_with_three_whole_leds_are_dropped_with_their_reason(
             cv2.circle(image, (round(x), round(y) - 10), 3, 200, cv2.FILLED)
         file.write_bytes(cv2.imencode(".png", image)[1].tobytes())
     out = tmp_path / "out.json"
-    outcome = lightpen(
-        "calibrate", images, "--camera", folder / "camera.yaml",
-        "--pen", folder / "leds.csv", "--json", out,
-    )  # fmt: skip
+    outcome = calibrate_set(lightpen, folder, "--json", str(out), images=images)
     assert outcome.returncode == 0, outcome.stderr
     assert "3 too few LEDs" in outcome.stdout
     fields = json.loads(out.read_text(encoding="utf-8"))
@@ -263,10 +216,7 @@ def test_images_without_any_pen_are_refused(
         image = noise.integers(0, 40, (1024, 1224), dtype=np.uint8)
         cv2.circle(image, (150 * i + 100, 450), 10, 255, -1)
         (images / f"{i}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
-    outcome = lightpen(
-        "calibrate", images,
-        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv",
-    )  # fmt: skip
+    outcome = calibrate_set(lightpen, folder, images=images)
     assert_refused(outcome, "image")
 
 
@@ -283,17 +233,6 @@ def test_images_of_any_depth_give_the_tip_to_8_um(
     assert image.max() > 2 ** (int(bits) - 2)
     assert tip_error_um(record(folder), truth(folder)) <= 8.0
     assert wrong_leds(record(folder), truth(folder)) == []
-
-
-@pytest.mark.slow
-def test_a_swing_about_one_axis_is_refused_and_the_axis_named(
-    scene: Scene, lightpen: Run
-) -> None:
-    for seed in ("1", "2", "3"):
-        folder = scene(*SMALL, "--swing", "one-axis", "--images", "12", "--seed", seed)
-        outcome = calibrate_set(lightpen, folder)
-        assert_refused(outcome, "axis|direction")
-        assert_refused(outcome, "tilt|lean|turn")
 
 
 @pytest.mark.slow
@@ -326,10 +265,7 @@ def test_too_few_images_are_refused_and_more_asked_for(
     images.mkdir()
     for path in sorted((folder / "images").iterdir())[:n_images]:
         shutil.copy(path, images)
-    outcome = lightpen(
-        "calibrate", images,
-        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv",
-    )  # fmt: skip
+    outcome = calibrate_set(lightpen, folder, images=images)
     assert_refused(outcome, rf"\b({n_images}|one|two|three)\b.*image|image.*{n_images}")
 
 
@@ -341,10 +277,7 @@ def test_one_image_again_and_again_is_refused(
     images.mkdir()
     for i in range(20):
         shutil.copy(folder / "images" / "frame_0001.png", images / f"{i}.png")
-    outcome = lightpen(
-        "calibrate", images,
-        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv",
-    )  # fmt: skip
+    outcome = calibrate_set(lightpen, folder, images=images)
     assert_refused(outcome, "tilt|lean|alike|same")
 
 
@@ -393,17 +326,6 @@ def assert_pen_refused(lightpen: Run, folder: Path, pen: Path, some: Path) -> No
         "calibrate", some, "--camera", folder / "camera.yaml", "--pen", pen
     )
     assert_refused(outcome, "do not match the")
-
-
-# The fanned pen has its LEDs where the common one has them.
-@pytest.mark.slow
-@pytest.mark.parametrize("pen", ["six", "eight", "near-symmetric"])
-def test_the_file_of_another_pen_is_refused(
-    pen: str, scene: Scene, lightpen: Run, tmp_path: Path
-) -> None:
-    images = scene(*CLEAN)
-    other = scene(*SMALL, "--pen", pen, "--images", "24", "--seed", "1")
-    assert_pen_refused(lightpen, images, other / "leds.csv", tmp_path / "some")
 
 
 @pytest.mark.slow

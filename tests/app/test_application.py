@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
-from typing_extensions import override
+from tests.app.blank_page import BlankPage
 
 from lightpen_app.application import Wizard
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import LIGHT, Appearance, colors_of
 from lightpen_app.shell.main_window import LEAST_SIZE
-from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.page import Page
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -65,26 +65,8 @@ LATER = {
 }
 
 
-class Only(Page):
-    """The least that a page can be."""
-
-    key = "start"
-
-    @override
-    def title(self) -> str:
-        return "Start"
-
-    @override
-    def is_complete(self) -> bool:
-        return True
-
-    @override
-    def main_action(self) -> MainAction:
-        return MainAction("Continue")
-
-
 def only_page(workbench: Workbench, sounds: Sounds) -> Sequence[Page]:
-    return [Only()]
+    return [BlankPage("start")]
 
 
 def open_wizard(qtbot: QtBot, settings: Settings) -> Wizard:

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
 from lightpen_app.steps.start.day_view import DayView
-from lightpen_app.steps.start.large_screen_panel import LargeScreenPanel
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 
@@ -116,17 +115,3 @@ def test_what_is_set_up_once_is_a_click_away(known: "Walker") -> None:
 def test_a_first_start_opens_the_setup(walker: "Walker") -> None:
     assert walker.says("Set up station")
     assert walker.offers("Try it with a simulated pen")
-
-
-def test_the_pictures_of_a_vast_screen_are_not_shown_in_a_usual_window(
-    known: "Walker",
-) -> None:
-    walker = known
-    walker.window.resize(1272, 760)
-    walker.until(lambda: walker.main_button().text().startswith("Swing "))
-
-    panel = walker.window.page().findChild(LargeScreenPanel)
-    assert isinstance(panel, LargeScreenPanel)
-    assert panel.isHidden()
-    walker.window.resize(2400, 1600)
-    assert panel.isVisible()

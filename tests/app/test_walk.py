@@ -12,6 +12,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
+    QApplication,
     QComboBox,
     QLineEdit,
     QTabBar,
@@ -32,6 +33,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen.simulator.scenes import Scene
+from lightpen_app.steps.page import step_titles
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.stations import Station
 
@@ -146,15 +148,17 @@ def test_a_recorded_swing_gives_its_tip(
 
 
 @pytest.mark.slow
-def test_in_chinese_no_english_word_is_left(
+def test_no_english_word_is_left_after_a_change_to_chinese(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    settings.set_preferences(Preferences(language="zh_CN"))
     names = Names("", "\u738b", "4", "10", "1")
     station = Station(names, limits=SwingLimits(0.02, min_images=20))
     settings.set_station("2\u53f7", station)
     settings.set_last_station("2\u53f7")
     walker = open_wizard()
+    walker.until(lambda: len(walker.window.pages()) == len(step_titles()))
+    walker.window.preferences_changed.emit(Preferences(language="zh_CN"))
+    QApplication.processEvents()
     left: dict[str, set[str]] = {}
 
     def read() -> None:

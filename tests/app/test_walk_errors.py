@@ -15,27 +15,20 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
 from tests.faulty_camera import FaultyCamera
 
-from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
-from lightpen.formats.decoding import encode_png
-from lightpen.formats.pen_files import write_pen
 from lightpen.live.sources import SourceEnvironment, camera_of
 from lightpen.model.limits import SwingLimits
 from lightpen.record.results.result_folder import RESULTS, SIMULATED
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
-from lightpen.simulator.samples import eight_led_pen
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_pen
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 
 if TYPE_CHECKING:
-    from tests.app.conftest import OpenWizard, SolvingOn, Walker
+    from tests.app.conftest import OpenWizard, Walker
 
 # Of raising a window and grabbing the keyboard, which menus do.
 pytestmark = pytest.mark.qt_log_ignore("^This plugin does not support ")
@@ -160,198 +153,7 @@ def record_folder(walker: "Walker") -> Path:
     return folder
 
 
-def give_path(walker: "Walker", name: str, path: Path) -> None:
-    """Click into the field of a path, type another one, and press Enter."""
-    walker.click_into(name, str(path))
-    walker.press(Key.Key_Return)
-
-
-def picture_in(folder: Path) -> Path:
-    path = folder / "picture.png"
-    path.write_bytes(encode_png(np.zeros((8, 8), np.uint8)))
-    return path
-
-
-# Wrong files
-
-
-@pytest.mark.slow
-def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) -> None:
-    go_to(prepared, "Camera")
-    workbench = prepared.workbench
-    prepared.until(lambda: not workbench.selection.preparation.camera_missing_inputs())
-    before = workbench.selection.preparation.camera_file
-
-    give_path(prepared, "Intrinsics file", picture_in(tmp_path))
-
-    prepared.until_tells("picture.png is not text")
-    assert workbench.selection.preparation.camera_file is before
-
-
-@pytest.mark.slow
-def test_intrinsics_of_another_size_are_reported_and_close_the_next_steps(
-    prepared: "Walker", tmp_path: Path
-) -> None:
-    go_to(prepared, "Camera")
-    prepared.until(prepared.main_button().isEnabled)
-    whole = write_sample_files(Scene(), tmp_path / "whole")
-
-    give_path(prepared, "Intrinsics file", whole.camera)
-
-    prepared.until_tells("Image size is 1224 x 1024; the intrinsics file is for")
-    assert not prepared.main_button().isEnabled()
-    assert prepared.says(
-        "The intrinsics file is for another image size. Open the file of this camera."
-    )
-    assert prepared.steps()["LEDs"] == "closed"
-    prepared.press(Key.Key_PageDown)
-    assert prepared.title() == "Camera"
-
-    prepared.click("Use its files")
-    prepared.until(prepared.main_button().isEnabled)
-
-
-@pytest.mark.slow
-def test_a_letter_in_the_led_file_is_reported_with_its_line(
-    prepared: "Walker", tmp_path: Path
-) -> None:
-    go_to(prepared, "LEDs")
-    path = tmp_path / "leds.csv"
-    path.write_text("led,x_mm,y_mm,z_mm\n1,0,0,-30\n2,0,60,-30\n3,12,4O,-30\n4,0,9,1\n")
-
-    give_path(prepared, "LED file", path)
-
-    prepared.until_tells("ine 4 of leds.csv")
-    assert prepared.tells("4O")
-    assert prepared.tells("(letter O)")
-
-
-@pytest.mark.slow
-def test_exchanged_leds_are_named(prepared: "Walker", tmp_path: Path) -> None:
-    leds = paper_pen().leds.copy()
-    leds[[5, 8]] = leds[[8, 5]]
-    go_to(prepared, "LEDs")
-
-    give_path(prepared, "LED file", pen_in(tmp_path, leds))
-
-    prepared.until_tells("LEDs 6 and 9 are swapped")
-    assert prepared.tells("Correct the LED table first (see the message above).")
-    assert prepared.steps()["Swing"] == "closed"
-
-
-@pytest.mark.slow
-def test_a_displaced_led_is_named(prepared: "Walker", tmp_path: Path) -> None:
-    leds = paper_pen().leds.copy()
-    leds[5] += (0.0, 0.8, 0.0)
-    go_to(prepared, "LEDs")
-
-    give_path(prepared, "LED file", pen_in(tmp_path, leds))
-    prepared.operator.swing()
-
-    prepared.until_tells("LED 6 is 0.80 mm from its file position")
-
-
-def pen_in(folder: Path, leds: FloatArray) -> Path:
-    """Write a table of LEDs (N, 3), mm, and return its path."""
-    path = folder / "pen.csv"
-    write_pen(replace(paper_pen(), leds=leds, name="", nominal_tip=None), path)
-    return path
-
-
-@pytest.mark.slow
-def test_the_file_of_another_pen_is_reported(
-    prepared: "Walker", tmp_path: Path
-) -> None:
-    path = tmp_path / "another.json"
-    write_pen(eight_led_pen(), path)
-    go_to(prepared, "LEDs")
-
-    give_path(prepared, "LED file", path)
-
-    prepared.until_says("Pen not found")
-
-
-@pytest.mark.slow
-def test_a_folder_without_images_can_be_tried_again(
-    prepared: "Walker", tmp_path: Path
-) -> None:
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    go_to(prepared, "Camera")
-    prepared.tab_to("Image source")
-    prepared.press(Key.Key_Down)
-
-    give_path(prepared, "Folder, record or video", empty)
-
-    prepared.until(lambda: prepared.offers("Try again"))
-    assert prepared.says("Not connected")
-    assert prepared.tells("). Choose the folder with the images.")
-    assert not prepared.main_button().isEnabled()
-    assert prepared.says("No image received from the camera yet.")
-
-    picture_in(empty)
-    prepared.click("Try again")
-    prepared.until_tells("8 x 8 px")
-
-
-# The camera
-
-
-@pytest.mark.slow
-def test_a_camera_that_is_gone_is_reported_and_comes_back(
-    cameras: list[FaultyCamera], prepared: "Walker"
-) -> None:
-    go_to(prepared, "Camera")
-    prepared.until_says("Live")
-
-    cameras[-1].unplug()
-    prepared.until_says("Lost, reconnecting")
-    assert prepared.tells("). Check cable and power.")
-    cameras[-1].plug_in()
-    prepared.until_says("Live")
-
-    go_to(prepared, "Swing")
-    prepared.swing()
-    keep_on(prepared)
-    cameras[-1].unplug()
-    prepared.until_says("NO IMAGES")
-    assert prepared.tells("The camera sends no images.")
-    n_before = n_kept(prepared)
-    cameras[-1].plug_in()
-    keep_on(prepared)
-
-    assert n_kept(prepared) > n_before
-    assert len(open_record(record_folder(prepared)).used_images) >= n_kept(prepared)
-
-
 # The pen
-
-
-@pytest.mark.slow
-def test_what_befalls_the_pen_is_reported_and_the_swing_goes_on(
-    capturing: "Walker",
-) -> None:
-    n_inputs = capturing.n_inputs
-
-    capturing.operator.cover()
-    capturing.until_says("PEN LOST")
-    assert capturing.tells("Turn the LEDs towards the camera.")
-    capturing.operator.uncover()
-    keep_on(capturing)
-
-    capturing.operator.lift()
-    capturing.until_says("LIFTED")
-    assert capturing.tells("The pen is lifted.")
-    capturing.swing()
-    keep_on(capturing)
-
-    n_before = n_kept(capturing)
-    capturing.operator.slip(0.5, 1.5)
-    capturing.until_says("TIP SLIPPED")
-    assert capturing.tells("Images rejected:")
-    keep_on(capturing)
-    assert n_kept(capturing) >= n_before - 5
-    assert capturing.n_inputs == n_inputs
 
 
 @pytest.mark.slow
@@ -408,32 +210,6 @@ def finish_now(walker: "Walker") -> None:
     walker.click("Finish now")
 
 
-@pytest.mark.slow
-def test_computing_is_cancelled_and_begun_again(
-    capturing: "Walker", solving_on: "SolvingOn"
-) -> None:
-    keep_on(capturing, 20)
-    with solving_on():
-        finish_now(capturing)
-        capturing.until(lambda: capturing.offers("Stop computing"))
-        capturing.click("Stop computing")
-        capturing.until_says("STOPPED")
-    assert capturing.says("Tip not computed yet")
-
-    capturing.click("Compute again")
-    capturing.until(lambda: capturing.workbench.run.status.solution is not None)
-    capturing.until(capturing.main_button().isEnabled)
-    capturing.click("Review")
-
-    n_images = n_kept(capturing)
-    capturing.until_tells(f"{n_images} of {n_images} images included")
-    capturing.click("Exclude")
-    capturing.until_tells(f"{n_images - 1} of {n_images} images included")
-    capturing.until(lambda: capturing.offers("Include"))
-    capturing.click("Include")
-    capturing.until_tells(f"{n_images} of {n_images} images included")
-
-
 # The disk
 
 
@@ -460,55 +236,6 @@ def test_a_full_disk_pauses_the_swing_until_there_is_room(
 
 
 # Back and forth
-
-
-@pytest.mark.slow
-def test_going_back_and_forth_pauses_the_swing_and_goes_on(capturing: "Walker") -> None:
-    folder = record_folder(capturing)
-    for title in ("LEDs", "Camera", "Start"):
-        capturing.press(Key.Key_PageUp)
-        assert capturing.title() == title
-    capturing.until(lambda: phase(capturing) is Phase.PAUSED)
-    n_before = n_kept(capturing)
-    go_to(capturing, "Swing")
-    keep_on(capturing)
-
-    capturing.click_step("Camera")
-    assert capturing.title() == "Camera"
-    assert capturing.tells("A swing is in progress.")
-    capturing.click_step("Swing")
-    keep_on(capturing)
-    capturing.click_step("Review")
-    assert capturing.title() == "Swing"
-    assert capturing.says("Swing the pen first.")
-
-    for _ in range(3):
-        capturing.press(Key.Key_Escape)
-    keep_on(capturing)
-    assert capturing.title() == "Swing"
-    assert phase(capturing) is Phase.CAPTURING
-    assert record_folder(capturing) == folder
-    assert n_kept(capturing) >= n_before
-
-
-@pytest.mark.slow
-def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
-    first = record_folder(capturing)
-    capturing.press(Key.Key_Space)
-    capturing.until_says("PAUSED")
-    n_images = n_kept(capturing)
-    capturing.press(Key.Key_Space)
-    keep_on(capturing)
-
-    capturing.click("Start over")
-    assert capturing.tells("Start over? The images of this swing (")
-    capturing.click("Restart swing")
-    capturing.until(
-        lambda: capturing.workbench.run.status.record_folder not in (None, first)
-    )
-    capturing.until(lambda: open_record(first).verdict == DISCARDED)
-    assert len(open_record(first).images) >= n_images
-    keep_on(capturing)
 
 
 @pytest.mark.slow
@@ -621,28 +348,6 @@ def test_about_tells_the_versions_and_licences(prepared: "Walker") -> None:
 
     for part in ("PySide6 ", "Qt, PySide6 and psycopg: LGPL 3", "FFmpeg", "Noto Sans"):
         assert any(part in text for text in reported), part
-
-
-@pytest.mark.slow
-def test_the_operator_view_leads_the_swing_by_its_keys(capturing: "Walker") -> None:
-    view = capturing.window.operator_view
-    capturing.press(Key.Key_F11)
-    capturing.until(view.isActiveWindow)
-    capturing.until(lambda: "CAPTURING" in capturing.texts(view))
-
-    capturing.press(Key.Key_Space)
-    capturing.until(lambda: "PAUSED" in capturing.texts(view))
-    capturing.press(Key.Key_Space)
-    keep_on(capturing)
-    for key in (Key.Key_PageUp, Key.Key_PageDown, Key.Key_Return):
-        capturing.press(key)  # nothing goes on behind the view
-    assert capturing.title() == "Swing"
-    assert "CAPTURING" in capturing.texts(view)
-    capturing.press(Key.Key_B)
-    capturing.press(Key.Key_F11)
-    capturing.until(lambda: not view.isVisible())
-    assert capturing.says("Sounds are off.")
-    keep_on(capturing)
 
 
 # Anything else

@@ -18,7 +18,6 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QThreadPool, QUrl
 from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
-    QAbstractButton,
     QApplication,
     QCheckBox,
     QComboBox,
@@ -72,7 +71,6 @@ from lightpen.swing.resuming import (
     read_resumable,
     recorded_setup,
 )
-from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.steps.page import MainAction
@@ -969,30 +967,6 @@ def test_the_budget_is_checked_by_monte_carlo_on_request(
         assert 0.4 < float(one) / float(other) < 2.0
 
 
-def test_the_words_change_with_the_language(page: ReviewPage) -> None:
-    the(page, QTabWidget).setTabText(0, "other")
-
-    QApplication.sendEvent(page, QEvent(QEvent.Type.LanguageChange))
-
-    assert the(page, QTabWidget).tabText(0) == "Images"
-    assert banner(page).word == "PASS: Within limits"
-
-
-def test_every_control_has_a_name_for_a_screen_reader(page: ReviewPage) -> None:
-    controls = [
-        each
-        for each in page.findChildren(QWidget)
-        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
-        and each.isVisibleTo(page)
-        and not isinstance(each, QTabBar)  # its tabs have names
-    ]
-
-    assert len(controls) > 5
-    for each in controls:
-        text = each.text() if isinstance(each, QAbstractButton) else ""
-        assert each.accessibleName() or text, each
-
-
 # Images
 
 
@@ -1014,6 +988,10 @@ def test_images_are_listed_worst_first_with_their_reasons(bed: Bed) -> None:
     misfits = [float(misfit) for _, misfit, _, _ in rows[1:]]
     assert misfits == sorted(misfits, reverse=True)
     assert count(page) == included(N_IMAGES - 2, "1 unreadable", "1 tip slipped")
+
+    table(page).choose(SLIPPED)  # which may be put back
+    click(page, "Include")
+    await_count(bed.qtbot, page, included(N_IMAGES - 1, "1 unreadable"))
 
 
 def test_the_chosen_image_is_shown_with_its_leds_and_residuals(
@@ -1081,19 +1059,6 @@ def test_of_another_swing_the_worst_image_is_shown_first(
     panel.set_value(replace(solution, source=source))
     assert table(page).number() == worst
     assert len(table(page).selected()) == 1
-
-
-@pytest.mark.slow
-def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
-    (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
-    bed.solve()
-    page = bed.show()
-
-    assert table(page).number() == DAMAGED
-    bed.qtbot.waitUntil(
-        lambda: "wrong checksum" in the(page, ResidualView).accessibleDescription()
-    )
-    assert the(page, ResidualView).image_size().isEmpty()
 
 
 def test_a_bug_while_an_image_is_read_is_reported_and_other_images_are_shown(
@@ -1173,40 +1138,27 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
 
 
 @pytest.mark.slow
-def test_keys_take_several_images_out_and_put_them_back(
+def test_keys_take_several_images_out_undo_redo_and_put_them_back(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     table(page).setFocus()
+    control = Qt.KeyboardModifier.ControlModifier
     shift = Qt.KeyboardModifier.ShiftModifier
     for _ in range(2):
         QTest.keyClick(table(page), Qt.Key.Key_Down, shift)
+    three_fewer = included(N_IMAGES - 3, "3 excluded manually")
 
     QTest.keyClick(table(page), Qt.Key.Key_Delete)
-    await_count(qtbot, page, included(N_IMAGES - 3, "3 excluded manually"))
+    await_count(qtbot, page, three_fewer)
     assert len(table(page).selected()) == 3
-
-    QTest.keyClick(table(page), Qt.Key.Key_Insert)
-    await_count(qtbot, page, included(N_IMAGES))
-
-
-@pytest.mark.slow
-def test_what_was_taken_out_or_put_back_is_undone_and_redone(
-    page: ReviewPage, qtbot: QtBot
-) -> None:
-    control, shift = (
-        Qt.KeyboardModifier.ControlModifier,
-        Qt.KeyboardModifier.ShiftModifier,
-    )
-    assert not button(page, "Undo").isEnabled()
-    click(page, "Exclude")
-    await_count(qtbot, page, included(N_IMAGES - 1, "1 excluded manually"))
-
     QTest.keyClick(table(page), Qt.Key.Key_Z, control)
     await_count(qtbot, page, included(N_IMAGES))
     assert not button(page, "Undo").isEnabled()
-
     QTest.keyClick(table(page), Qt.Key.Key_Z, control | shift)
-    await_count(qtbot, page, included(N_IMAGES - 1, "1 excluded manually"))
+    await_count(qtbot, page, three_fewer)
+
+    QTest.keyClick(table(page), Qt.Key.Key_Insert)
+    await_count(qtbot, page, included(N_IMAGES))
 
 
 @pytest.mark.slow
@@ -1252,20 +1204,7 @@ def test_the_line_leaves_the_better_half_of_the_images(
     assert states.count("excluded") == half  # short enough for its column
 
 
-@pytest.mark.slow
-def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
-    slip(bed.swing)
-    bed.solve()
-    page = bed.show()
-    table(page).choose(SLIPPED)
-
-    assert "1 tip slipped" in count(page)
-    click(page, "Include")
-
-    await_count(bed.qtbot, page, included(N_IMAGES))
-
-
-def test_an_image_that_the_program_left_out_cannot_be_put_back(bed: Bed) -> None:
+def test_an_image_that_cannot_be_read_says_why_and_cannot_be_put_back(bed: Bed) -> None:
     (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
     bed.solve()
     page = bed.show()
@@ -1275,6 +1214,9 @@ def test_an_image_that_the_program_left_out_cannot_be_put_back(bed: Bed) -> None
     why = "Excluded automatically: unreadable"
     assert button(page, "Include").toolTip() == why
     assert not button(page, "Exclude").isEnabled()
+    view = the(page, ResidualView)
+    bed.qtbot.waitUntil(lambda: "wrong checksum" in view.accessibleDescription())
+    assert view.image_size().isEmpty()
 
 
 def test_taking_out_too_many_is_refused_and_nothing_is_lost(
@@ -1616,7 +1558,7 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
     qtbot.waitUntil(lambda: page.main_action().why_not == "")
 
 
-def test_a_repetition_is_asked_for_and_can_be_declined(
+def test_a_repetition_is_asked_for_and_keeps_the_images_of_the_swing(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     click(page, "Repeat swing")
@@ -1624,21 +1566,13 @@ def test_a_repetition_is_asked_for_and_can_be_declined(
     assert asks.words() == (
         "Repeat the swing from the start? These images remain on the disk."
     )
-
     answer(page, "Continue with these")
-
     assert asks.words() == ""
     assert workbench.run.status.solution is not None
 
-
-def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
-) -> None:
     click(page, "Repeat swing")
-
     with qtbot.waitSignal(page.step_requested) as asked:
         answer(page, "Repeat swing")
-
     assert asked.args == ["swing"]
     record = open_record(workbench.run.records_folder / "swing")
     assert record.verdict == DISCARDED
@@ -1660,18 +1594,6 @@ def test_a_swing_that_cannot_be_set_aside_is_reported(
 
 
 # What is asked
-
-
-def test_a_question_stays_in_another_language(
-    page: ReviewPage, qapp: QApplication
-) -> None:
-    click(page, "Repeat swing")
-    english = the(page, QuestionBar).words()
-    LanguageSwitch(qapp).set_language("zh_CN")
-    QApplication.processEvents()
-
-    assert english.startswith("Repeat the swing")
-    assert the(page, QuestionBar).words() not in ("", english)
 
 
 def test_whether_to_repeat_is_asked_no_more_once_the_tip_is_accepted(bed: Bed) -> None:
@@ -1727,11 +1649,6 @@ def test_a_swing_without_a_tip_shows_its_cause_once_and_its_residuals(
     plots = [card.plot.columns() for card in failed.findChildren(PlotCard)]
     (leds,) = (columns for columns in plots if "rms_px" in columns)
     assert (np.asarray(leds["rms_px"], dtype=float) > 0).all()
-
-
-def test_a_swing_without_a_tip_goes_on_with_more_images_or_anew(
-    failed: ReviewPage,
-) -> None:
     assert failed.main_action() == MainAction("Capture more")
     assert button(failed, "Repeat swing").isEnabled()
     assert not button(failed, "Copy tip").isEnabled()

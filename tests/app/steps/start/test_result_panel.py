@@ -3,6 +3,7 @@
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import pytest
 from benchmarks.small_records import small_record
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -81,3 +82,22 @@ def test_that_a_tip_is_too_old_is_said_by_the_rule_that_holds_now(
     panel.set_rule(DueRule(60))
 
     assert not any("older than" in words for words in panel.words())
+
+
+@pytest.mark.parametrize(
+    ("days", "age"),
+    [
+        *((0, "Today"), (1, "Yesterday"), (2, "2 days ago"), (59, "59 days ago")),
+        *((60, "2 months ago"), (729, "24 months ago"), (730, "2 years ago")),
+        (-400, "In the future"),
+    ],
+)
+def test_the_age_is_reported_in_words(
+    qtbot: QtBot, tmp_path: Path, days: int, age: str
+) -> None:
+    panel = LastResultPanel(lambda: NOON + timedelta(days=days))
+    qtbot.addWidget(panel)
+    panel.set_value(LastResult(accepted(tmp_path)))
+
+    assert panel.words()[0] == age
+    assert ("Check the clock" in panel.words()[-1]) is (days < 0)

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,30 +10,23 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication
 from pytestqt.qtbot import QtBot
+from tests.app.blank_page import BlankPage
 from tests.faulty_camera import FaultyCamera
-from typing_extensions import override
 
-from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import Connection
-from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.simulator.hand import Operator
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.capture.state import Pause, Phase, SwingState
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.resuming import Resumable, read_for_more
 from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow
-from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
 from lightpen_app.steps.swing.page import SwingPage
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -55,26 +46,6 @@ LONG = SwingLimits(max_uncertainty=1e-5, min_images=5000, max_images=5000)
 VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
 UPRIGHT = Posture(0.0, 0.0, 0.0)
 PATIENCE_MS = 120_000
-
-
-class Blank(Page):
-    """A step before or after."""
-
-    def __init__(self, key: str) -> None:
-        super().__init__()
-        self.key = key
-
-    @override
-    def title(self) -> str:
-        return self.key
-
-    @override
-    def is_complete(self) -> bool:
-        return True
-
-    @override
-    def main_action(self) -> MainAction:
-        return MainAction("Next")
 
 
 class Recorder:
@@ -97,7 +68,7 @@ class Desk:
         self.workbench, self.run = workbench, workbench.run
         self.recorder = Recorder()
         self.page = SwingPage(workbench, self.recorder)
-        pages = (Blank("leds"), self.page, Blank("review"))
+        pages = (BlankPage("leds"), self.page, BlankPage("review"))
         self.window = MainWindow(
             pages, settings, Preferences(), workbench.notifications
         )
@@ -208,23 +179,6 @@ def desk(qtbot: QtBot, workbench: Workbench, settings: Settings) -> Iterator[Des
     desk = Desk(workbench, settings)
     yield desk
     desk.close()
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory, small_scene: Scene) -> Path:
-    """A folder with the images of a swing that somebody took."""
-    folder = tmp_path_factory.mktemp("recording")
-    clock = SkippingClock()
-    operator = Operator(clock, seated=True)
-    operator.swing()
-    camera = FaultyCamera(small_scene, clock, operator)
-    camera.open()
-    camera.start()
-    for number in range(16):
-        image = camera.read(1.0).image
-        (folder / f"{number:03}.png").write_bytes(encode_png(image))
-    camera.close()
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -361,24 +315,6 @@ def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> Non
     until(qtbot, lambda: (desk.posture or UPRIGHT).tilt > 0.2)
 
 
-def test_a_recording_ends_when_a_whole_pass_brought_nothing_new(
-    qtbot: QtBot, desk: Desk, recording: Path
-) -> None:
-    choice = SourceChoice(SourceKind.RECORDED, str(recording))
-    desk.workbench.selection.set_preparation(
-        replace(desk.workbench.selection.preparation, limits=LONG, source=choice)
-    )
-    until(
-        qtbot, lambda: not desk.workbench.selection.preparation.camera_missing_inputs()
-    )
-
-    desk.window.go_to(1)
-
-    until_verdict(qtbot, desk)
-    assert not desk.offers("Seat")  # there is nobody to instruct
-    assert desk.value.state.word in {"CHECK", "REPEAT", "NO TIP"}
-
-
 # A short swing, from beginning to end
 
 
@@ -433,29 +369,6 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_shows_the_review(
     assert filled[-1] > 0.5  # the ring was seen to fill
 
 
-def test_after_the_verdict_more_can_be_captured(
-    qtbot: QtBot, at_verdict: Desk, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    desk = at_verdict
-    n_before = desk.state.n_kept
-    is_seen = Event()
-
-    def read_late(folder: Path) -> Resumable:
-        is_seen.wait(PATIENCE_MS / 1000)
-        return read_for_more(folder)
-
-    monkeypatch.setattr("lightpen.swing.workflow.read_for_more", read_late)
-    desk.click("Capture more")
-
-    until(qtbot, lambda: desk.page.main_action().why_not == "Swing in progress")
-    is_seen.set()
-    until(qtbot, lambda: desk.state.n_kept > n_before + 5)
-    desk.finish()
-    until_verdict(qtbot, desk)
-    assert desk.run.status.solution is not None
-    assert len(desk.run.status.solution.numbers) == desk.state.n_kept
-
-
 @pytest.mark.slow
 def test_enter_after_pause_does_not_ask_for_more_images_once_the_swing_is_complete(
     qtbot: QtBot, at_verdict: Desk
@@ -497,28 +410,6 @@ def test_computing_can_be_stopped_and_begun_again(
     until_verdict(qtbot, desk)
 
 
-@pytest.mark.slow
-def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
-    qtbot: QtBot, at_verdict: Desk
-) -> None:
-    desk = at_verdict
-    folder = desk.run.status.record_folder
-    desk.window.go_to(2)
-    desk.run.runner.ask(lambda workflow: workflow.accept("It is seen to."))
-    until(qtbot, lambda: desk.value.state.word == "PRACTICE SAVED")
-    assert desk.value.instruction == "Accepted"
-    assert folder is not None
-    journal = (folder / JOURNAL).read_bytes()
-
-    desk.window.go_to(1)
-
-    until(qtbot, lambda: desk.run.status.record_folder not in (None, folder))
-    assert desk.run.status.result is None
-    desk.let_operator_swing()
-    until_verdict(qtbot, desk)
-    assert (folder / JOURNAL).read_bytes() == journal
-
-
 # A long swing, disturbed
 
 
@@ -536,44 +427,6 @@ def test_a_covered_pen_is_reported_and_the_swing_goes_on_by_itself(
     assert lost()[0].instruction == "Pen not detected"
     assert Sound.LOST in capturing.recorder.sounds()[n_played:]
     keep_on(qtbot, capturing)
-
-
-def test_a_lifted_pen_pauses_the_swing_until_it_is_back(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    n_before = capturing.state.n_kept
-
-    capturing.click("Lift")
-    until(qtbot, lambda: capturing.value.state.word == "LIFTED")
-    assert capturing.value.dial is not None
-    assert capturing.value.dial.target is None
-
-    capturing.click("Seat")
-    keep_on(qtbot, capturing)
-    assert capturing.state.n_kept > n_before
-
-
-@pytest.mark.slow
-def test_a_slip_costs_only_the_images_that_slipped(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    keep_on(qtbot, capturing, 5)
-    n_before = capturing.state.n_kept
-    n_reported = len(capturing.shown)
-
-    capturing.click("Slip")
-
-    until(
-        qtbot,
-        lambda: any(
-            v.instruction == "Tip slipped" for v in capturing.shown[n_reported:]
-        ),
-    )
-    assert Sound.LOST in capturing.recorder.sounds()
-    keep_on(qtbot, capturing)
-    assert capturing.state.n_kept > n_before - 5
-    until(qtbot, lambda: capturing.value.state.word == "CAPTURING")
-    assert capturing.state.slipped_at is not None  # it is no longer shown, not undone
 
 
 def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
@@ -610,28 +463,6 @@ def test_leaving_the_step_pauses_and_coming_back_goes_on(
 
     capturing.window.go_to(1)
     keep_on(qtbot, capturing)
-
-
-def test_a_full_disk_pauses_with_its_sentence_and_space_goes_on(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    resource = pytest.importorskip("resource")
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, before[1]))
-    try:
-        until(qtbot, lambda: "could not be recorded" in capturing.value.hint)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert capturing.value.instruction == "Paused"
-    assert "cannot be written" in capturing.words()
-    n_before = capturing.state.n_kept
-
-    capturing.type(Key.Key_Space)
-    keep_on(qtbot, capturing)
-
-    folder = capturing.run.status.record_folder
-    assert folder is not None
-    assert len(open_record(folder).used_images) >= n_before + 3
 
 
 def test_a_camera_that_is_unplugged_and_back_costs_nothing(
@@ -752,22 +583,6 @@ def test_enter_presses_the_main_button_unless_another_was_chosen(
     capturing.click("Continue swinging")
 
 
-@pytest.mark.slow
-def test_space_pauses_even_after_a_click_on_the_simulated_hand(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    capturing.window.go_to(0)
-    capturing.window.go_to(1)
-    keep_on(qtbot, capturing, 1)  # as it was paused by leaving the step
-    capturing.click("Slip")
-
-    capturing.type(Key.Key_Space)
-    until(qtbot, lambda: capturing.value.state.word == "PAUSED")
-
-    capturing.type(Key.Key_Space)
-    keep_on(qtbot, capturing)
-
-
 def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     qtbot: QtBot, capturing: Desk
 ) -> None:
@@ -787,16 +602,3 @@ def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     assert len(open_record(old).used_images) >= n_before
     keep_on(qtbot, capturing)
     assert old not in {each.folder for each in interrupted(capturing)}
-
-
-@pytest.mark.slow
-def test_finishing_early_gives_a_verdict_that_says_why(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    keep_on(qtbot, capturing, 8)
-    capturing.finish()
-
-    until(qtbot, lambda: capturing.run.status.state is not None)
-    until(qtbot, lambda: capturing.state.phase is Phase.VERDICT)
-    until(qtbot, lambda: capturing.value.state.word in {"REPEAT", "NO TIP"})
-    assert capturing.recorder.sounds()[-1] is Sound.FAILED
