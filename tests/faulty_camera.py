@@ -13,12 +13,12 @@ from lightpen.simulator.camera import SimulatedCamera
 
 
 class FaultyCamera(SimulatedCamera):
-    """Can be unplugged, stall, be busy, and lose or damage images, from any thread."""
+    """Can be unplugged, stall, be busy, and damage images, from any thread."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._busy_until = self._stalled_until = -inf  # by the clock, s
-        self._n_to_lose = self._n_to_spoil = 0
+        self._n_to_spoil = 0
         self._is_plugged_in = True
         self._has_power = True  # since it was opened
 
@@ -37,10 +37,6 @@ class FaultyCamera(SimulatedCamera):
     def occupy(self, seconds: float) -> None:
         """Let another program have the device for a time."""
         self._busy_until = self._now + seconds
-
-    def lose_frames(self, n_frames: int) -> None:
-        """Lose the next images on the way."""
-        self._n_to_lose = n_frames
 
     def spoil_frames(self, n_frames: int) -> None:
         """Damage the next images on the way."""
@@ -74,8 +70,6 @@ class FaultyCamera(SimulatedCamera):
 
     @override
     def _take_image(self) -> Frame:
-        self._lose(self._n_to_lose)
-        self._n_to_lose = 0
         frame = super()._take_image()
         if self._n_to_spoil:
             self._n_to_spoil -= 1

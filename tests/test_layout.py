@@ -62,15 +62,6 @@ def test_a_class_and_a_function_are_found_by_their_name_alone() -> None:
     assert names_given_twice(PACKAGES.values()) == {}
 
 
-def test_a_name_given_twice_is_noticed(tmp_path: Path) -> None:
-    for module in ("one", "other"):
-        (tmp_path / f"{module}.py").write_text(
-            "class Verdict: ...\nclass _Own: ...\ndef judge(): ...\ndef main(): ...\n"
-        )
-
-    assert set(names_given_twice([tmp_path])) == {"Verdict", "judge"}
-
-
 def test_no_page_is_long() -> None:
     pages = (PACKAGES["lightpen_app"] / "steps").glob("*/page.py")
     lengths = {
@@ -99,16 +90,6 @@ def test_every_step_is_among_those_that_know_no_other(
     steps = {path.name for path in folder.iterdir() if (path / "__init__.py").exists()}
 
     assert set(contract["modules"]) == {f"lightpen_app.steps.{step}" for step in steps}
-
-
-def test_a_package_without_a_place_is_noticed(tmp_path: Path) -> None:
-    for name in ("model", "formats", "forgotten"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "module.py").touch()
-    (tmp_path / "cli.py").touch()
-    contract = {"layers": ["cli", "formats | model"]}
-
-    assert parts_of(tmp_path) - layers_of(contract) == {"forgotten"}
 
 
 def test_the_page_of_the_architecture_is_that_of_the_imports() -> None:

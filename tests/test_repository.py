@@ -13,8 +13,6 @@ from lightpen import __version__
 
 ROOT = Path(__file__).parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-MOST_PICTURES = 12
-PICTURES = (".png", ".jpg", ".jpeg", ".gif", ".webp")
 POWERSHELL = re.compile(r"powershell (?=-)(?!-NoProfile)")
 
 
@@ -27,14 +25,6 @@ def tracked() -> list[Path]:
     if listing.returncode != 0:
         pytest.skip("this is no clone")
     return [ROOT / name for name in listing.stdout.split("\0") if name]
-
-
-def test_few_pictures_and_no_links_are_in_the_repository() -> None:
-    files = tracked()
-
-    pictures = [path for path in files if path.suffix.lower() in PICTURES]
-    assert len(pictures) <= MOST_PICTURES
-    assert [path for path in files if path.is_symlink()] == []
 
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
@@ -61,18 +51,6 @@ def test_a_release_is_of_a_tag_approved_signed_checked_and_summed() -> None:
     places = [text.find(step) for step in [*steps, "SHA256SUMS", "--verify-tag"]]
     assert -1 not in places
     assert places == sorted(places)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("SECURITY.md", "CITATION.cff", "CHANGELOG.md", "LICENSE"),
-        ".github/PULL_REQUEST_TEMPLATE.md",
-        *(f".github/ISSUE_TEMPLATE/{kind}.md" for kind in ("bug", "feature")),
-    ],
-)
-def test_whoever_reports_changes_or_cites_finds_how(name: str) -> None:
-    assert (ROOT / name).read_text("utf-8").strip()
 
 
 def test_the_version_to_cite_is_that_of_the_program() -> None:

@@ -68,15 +68,6 @@ import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 """
 
-DEMO = """
-import os
-for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
-    os.environ.pop(name, None)  # so it tells what it does
-from lightpen_app.application import run_demo
-from lightpen_app.wizard_pages import make_pages
-sys.exit(run_demo(make_pages))
-"""
-
 SWINGING = """
 import shutil
 from PySide6.QtCore import QTimer
@@ -270,34 +261,6 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
 
 
 @pytest.mark.slow
-def test_a_solution_that_ends_in_time_is_waited_for(
-    workbench: Workbench,
-    interrupted: Path,
-    qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    began, ended = Event(), Event()
-
-    def solve(record: Record, report: Report) -> Solution:
-        began.set()
-        time.sleep(0.5)  # as in a step that cannot be cancelled
-        solution = solve_record(record)
-        ended.set()
-        return solution
-
-    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve)
-    resumable = read_resumable(interrupted)
-    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
-    workbench.run.runner.ask(lambda workflow: workflow.finish())
-    qtbot.waitUntil(began.is_set)
-
-    assert workbench.shut_down(TIMEOUT / 1000)
-    assert ended.is_set()
-    assert workbench.run.status.solution is None
-    assert_whole(interrupted, N_IMAGES)
-
-
-@pytest.mark.slow
 def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     open_wizard: "OpenWizard",
     swung: Callable[..., Path],
@@ -354,21 +317,6 @@ def test_the_process_ends_though_a_job_does_not(tmp_path: Path) -> None:
             process.kill()
 
     assert status == 0
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signals")
-def test_a_signal_ends_the_demo_with_nothing_left_behind(tmp_path: Path) -> None:
-    number = signal.SIGTERM
-    with started(DEMO, tmp_path) as process:
-        assert "Demo:" in said(process)
-        assert len(list(tmp_path.glob("lightpen-demo-*"))) == 1
-        process.send_signal(number)
-        words = process.communicate(timeout=TIMEOUT / 1000)[1]
-
-    assert process.returncode == 128 + number
-    assert "Traceback" not in words
-    assert list(tmp_path.glob("lightpen-demo-*")) == []
 
 
 @pytest.mark.slow

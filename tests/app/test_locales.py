@@ -170,15 +170,6 @@ def test_no_property_of_qt_is_set_by_keyword() -> None:
     assert found == {}
 
 
-def test_a_property_that_is_set_by_keyword_is_noticed() -> None:
-    source = "QTimer(self, interval=5)\nQtGui.QAction(parent=self, checkable=True)"
-
-    assert properties_by_keyword(source) == [
-        "QTimer(interval=)",
-        "QtGui.QAction(checkable=)",
-    ]
-
-
 @pytest.mark.skipif(
     not (shutil.which("localedef") and SOURCE.exists()),
     reason="needs localedef and the source of a Turkish locale (Debian: locales)",

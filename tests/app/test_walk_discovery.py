@@ -1,23 +1,18 @@
 """From "I have no such file" to the accepted tip, with the simulated pen."""
 
 import re
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QTabBar, QWidget
+from PySide6.QtWidgets import QWidget
 from tests.app.walks import NAMES, page_text, read_out, result_on_disk
 
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.pen_files import read_pen
-from lightpen.model.pen import Pen
 from lightpen.record.swings.recordings import files_beside
 from lightpen_app.discovery.discovery_run import DISCOVERIES
 from lightpen_app.discovery.discovery_window import DiscoveryWindow
-from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.pen_view import PenView
 
@@ -26,7 +21,6 @@ if TYPE_CHECKING:
 
 FRAME_RATE = 20.0  # a hand that moves farther from image to image cannot be followed
 NO_KEY = Qt.KeyboardModifier.NoModifier
-REPEATABILITY = 2  # tab of History
 SAVE = "Save both files and calibrate the tip"
 
 
@@ -96,70 +90,6 @@ def find_and_accept(walker: "Walker", step: str) -> None:
     walker.until(lambda: walker.workbench.run.status.result is not None)
 
 
-def has_results(walker: "Walker", number: int) -> bool:
-    """Whether there are so many results on the disk."""
-    return len(list(walker.workbench.folder.rglob("results/*.json"))) == number
-
-
-@pytest.mark.qt_log_ignore("^This plugin does not support ")
-@pytest.mark.slow
-def test_the_files_found_improve_with_two_more_swings(
-    walker: "Walker", monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", FRAME_RATE)
-    find_and_accept(walker, "Camera")
-    run, found = walker.workbench.run, walker.workbench.selection.preparation
-    assert found.pen is not None
-    assert found.camera is not None
-
-    walker.click_step("Camera")
-    walker.tab_to("Image source")
-    walker.press(Qt.Key.Key_Up)
-    walker.until_says("Live")
-    for n_results in (2, 3):
-        walker.until(walker.main_button().isEnabled)
-        walker.click_step("Swing")
-        walker.until(lambda: run.status.state is not None and run.status.result is None)
-        walker.swing()
-        walker.until(lambda: run.status.verdict is not None)
-        walker.workbench.live.set_following(False)
-        walker.operator.lean_towards(0.0, 0.0, 0.0)  # upright and still: to the review
-        walker.until_shows("Review")
-        walker.until(walker.main_button().isEnabled)
-        walker.click("Accept")
-        walker.until(partial(has_results, walker, n_results))
-
-    walker.click_step("History")
-    walker.until_says("3 entries")
-    page = walker.window.page()
-    (tabs,) = page.findChildren(QTabBar)
-    click(tabs, tabs.tabRect(REPEATABILITY))
-    (table,) = page.findChildren(HistoryTable)
-    for row, keys in ((0, NO_KEY), (2, Qt.KeyboardModifier.ShiftModifier)):
-        click(table.viewport(), table.visualRect(table.model().index(row, 0)), keys)
-    walker.click("Adjust together")
-    walker.until_tells("Residuals of the swing held out")
-
-    (camera,) = walker.workbench.folder.rglob("led files/*.yaml")
-    (leds,) = walker.workbench.folder.rglob("led files/*.json")
-    refined, improved = read_camera(camera), read_pen(leds)
-    assert refined.covariance is not None
-    assert found.camera.covariance is not None
-    assert (np.diag(refined.covariance) < np.diag(found.camera.covariance))[:4].all()
-    assert variance_of(improved) < variance_of(found.pen)
-    assert refined.found is not None
-    assert found.camera.found is not None
-    assert len(refined.found.marks) > len(found.camera.found.marks)
-
-
 def click(widget: QWidget, place: QRect, keys: Qt.KeyboardModifier = NO_KEY) -> None:
     """Click the centre of a part of a widget."""
     QTest.mouseClick(widget, Qt.MouseButton.LeftButton, keys, place.center())
-
-
-def variance_of(pen: Pen) -> float:
-    """Sum of the variances of all LED coordinates, mm^2."""
-    assert pen.led_covariance is not None
-    assert pen.scale_sigma is not None
-    arms = pen.leds - pen.leds.mean(axis=0)
-    return float(np.trace(pen.led_covariance) + pen.scale_sigma**2 * np.sum(arms**2))

@@ -2,17 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from tests.accepted_tip import Holder, accept_tip, leant
-from tests.verifying import FRAME
+from tests.accepted_tip import accept_tip
 
-from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.rig import rig_of
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.swings.names import Names
-from lightpen.simulator.swings import PAPER_TIP
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.fixed_point import FixedPointOptions
 from lightpen_app.work.settings import Settings
@@ -73,40 +68,3 @@ def test_a_wrong_password_lays_down_nothing_and_is_asked_for_again(
     walker.type("correct horse")  # the password waits for it
     walker.press(Qt.Key.Key_Return)
     walker.until(lambda: walker.workbench.selection.choices.limits.across == 1.0)
-
-
-@pytest.mark.slow
-def test_beyond_the_limits_a_supervisor_accepts_after_a_wrong_password(
-    known: "Walker",
-) -> None:
-    walker, workbench = known, known.workbench
-    lay_down_limits(walker, "correct horse", STRICT)
-    walker.until(lambda: workbench.selection.supervision.is_guarded)
-    walker.take_window()  # of several windows none is active by itself here
-    walker.click_step("Verify")
-    walker.until_says("Probe the cone")
-    camera, pen = (
-        workbench.selection.preparation.camera,
-        workbench.selection.preparation.pen,
-    )
-    assert camera is not None
-    assert pen is not None
-    bent = Holder(rig_of(camera), pen, PAPER_TIP + np.array([0.3, 0.0, 0.0]))
-    status = workbench.verification.status
-    assert status.region is not None
-    for hold in leant(6):  # the first is the rest that the pen leaves
-        for detection in bent.still(hold):
-            workbench.verification.runner.take(FRAME, detection, status.region)
-    walker.until_says("Not verified")
-    assert workbench.verification.status.assessment is not None
-    assert workbench.verification.status.assessment.grade is Grade.REPEAT
-
-    walker.click("Accept...")
-    walker.click_into("Reason", "Roughing only.")
-    assert not walker.offers("Accept with reason")
-    sign(walker, "Eve", "wrong horse")
-    walker.until_tells("Wrong supervisor password.")
-    assert workbench.verification.status.accepted_by == ""
-    walker.type("correct horse")  # name and reason are still there
-    walker.press(Qt.Key.Key_Return)
-    walker.until(lambda: workbench.verification.status.accepted_by == "Eve")

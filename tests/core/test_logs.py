@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from lightpen import logs
-from lightpen.errors import UsageError
 from lightpen.logs import (
     LEVEL_VARIABLE,
     N_OLD_FILES,
@@ -251,17 +250,3 @@ def test_the_option_comes_before_the_variable(
         monkeypatch.setenv(LEVEL_VARIABLE, variable)
 
     assert log_level(option) == level
-
-
-def test_a_variable_that_names_no_level_is_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv(LEVEL_VARIABLE, "loud")
-
-    with pytest.raises(UsageError) as refused:
-        log_level(None)
-
-    assert str(refused.value) == (
-        "LIGHTPEN_LOG_LEVEL is loud, which is not a log level. "
-        "Set it to one of: debug, info, warning, error."
-    )

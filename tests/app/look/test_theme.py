@@ -2,7 +2,7 @@
 
 import re
 import shutil
-from dataclasses import fields, replace
+from dataclasses import fields
 from itertools import combinations
 from pathlib import Path
 
@@ -17,7 +17,6 @@ from lightpen.arrays import FloatArray
 from lightpen_app.look.theme import (
     DARK,
     FAMILIES,
-    GRID,
     LIGHT,
     Appearance,
     Colors,
@@ -123,12 +122,6 @@ def test_borders_and_pointers_are_seen_on_every_ground(colors: Colors) -> None:
     assert poor_pairs(colors, SHAPES, 3.0) == []
 
 
-def test_a_faint_word_is_noticed() -> None:
-    faint = replace(LIGHT, muted="#999999")
-
-    assert poor_pairs(faint, PAIRS, 4.5)
-
-
 @PALETTES
 @pytest.mark.parametrize("kind", BLINDNESS)
 def test_states_differ_for_the_colour_blind(colors: Colors, kind: str) -> None:
@@ -217,11 +210,6 @@ def test_letters_grow_with_the_distance(distance_m: float, expected: int) -> Non
     wide = expected * 0.729 / 0.714
 
     assert letters_for(distance_m, 91.8) == pytest.approx(wide, abs=1)
-
-
-def test_the_grid_holds_the_type_scale() -> None:
-    assert GRID == 8
-    assert sorted(TextSize) == list(TextSize)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

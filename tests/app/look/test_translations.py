@@ -22,7 +22,6 @@ from lightpen_resources import RESOURCES, SOURCE_LANGUAGE, languages
 
 ROOT = RESOURCES.parents[1]
 APPLICATION = ROOT / "app" / "lightpen_app"
-CORE = ROOT / "core" / "lightpen"
 TRANSLATIONS = RESOURCES / "translations"
 CHINESE = TRANSLATIONS / "lightpen_zh_CN.ts"
 TRANSLATED = sorted(
@@ -168,21 +167,6 @@ def test_every_text_is_translated(ts_file: Path, tmp_path: Path) -> None:
     assert untranslated(fresh) == []
 
 
-def test_a_text_that_is_not_translated_is_noticed(tmp_path: Path) -> None:
-    application, core = tmp_path / "app", tmp_path / "core"
-    application.mkdir()
-    core.mkdir()
-    (application / "page.py").write_text(
-        "class Page(QWidget):\n    def f(self):\n        self.tr('New text')\n"
-    )
-    (core / "files.py").write_text("error = message('file.new', 'New {what}')\n")
-    fresh = tmp_path / CHINESE.name
-
-    TOOL.collect(fresh, application, ["New {what}"])
-
-    assert sorted(untranslated(fresh)) == ["Page: New text", "core: New {what}"]
-
-
 @pytest.mark.slow
 def test_no_text_reaches_the_screen_untranslatable() -> None:
     for path in APPLICATION.rglob("*.py"):
@@ -211,11 +195,6 @@ def test_a_text_that_nothing_translates_is_noticed(source: str) -> None:
     assert len(list(bare_texts(ast.parse(source)))) == 1
 
 
-def test_an_untranslatable_text_is_noticed() -> None:
-    assert formatted_texts("self.tr(f'{n} images')") == ["self.tr(f'{n} images')"]
-    assert plain_errors("show_notice(str(error))") == ["str(error)"]
-
-
 @pytest.mark.parametrize("ts_file", sorted(TRANSLATIONS.glob("*.ts")), ids=str)
 def test_the_compiled_translations_are_fresh(ts_file: Path, tmp_path: Path) -> None:
     compiled = TOOL.compile_ts(ts_file, tmp_path)
@@ -235,10 +214,6 @@ def test_a_translation_keeps_the_places_and_formats_of_the_values(
     for _, source, translation in messages(ts_file):
         for text in texts_of(translation):
             assert places_in(text) == places_in(source), source
-
-
-def test_a_place_with_another_format_is_noticed() -> None:
-    assert places_in("U = {limit:.3f} mm") != places_in("U = {limit:.4f} mm")
 
 
 def test_the_language_changes_while_a_widget_is_shown(
@@ -297,10 +272,6 @@ def test_the_bundled_fonts_hold_every_character_that_is_shown() -> None:
     assert missing_characters(text) == set(), "run resources/cut_fonts.py"
 
 
-def test_a_missing_character_is_noticed() -> None:
-    assert missing_characters("a\u9f98") == {"\u9f98"}
-
-
 @pytest.mark.parametrize("language", languages())
 @pytest.mark.parametrize("topic", HELP_TOPICS)
 def test_every_step_has_help(language: str, topic: str) -> None:
@@ -333,12 +304,6 @@ def test_texts_use_the_terms_of_the_glossary() -> None:
     for _, source, translation in messages(CHINESE):
         for text in (source, *texts_of(translation)):
             assert other_terms(text) == [], text
-
-
-def test_another_word_than_that_of_the_glossary_is_noticed() -> None:
-    assert other_terms("Open the camera file. Name the touches.") != []
-    assert other_terms("\u6821\u51c6\u5b9e\u9a8c\u5ba4") == []  # a laboratory
-    assert other_terms("\u91cd\u65b0\u6821\u51c6") == ["\u6821\u51c6"]
 
 
 @pytest.mark.parametrize("page", sorted((RESOURCES / "help").glob("*/*.md")), ids=str)

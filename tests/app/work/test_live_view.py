@@ -23,7 +23,6 @@ from lightpen.simulator.hand import Operator
 from lightpen.streaming.server import PoseStream
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
-from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.notifications import Notifications
@@ -192,19 +191,6 @@ def test_exposure_and_gain_are_reported_when_they_are_in_force(
         view.set_gain(6.0)
 
 
-def test_a_camera_that_is_not_there_is_reported_and_another_can_be_opened(
-    view: LiveView, stage: Stage, qtbot: QtBot
-) -> None:
-    with qtbot.waitSignal(view.failed):
-        stage.open(ReplayCamera(str(stage.folder / "nothing")))
-    assert "There is no folder, video or image at" in view.why_no_images
-    assert view.operator is None
-    view.set_following(True)  # nobody is there to follow
-
-    with qtbot.waitSignal(view.image_shown):
-        stage.open()
-
-
 def test_images_that_are_skipped_are_counted_in_the_status_line_alone(
     view: LiveView, stage: Stage, notifications: Notifications, qtbot: QtBot
 ) -> None:
@@ -361,23 +347,6 @@ def test_a_swing_goes_on_when_its_camera_is_closed_and_another_is_opened(
     numbers = [image.number for image in open_record(interrupted).images]
 
     assert numbers == list(range(1, len(numbers) + 1))
-
-
-@pytest.mark.parametrize("wish", ["pause", "finish"])
-def test_what_is_wished_for_between_two_cameras_is_done(
-    run: SwingRun, stage: Stage, interrupted: Path, wish: str
-) -> None:
-    stage.open()
-    resumable = read_resumable(interrupted)
-    run.runner.ask(lambda workflow: workflow.go_on(resumable))
-    stage.close()
-    run.runner.ask(getattr(SwingWorkflow, wish))
-    stage.open()
-    stage.hold_up_until(
-        lambda: (
-            run.runner.status.is_paused_by_user or not run.runner.status.is_capturing
-        )
-    )
 
 
 def test_the_operator_follows_the_swing_until_his_camera_is_closed(

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -273,18 +272,6 @@ def test_a_stopped_program_that_holds_the_settings_keeps_nobody_from_saving(
         holder.kill()
 
 
-@pytest.mark.parametrize("content", [b"", b"1\nother\nfar\n", bytes(64)])
-def test_a_lock_that_was_left_behind_is_no_matter(
-    settings: Settings, content: bytes
-) -> None:
-    settings.file.parent.mkdir()
-    for name in ("lightpen.ini.lock", "lightpen.json.lock"):
-        (settings.file.parent / name).write_bytes(content)
-    settings.set_station("Hall 3", STATION)
-
-    assert reopened(settings).station("Hall 3") == STATION
-
-
 def test_what_is_set_many_times_in_a_row_is_on_the_disk_as_it_was_last(
     settings: Settings,
 ) -> None:
@@ -313,21 +300,6 @@ def test_a_window_comes_back_where_it_was(qtbot: QtBot, settings: Settings) -> N
 
     assert restored
     assert windows[1].geometry() == place
-
-
-def test_settings_that_cannot_be_saved_are_reported_and_saved_when_they_can_be(
-    tmp_path: Path, qtbot: QtBot
-) -> None:
-    (tmp_path / "file").write_text("not a folder")
-    settings = Settings(tmp_path / "file" / "lightpen.json")
-
-    with qtbot.waitSignal(settings.failed) as reported:
-        settings.set_preferences(PREFERENCES)
-    assert re.search(r"Settings not saved: .*lightpen\.json", str(reported.args[0]))
-
-    (tmp_path / "file").unlink()
-    settings.set_last_station("Hall 3")
-    assert reopened(settings).preferences() == PREFERENCES
 
 
 def test_what_could_not_be_saved_is_tried_again_and_taken_back(

@@ -12,13 +12,10 @@ from PySide6.QtCore import QCoreApplication, QThreadPool
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import Connection
-from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.formats.pen_files import read_pen
+from lightpen.formats.opened_files import PenFile
 from lightpen.live.sources import sample_files
 from lightpen.messages import message
 from lightpen.model.assumptions import USUAL, with_focal_length
@@ -138,16 +135,6 @@ def test_everything_that_was_chosen_is_chosen_at_the_next_start(stage: Stage) ->
     assert stage.sentences == []
 
 
-@pytest.mark.parametrize(
-    "mask",
-    [np.zeros((0, 3)), MASK[:1], MASK, MASK / 3],
-    ids=["none", "one", "two", "odd numbers"],
-)
-def test_a_mask_comes_back_to_the_last_digit(stage: Stage, mask: FloatArray) -> None:
-    stage.choose(mask=mask)
-    np.testing.assert_array_equal(stage.start_again().mask, mask)
-
-
 def test_the_units_of_a_pen_file_that_does_not_say_are_remembered(
     stage: Stage, tmp_path: Path
 ) -> None:
@@ -238,17 +225,6 @@ def test_files_that_are_gone_are_reported_one_by_one(
     assert ["does not exist" in sentence for sentence in stage.sentences] == [True] * 2
 
 
-def test_the_files_of_the_simulated_pen_are_those_of_its_scene(stage: Stage) -> None:
-    now = stage.workbench.selection.preparation
-    assert now.camera_file is not None
-    assert now.pen_file is not None
-    scene = stage.workbench.around.scene
-    camera = read_camera(now.camera_file.path)
-
-    assert camera.fx == pytest.approx(scene.camera.fx)
-    np.testing.assert_allclose(read_pen(now.pen_file.path).leds, scene.pen.leds)
-
-
 @pytest.mark.parametrize(
     "read",
     [
@@ -301,19 +277,6 @@ def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
         stage.choose(pen_file=chosen.pen_file)
 
     assert withdrawn.args == stage.sentences[-1:]
-
-
-def test_choices_that_cannot_be_saved_are_reported_and_in_force_all_the_same(
-    stage: Stage,
-) -> None:
-    assert stage.settings.await_saved(120.0)
-    shutil.rmtree(stage.settings.file.parent)
-    stage.settings.file.parent.write_text("not a folder")
-    stage.choose(names=OTHER)
-
-    assert stage.workbench.selection.preparation.names == OTHER
-    stage.qtbot.waitUntil(lambda: bool(stage.sentences))
-    assert "Settings not saved:" in stage.sentences[0]
 
 
 @pytest.mark.parametrize(
@@ -473,23 +436,6 @@ def test_a_recording_does_not_forget_the_exposure(
 
 
 # Results and records
-
-
-def test_a_swing_of_a_recorded_source_finds_its_images(
-    stage: Stage, swung: Callable[..., Path]
-) -> None:
-    stage.choose(
-        source=SourceChoice(SourceKind.RECORDED, str(swung())),
-        camera_file=CameraFile.read(swung() / "camera.yaml"),
-    )
-    stage.workbench.camera.open()
-    stage.wait_for_size((1224, 1024))
-    chosen = stage.workbench.selection.preparation
-    stage.workbench.run.runner.ask(lambda workflow: workflow.begin(chosen))
-    run = stage.workbench.run
-    stage.qtbot.waitUntil(
-        lambda: run.status.state is not None and run.status.state.n_kept >= 3
-    )
 
 
 def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:

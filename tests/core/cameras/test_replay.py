@@ -13,7 +13,6 @@ from lightpen.arrays import Image
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import (
     CameraSettings,
-    ConfigError,
     DeviceLost,
     DeviceNotFound,
     EndOfImages,
@@ -305,18 +304,3 @@ def test_a_folder_of_which_no_image_can_be_read_is_not_found(tmp_path: Path) -> 
         (tmp_path / name).write_bytes(b"no image")
     with pytest.raises(DeviceNotFound, match=r"1\.png"):
         ReplayCamera(str(tmp_path)).open()
-
-
-def test_exposure_and_gain_of_recorded_images_cannot_be_changed(tmp_path: Path) -> None:
-    write_images(tmp_path)
-    camera = opened(tmp_path)
-    with pytest.raises(ConfigError, match="exposure"):
-        camera.set_exposure(100)
-    with pytest.raises(ConfigError, match="gain"):
-        camera.set_gain(3)
-
-
-def test_settings_cannot_change_while_images_come(tmp_path: Path) -> None:
-    write_images(tmp_path)
-    with pytest.raises(ValueError, match="stopped"):
-        opened(tmp_path).configure(CameraSettings())

@@ -10,7 +10,6 @@ from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
 from lightpen.cameras.clock import Clock, MachineClock, SkippingClock
-from lightpen.cameras.frame_box import FrameBox, FrameQueue
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
@@ -758,37 +757,3 @@ def test_a_camera_that_hangs_does_not_hang_the_program(benches: Benches) -> None
             workbench.worker.stop(timeout_s=0.1)
     finally:
         camera.let_go.set()
-
-
-def test_a_mailbox_tells_only_news() -> None:
-    box = FrameBox()
-    assert box.put(frame(1))
-    assert not box.put(frame(2))
-    taken = box.take()
-    assert taken is not None
-    assert taken.seq == 2
-    assert box.take() is None
-    assert box.put(frame(3))
-
-
-def test_a_queue_keeps_the_order_and_refuses_what_does_not_fit() -> None:
-    queue = FrameQueue(2)
-    assert [queue.offer(frame(seq)) for seq in range(3)] == [True, True, False]
-    assert [queue.take(0).seq for _ in range(2)] == [0, 1]
-    with pytest.raises(FrameTimeout):
-        queue.take(0)
-
-
-def test_an_ended_queue_gives_out_what_it_holds() -> None:
-    queue = FrameQueue(2)
-    queue.offer(frame(1))
-    queue.end()
-    assert not queue.offer(frame(2))
-    assert queue.take(0).seq == 1
-    with pytest.raises(EndOfImages):
-        queue.take(0)
-
-
-def test_a_queue_without_room_is_refused() -> None:
-    with pytest.raises(ValueError, match="at least 1"):
-        FrameQueue(0)

@@ -271,22 +271,6 @@ def test_a_length_to_an_led_that_is_none_is_refused() -> None:
         discover(STATION.sightings, replace(STATION.request, lengths=lengths))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("zoom", [1.003, 1.1])
-def test_a_zoom_midway_is_refused(zoom: float) -> None:
-    station = random_station(902, n_images=N)
-    middle = np.array([station.camera.width, station.camera.height]) / 2
-
-    def zoomed(centers: list[np.ndarray]) -> list[np.ndarray]:
-        later = [middle + zoom * (each - middle) for each in centers[N // 2 :]]
-        return [*centers[: N // 2], *later]
-
-    assert refused(with_centers(station, zoomed), station) in {
-        "discover.camera-changed",
-        "discover.many-left-out",
-    }
-
-
 def with_loose_leds(station: Station, amplitude: float) -> Station:
     """Return a station whose LEDs move on the pen, each by itself, px."""
     pixels = station.pixels

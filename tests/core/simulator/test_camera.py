@@ -1,20 +1,10 @@
-from collections.abc import Callable
-
 import cv2
 import numpy as np
 import pytest
 from tests.faulty_camera import FaultyCamera
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.protocol import (
-    CameraSettings,
-    DeviceBusy,
-    DeviceLost,
-    DeviceNotFound,
-    Frame,
-    FrameIncomplete,
-    FrameTimeout,
-)
+from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.pose import fit_poses
 from lightpen.estimation.calibrate import calibrate
@@ -235,89 +225,6 @@ def test_a_live_camera_loses_images_when_more_wait_than_it_buffers(
 
     assert after.seq == before.seq + 1 + n_lost
     assert camera.stats().missed == n_lost
-
-
-def test_lost_images_leave_a_gap_and_are_counted() -> None:
-    camera = streaming_camera()
-    (before,) = read(camera, 1)
-    camera.lose_frames(4)
-    after = read(camera, 2)
-
-    assert [frame.seq - before.seq for frame in after] == [5, 6]
-    assert camera.stats().missed == 4
-
-
-def test_damaged_images_are_thrown_away_and_counted() -> None:
-    camera = streaming_camera()
-    camera.spoil_frames(2)
-    for _ in range(2):
-        with pytest.raises(FrameIncomplete, match="incomplete"):
-            camera.read(1.0)
-    read(camera, 1)
-
-    assert camera.stats().incomplete == 2
-    assert camera.stats().delivered == 1
-
-
-def test_a_stalled_camera_sends_nothing_but_answers() -> None:
-    clock = SkippingClock()
-    camera = streaming_camera(clock=clock)
-    camera.stall(3.0)
-    for _ in range(3):
-        with pytest.raises(FrameTimeout):
-            camera.read(0.9)
-        camera.probe()
-    (frame,) = read(camera, 1)
-
-    assert frame.host_ts_ns >= 3.0e9
-    assert camera.stats().missed == 0
-
-
-def plug_out_and_in(camera: FaultyCamera) -> None:
-    camera.unplug()
-    camera.plug_in()
-
-
-@pytest.mark.parametrize("act", [lambda camera: camera.unplug(), plug_out_and_in])
-def test_an_unplugged_camera_is_silent_and_lost_until_it_is_opened_anew(
-    act: Callable[[FaultyCamera], None],
-) -> None:
-    camera = streaming_camera()
-    (before,) = read(camera, 1)
-    act(camera)
-    with pytest.raises(FrameTimeout):
-        camera.read(1.0)
-    for call in (camera.probe, lambda: camera.set_gain(3), camera.start):
-        with pytest.raises(DeviceLost, match="cable"):
-            call()
-    camera.close()
-    camera.plug_in()
-    camera.open()
-    camera.start()
-
-    assert read(camera, 1)[0].seq > before.seq
-
-
-def test_an_unplugged_camera_is_not_found() -> None:
-    camera = FaultyCamera(SCENE)
-    camera.unplug()
-    with pytest.raises(DeviceNotFound, match="SIM-1"):
-        camera.open()
-
-
-def test_a_camera_in_use_is_busy_until_it_is_free() -> None:
-    clock = SkippingClock()
-    camera = FaultyCamera(SCENE, clock)
-    camera.occupy(2.0)
-    with pytest.raises(DeviceBusy, match="Another program"):
-        camera.open()
-    clock.wait(2.0)
-    camera.open()
-
-
-def test_settings_cannot_change_while_images_come() -> None:
-    with pytest.raises(ValueError, match="stopped"):
-        streaming_camera().configure(CameraSettings())
 
 
 def test_a_board_is_held_still_for_a_slow_reader_too() -> None:

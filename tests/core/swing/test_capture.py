@@ -8,29 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.small_records import entries_of
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame
-from lightpen.detection.observations import observe_images
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import FileError
-from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.reports.report import calibration_record
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import CAMERA_FILE
-from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.messages import message
-from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.header import FileCopy, Header
 from lightpen.record.swings.reading import open_record
-from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import PAPER_TIP, paper_camera
+from lightpen.simulator.swings import paper_camera
 from lightpen.swing.capture.state import (
     Phase,
     SwingEvent,
@@ -130,60 +123,6 @@ def wizard(tmp_path: Path, undisturbed: Swung) -> Iterator[Wizard]:
     wizard.writer.close()
 
 
-def calibrated(folder: Path) -> Calibration:
-    found = source(open_record(folder))
-    seen = observe_images(found.images, found.camera, found.pen)
-    return calibrate(found.camera, found.pen, seen)
-
-
-@pytest.mark.slow
-def test_every_kept_image_is_on_disk_with_what_was_seen_in_it(wizard: Wizard) -> None:
-    wizard.run(12)
-    record = open_record(wizard.folder)
-
-    assert len(record.images) == 12
-    np.testing.assert_array_equal(
-        [image.pixels for image in record.images], wizard.state.kept.pixels[:, 0]
-    )
-    assert record.images[0].device_time_ns is not None
-    assert wizard.state.phase is Phase.CAPTURING
-
-
-def test_the_record_gives_the_same_tip_to_the_last_digit(wizard: Wizard) -> None:
-    wizard.run(20)
-    first = calibrated(wizard.folder)
-    again = calibrated(wizard.folder)
-
-    np.testing.assert_array_equal(first.joint.tip_pen, again.joint.tip_pen)
-    np.testing.assert_array_equal(first.budget.covariance, again.budget.covariance)
-    inputs = Inputs(
-        *(InputFile(Path("a"), ""), InputFile(Path("b"), "")), (), nominal_tip=None
-    )
-    records = [
-        entries_of(calibration_record(one, inputs, SwingLimits()))
-        for one in (first, again)
-    ]
-    for record in records:
-        record.pop("created")
-    assert records[0] == records[1]
-    # What was shown during the swing is that tip, but for what the files have wrong.
-    assert wizard.state.kept.seat is not None
-    change = np.abs(wizard.state.kept.seat.tip_pen - first.joint.tip_pen)
-    assert (change < first.budget.expanded_uncertainty[:3]).all()
-    assert np.abs(first.joint.tip_pen - PAPER_TIP).max() < 0.02
-
-
-def test_centres_found_live_are_those_found_in_the_record(wizard: Wizard) -> None:
-    wizard.run(12)
-    found = source(open_record(wizard.folder))
-    seen = observe_images(found.images, found.camera, found.pen)
-
-    # Lens distortion of one image is computed by OpenCV, of many images by numpy, which
-    # differ in the last digit of a double.
-    kept = wizard.state.kept.pixels[:, 0]
-    np.testing.assert_allclose(seen.pixels, kept, rtol=0, atol=1e-11)
-
-
 @pytest.mark.slow
 def test_an_interrupted_swing_goes_on_with_all_its_images(wizard: Wizard) -> None:
     wizard.run(20)
@@ -231,23 +170,6 @@ def test_slipped_images_are_taken_out_of_the_record(tmp_path: Path) -> None:
     np.testing.assert_array_equal(record.numbers, wizard.state.kept.numbers)
 
 
-def test_an_image_that_cannot_be_recorded_is_not_kept(
-    wizard: Wizard, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    wizard.run(3)
-
-    def fail(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr("lightpen.formats.files.os.fsync", fail)
-        with pytest.raises(FileError, match="disk is full"):
-            wizard.run(4)
-    assert wizard.state.n_kept == 3
-    wizard.run(5)
-    assert len(open_record(wizard.folder).images) == 5
-
-
 def test_state_and_record_must_belong_together(wizard: Wizard) -> None:
     wizard.run(1)
     other = start_swing(wizard.setup)
@@ -281,12 +203,3 @@ def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
             wizard.run(4)
     assert wizard.writer.next_number == wizard.state.next_number == 4
     wizard.run(5)
-
-
-def test_a_folder_that_is_gone_is_said_and_nothing_is_kept(wizard: Wizard) -> None:
-    wizard.run(2)
-    wizard.folder.rename(wizard.folder.with_name("elsewhere"))
-    with pytest.raises(FileError, match="cannot be written"):
-        wizard.run(3)
-
-    assert wizard.state.n_kept == 2

@@ -20,7 +20,6 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.decoding import encode_png, read_image
 from lightpen.formats.images import find_images
-from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.reading import open_record, recorded_origin
 from lightpen.record.swings.recorded_source import source
@@ -184,22 +183,6 @@ def test_an_image_takes_part_that_would_on_files_with_few_leds_whole(
 
 
 @pytest.mark.slow
-def test_the_postures_that_are_missing_are_named_at_the_end(
-    station: "Station", swung: Callable[..., Path]
-) -> None:
-    recording = Recording(station, swung() / "images")
-    station.begin(SwingLimits(max_uncertainty=0.05, min_images=12))
-    recording.show(N_IMAGES)
-    station.wait_for_phase(Phase.VERDICT)
-
-    assessment = station.status.assessment
-    assert assessment is not None
-    reported = [assessment.verdict.reason, *assessment.doubts]
-    (tilt,) = [each for each in reported if each.code == Code.TOO_LITTLE_TILT]
-    assert "camera" in str(tilt)  # which side, the hand of the operator decides
-
-
-@pytest.mark.slow
 def test_an_interrupted_reading_goes_on_and_takes_no_image_twice(
     recording: Recording, station: "Station"
 ) -> None:
@@ -214,21 +197,6 @@ def test_an_interrupted_reading_goes_on_and_takes_no_image_twice(
 
     sums = [image.sha256 for image in open_record(folder).images]
     assert len(sums) == len(set(sums)) == N_IMAGES
-
-
-@pytest.mark.slow
-def test_a_pause_waits_and_goes_on_with_the_next_image(
-    recording: Recording, station: "Station"
-) -> None:
-    recording.show(5)
-    station.runner.ask(lambda workflow: workflow.pause())
-    recording.show(N_IMAGES)
-    assert station.state.progress.n_read == 5
-    station.runner.ask(lambda workflow: workflow.resume())
-    recording.show(N_IMAGES)
-
-    station.wait_for_phase(Phase.VERDICT)
-    assert station.n_recorded == N_IMAGES
 
 
 @pytest.mark.slow

@@ -13,19 +13,17 @@ import pytest
 
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import WorkerEvent
-from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.live.pipeline import Live, LiveImage
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.names import Names
-from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
+from lightpen.record.swings.reading import IMAGES, open_record
 from lightpen.record.swings.solving import solve_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.samples import SAMPLE_PENS
-from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
+from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen.swing_messages import Code
@@ -128,31 +126,6 @@ def test_without_a_nominal_tip_the_swing_finds_the_seat_and_goes_to_the_verdict(
 # Beginning
 
 
-def test_two_swings_in_one_second_have_records_of_their_own(station: "Station") -> None:
-    folders = set[Path]()
-    for _ in range(4):
-        station.begin()
-        folders.add(station.record_folder)
-
-    assert len(folders) == 4
-    assert all(station.is_free(folder) for folder in folders - {station.record_folder})
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["a/b\\c:d", "../..", "量具 7", "T" * 300, "针" * 300, ".", "\x00", "\udce4"],
-)
-def test_whatever_the_pen_and_the_tip_are_called_the_record_has_a_folder(
-    station: "Station", name: str
-) -> None:
-    names = Names("Hall 2", "Ann", pen=name, tip=name, cone=name)
-    station.preparation = replace(station.preparation, names=names)
-    station.begin()
-
-    assert station.record_folder.parent == station.records
-    assert station.status.names == names
-
-
 def test_a_record_that_cannot_be_made_leaves_the_swing_before(
     station: "Station",
 ) -> None:
@@ -230,27 +203,6 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
 
 
 # Capture
-
-
-@pytest.mark.slow
-def test_a_paused_swing_keeps_nothing_until_it_is_resumed(
-    station: "Station", interrupted: Path
-) -> None:
-    station.go_on(interrupted)
-    station.keep(1)
-    station.runner.ask(lambda workflow: workflow.pause())
-    station.wait_for_phase(Phase.PAUSED)
-    assert station.state.pause is Pause.BY_USER
-    assert station.state.message.code == Code.PAUSED
-    assert station.status.is_paused_by_user
-    n_images = station.n_recorded
-    station.see(30)
-    assert station.n_recorded == n_images
-    assert station.state.pause is Pause.BY_USER
-
-    station.runner.ask(lambda workflow: workflow.resume())
-    station.keep(1)
-    assert station.n_recorded == n_images + 1
 
 
 def test_a_paused_swing_can_be_finished(station: "Station", interrupted: Path) -> None:
@@ -357,15 +309,6 @@ def test_the_record_is_closed_however_the_swing_ends(
 
     assert station.is_free(interrupted)
     assert len(open_record(interrupted).images) == N_IMAGES
-
-
-def test_a_record_is_not_free_while_it_is_captured(
-    station: "Station", interrupted: Path
-) -> None:
-    station.go_on(interrupted)
-
-    with pytest.raises(FileError, match="is writing to"):
-        station.is_free(interrupted)
 
 
 def test_an_image_that_is_kept_is_on_the_disk_when_it_is_reported(
@@ -480,18 +423,6 @@ def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
 
 
 # The end
-
-
-def test_what_was_commanded_before_the_end_is_done(
-    station: "Station", interrupted: Path
-) -> None:
-    station.go_on(interrupted)
-    station.runner.ask(lambda workflow: workflow.set_aside())
-    station.runner.shut_down()
-    assert station.runner.await_end(TIMEOUT)
-
-    assert open_record(interrupted).verdict == DISCARDED
-    assert station.status.state is None
 
 
 def test_an_end_while_images_are_captured_keeps_all_of_them(

@@ -11,7 +11,7 @@ from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.workflow import SwingWorkflow
 
 if TYPE_CHECKING:
@@ -30,33 +30,6 @@ def test_a_swing_begins_with_the_first_image_when_somebody_is_there(
 
     present.see()
     assert present.state.phase is Phase.SEEN
-
-
-def test_no_swing_begins_while_something_lacks(station: "Station") -> None:
-    prepared = station.preparation
-    lacking = replace(prepared, image_size=None)
-    assert lacking.missing_inputs() == (MissingInput.IMAGES,)
-    station.runner.ask(lambda workflow: workflow.come())
-    station.see()
-    assert station.status.state is None
-    station.runner.ask(lambda workflow: workflow.choose(lacking))
-    station.see()
-    assert station.status.state is None
-
-    station.runner.ask(lambda workflow: workflow.choose(prepared))
-    station.see()
-    assert station.status.is_capturing
-
-
-def test_no_swing_begins_while_nobody_is_there(station: "Station") -> None:
-    station.runner.ask(lambda workflow: workflow.choose(station.preparation))
-    station.see()
-    assert station.status.state is None
-    station.runner.ask(lambda workflow: workflow.come())
-    station.runner.ask(lambda workflow: workflow.leave())
-    station.see()
-    assert station.status.state is None
-    assert not station.records.exists()
 
 
 def test_a_record_that_cannot_be_made_is_reported_once_and_tried_again_when_asked_for(
@@ -80,18 +53,6 @@ def test_a_record_that_cannot_be_made_is_reported_once_and_tried_again_when_aske
     assert present.witness.reliefs == [sentence]
 
 
-def test_whoever_comes_again_tries_again(present: "Station") -> None:
-    present.records.write_text("not a folder")
-    present.see()
-    present.records.unlink()
-    present.runner.ask(lambda workflow: workflow.leave())
-    present.runner.ask(lambda workflow: workflow.come())
-    present.see()
-
-    assert present.status.is_capturing
-    assert present.status.refusal is None
-
-
 @pytest.mark.slow
 def test_leaving_pauses_and_coming_back_goes_on(
     present: "Station", interrupted: Path
@@ -106,33 +67,6 @@ def test_leaving_pauses_and_coming_back_goes_on(
 
     present.runner.ask(lambda workflow: workflow.come())
     present.keep(1)
-
-
-def test_a_swing_that_its_user_paused_stays_paused_when_he_comes_back(
-    present: "Station",
-) -> None:
-    present.see()
-    present.runner.ask(lambda workflow: workflow.pause())
-    present.runner.ask(lambda workflow: workflow.leave())
-    present.runner.ask(lambda workflow: workflow.come())
-    present.see()
-    assert present.status.is_paused_by_user
-
-    present.runner.ask(lambda workflow: workflow.resume())
-    present.see()
-    assert not present.status.is_paused_by_user
-
-
-def test_a_swing_that_is_paused_while_nobody_is_there_stays_paused(
-    present: "Station",
-) -> None:
-    present.see()
-    present.runner.ask(lambda workflow: workflow.leave())
-    present.runner.ask(lambda workflow: workflow.pause())
-    present.runner.ask(lambda workflow: workflow.come())
-    present.see()
-
-    assert present.status.is_paused_by_user
 
 
 def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
@@ -165,26 +99,6 @@ def test_a_swing_that_begins_while_everybody_is_away_waits(
     assert not present.status.is_paused_by_user
 
 
-def test_more_that_is_captured_while_everybody_is_away_waits(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.leave())
-    solved.runner.ask(lambda workflow: workflow.capture_more())
-    solved.wait_until(lambda: solved.status.is_paused_by_user)
-    solved.runner.ask(lambda workflow: workflow.come())
-    solved.see()
-
-    assert solved.status.is_capturing
-    assert not solved.status.is_paused_by_user
-
-
-def test_a_swing_that_is_led_by_commands_waits_for_nobody(
-    station: "Station", interrupted: Path
-) -> None:
-    station.go_on(interrupted)
-    station.keep(1)
-
-    assert not station.status.is_paused_by_user
-
-
 def other_operator(prepared: Preparation) -> Preparation:
     return replace(prepared, names=replace(prepared.names, operator="Bob"))
 
@@ -202,41 +116,6 @@ def test_other_choices_do_not_change_a_swing_that_is_under_way(
     assert present.status.has_other_choices
     assert present.status.setup is setup
     assert present.status.names.operator == "Ann"
-
-
-def test_other_choices_are_settled_when_they_are_kept_or_taken_back(
-    present: "Station",
-) -> None:
-    present.see()
-    chosen = other_operator(present.preparation)
-    present.runner.ask(lambda workflow: workflow.choose(chosen))
-    present.runner.ask(lambda workflow: workflow.choose(present.preparation))
-    present.see()
-    assert not present.status.has_other_choices
-
-    present.runner.ask(lambda workflow: workflow.choose(chosen))
-    present.runner.ask(lambda workflow: workflow.keep_choices())
-    present.see()
-    assert not present.status.has_other_choices
-    assert present.status.names.operator == "Ann"
-
-
-@pytest.mark.slow
-def test_other_choices_are_not_settled_by_capturing_more(
-    solved: "Station", interrupted: Path
-) -> None:
-    solved.runner.ask(lambda workflow: workflow.choose(solved.preparation))
-    solved.runner.ask(lambda workflow: workflow.abandon())
-    solved.wait_until(lambda: solved.status.state is None)
-    solved.go_on(interrupted)
-    chosen = other_operator(solved.preparation)
-    solved.runner.ask(lambda workflow: workflow.choose(chosen))
-    solved.solve()
-    assert solved.status.has_other_choices  # or a mended file would not be looked at
-    solved.runner.ask(lambda workflow: workflow.capture_more())
-    solved.wait_until(lambda: solved.status.is_capturing)
-
-    assert solved.status.has_other_choices
 
 
 def test_a_swing_that_starts_over_begins_with_what_is_chosen_now(

@@ -131,35 +131,17 @@ def test_a_swing_whose_entrance_fails_by_a_bug_leaves_the_one_before_whole(
     assert station.is_free(other)
 
 
-def test_a_bug_while_the_tip_is_computed_leaves_the_swing_to_be_solved_again(
+@pytest.mark.parametrize("step", ["solve_record", "assess"])
+def test_a_bug_in_the_computation_of_the_tip_leaves_the_swing_to_be_solved_again(
     station: "Station",
     interrupted: Path,
     crashes: Crashes,
     monkeypatch: pytest.MonkeyPatch,
+    step: str,
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.workflow.solve_record", fail)
-        station.runner.ask(lambda workflow: workflow.finish())
-        station.wait_for_phase(Phase.SOLVING)
-        station.wait_until(lambda: not station.status.is_solving)
-    assert is_reported_once(crashes)
-    assert station.status.solution is None
-
-    station.runner.ask(lambda workflow: workflow.solve())
-    station.wait_for_phase(Phase.VERDICT)
-    assert station.status.solution is not None
-
-
-def test_a_bug_when_the_tip_is_judged_leaves_the_swing_to_be_solved_again(
-    station: "Station",
-    interrupted: Path,
-    crashes: Crashes,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    station.go_on(interrupted)
-    with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.workflow.assess", fail)
+        broken.setattr(f"lightpen.swing.workflow.{step}", fail)
         station.runner.ask(lambda workflow: workflow.finish())
         assert is_reported_once(crashes)
         station.wait_until(lambda: not station.status.is_solving)
@@ -167,6 +149,7 @@ def test_a_bug_when_the_tip_is_judged_leaves_the_swing_to_be_solved_again(
 
     station.runner.ask(lambda workflow: workflow.solve())
     station.wait_for_phase(Phase.VERDICT)
+    assert station.status.solution is not None
 
 
 def test_a_bug_while_images_are_read_again_leaves_the_solution(

@@ -56,25 +56,6 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
     assert fields == command(solved.record_folder)
 
 
-@pytest.mark.slow
-def test_so_it_is_after_taking_images_out_and_putting_some_back(
-    solved: "Station", command: Command
-) -> None:
-    before = solved.tip
-    solved.runner.ask(lambda workflow: workflow.exclude([2, 5, 9]))
-    solved.wait_until_solved()
-    without = solved.tip
-    solved.runner.ask(lambda workflow: workflow.include([5]))
-    solved.wait_until_solved()
-    assert len({tuple(tip) for tip in (before, without, solved.tip)}) == 3
-    assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
-    assert set(open_record(solved.record_folder).excluded) == {2, 9}
-
-    solved.runner.ask(lambda workflow: workflow.include([2, 9]))
-    solved.wait_until_solved()
-    assert solved.tip == before == command(solved.record_folder)["tip_pen_mm"]
-
-
 def test_how_far_the_tip_is_computed_is_reported_from_0_to_1(solved: "Station") -> None:
     fractions = solved.witness.fractions
 
@@ -353,16 +334,6 @@ def test_images_that_cannot_be_read_again_leave_the_solution_and_no_wish(
     solved.runner.ask(lambda workflow: workflow.exclude([7]))
     solved.wait_until_solved()
     assert set(solved.solution.excluded) == {7}
-
-
-def test_a_solved_swing_is_set_aside_with_its_images(solved: "Station") -> None:
-    folder = solved.record_folder
-    solved.runner.ask(lambda workflow: workflow.set_aside())
-    solved.wait_until(lambda: solved.status.state is None)
-
-    assert open_record(folder).verdict == DISCARDED
-    assert len(open_record(folder).images) == N_IMAGES
-    assert solved.interrupted() == []
 
 
 def test_a_swing_that_is_captured_is_set_aside_for_good(

@@ -271,14 +271,6 @@ def test_hidden_leds_are_reported_missing(n_missing: int) -> None:
         np.testing.assert_array_equal(label.spot, view.spot)
 
 
-@pytest.mark.parametrize("n_lamps", [1, 3, 5])
-def test_lamps_like_leds_are_distinguished_from_leds(n_lamps: int) -> None:
-    found = outcomes(
-        lambda rng: random_view(rng, n_lamps=n_lamps), PEN, 50, 20 + n_lamps
-    )
-    assert found == {"right": 50}
-
-
 def test_hidden_leds_and_lamps_together_give_right_labels() -> None:
     def make(rng: np.random.Generator) -> View:
         return random_view(rng, PEN, int(rng.integers(1, 5)), int(rng.integers(1, 6)))
@@ -587,12 +579,6 @@ def test_a_prediction_far_off_is_refused() -> None:
         view, other = random_view(rng), random_view(rng)
         label = track_spots(view.spots, CAMERA, PEN, other.R, other.t)
         assert outcome(label, view) in {"right", str(LabelStatus.NO_FIT)}
-
-
-def test_tracking_without_spots_is_refused() -> None:
-    spots = spots_at(np.empty((0, 2)), np.empty((0, 2, 2)))
-    label = track_spots(spots, CAMERA, PEN, np.eye(3), np.array([0, 0, 1000.0]))
-    assert label.reason is LabelStatus.NO_SPOTS
 
 
 # What is wrong with a whole set

@@ -241,19 +241,6 @@ def whole() -> Station:
     return station.run(120.0, until=Phase.SOLVING)
 
 
-@pytest.mark.slow
-def test_a_guided_swing_goes_through_its_phases_without_a_key(whole: Station) -> None:
-    assert whole.phases == [
-        Phase.WAIT,
-        Phase.SEEN,
-        Phase.SETTLED,
-        Phase.COUNTDOWN,
-        Phase.CAPTURING,
-        Phase.SOLVING,
-    ]
-    assert whole.event_kinds() == [SwingEventKind.SEATED, SwingEventKind.CAPTURED]
-
-
 def test_it_ends_when_postures_and_uncertainty_suffice(whole: Station) -> None:
     limits = whole.setup.limits
     assert whole.state.kept.uncertainty <= limits.max_uncertainty
@@ -586,16 +573,6 @@ def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
     station.run(120.0, until=Phase.SOLVING)
     assert station.state.n_kept == 40
     assert missing(station.setup, station.state)[-1].code == Code.UNCERTAIN
-
-
-@pytest.mark.slow
-def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
-    station = Station(limits=SwingLimits(max_uncertainty=0.02), sigma=0.01)
-    station.cone = PAPER_CONE + np.array([200.0, 0.0, 0.0])
-    station.operator.seat()
-    station.run(120.0, until=Phase.SOLVING)
-    assert station.state.phase is Phase.SOLVING
-    assert station.state.counts[2, 0] < 2
 
 
 def test_the_verdict_is_reported(whole: Station) -> None:
