@@ -1,7 +1,4 @@
-"""The wizard in windows of a real screen, that of an X server without a monitor.
-
-Where there is no X server, the wizard is walked without a screen.
-"""
+"""The wizard in windows of a real screen, that of an X server without a monitor."""
 
 import configparser
 import os
@@ -20,7 +17,6 @@ import pytest
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 FILE = str(HERE / "in_real_window.py")
-WALK = f"{FILE}::test_the_simulated_pen_by_the_mouse"
 LONGEST_S = 400  # on a machine that does other things besides
 
 
@@ -72,12 +68,11 @@ def passed(test: str, environment: dict[str, str]) -> str:
 def test_on_a_real_screen() -> None:
     lack = why_no_screen()
     if lack:
-        assert "1 passed" in passed(WALK, {"QT_QPA_PLATFORM": "offscreen"})
-        pytest.skip(f"{lack}: walked without a screen")
+        pytest.skip(lack)
 
     with display() as name:
         on_screen = {"DISPLAY": name, "QT_QPA_PLATFORM": "xcb"}
-        assert "2 passed" in passed(FILE, on_screen)
+        assert "1 passed" in passed(FILE, on_screen)
 
 
 @pytest.mark.slow

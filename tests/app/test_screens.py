@@ -14,8 +14,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QRect, QSize
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QTabWidget
 from tests.app.room import SizeClass, room_of
 
@@ -54,17 +54,6 @@ KEYS = [
 ]
 
 Key = tuple[str, str, int]
-
-
-def moved(picture: QImage, word: QRect, by: QPoint) -> QImage:
-    """Return the picture with a part of it moved."""
-    part = picture.copy(word)
-    assert np.ptp(SCREENS.levels(part)) > SCREENS.VISIBLE
-    drawn = picture.copy()
-    painter = QPainter(drawn)
-    painter.drawImage(word.topLeft() + by, part)
-    painter.end()
-    return drawn
 
 
 @dataclass(frozen=True)
@@ -155,23 +144,6 @@ def test_no_step_needs_more_room_than_a_small_screen_has(
     sizes = {name: picture.size() for name, picture in pictures.items()}
     too_large = [n for n, size in sizes.items() if small in n and size != smallest]
     assert too_large == []
-
-
-@pytest.mark.parametrize(
-    ("word", "by"),
-    [
-        (QRect(270, 26, 120, 34), QPoint(1, 0)),  # the title
-        (QRect(46, 106, 40, 20), QPoint(2, 0)),  # "Start" in the list of steps
-        (QRect(18, 54, 30, 18), QPoint(0, 2)),  # "Pen" below the program's name
-    ],
-)
-def test_a_word_that_moved_is_noticed(
-    pictures: dict[str, QImage], word: QRect, by: QPoint
-) -> None:
-    picture = pictures[NAMES[0]]
-
-    assert SCREENS.compare(moved(picture, word, by), picture).is_seen
-    assert SCREENS.compare(picture, picture).share == 0
 
 
 def test_edges_that_are_shaded_otherwise_are_no_difference(

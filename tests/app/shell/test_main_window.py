@@ -335,15 +335,6 @@ def test_a_page_leads_to_any_step_by_its_key(shell: Shell) -> None:
     assert shell.shown == "Start"
 
 
-def test_a_closed_step_that_a_page_leads_to_says_why(shell: Shell) -> None:
-    shell.pages[2].closed_because = "Needs a camera."
-
-    shell.pages[0].step_requested.emit("swing")
-
-    assert shell.shown == "Start"
-    assert "Needs a camera." in shell.window.words()
-
-
 def test_the_window_opens_with_the_focus_on_the_first_control_of_the_page(
     shell: Shell,
 ) -> None:
@@ -363,15 +354,6 @@ def test_a_closed_step_says_why_in_the_list_and_when_it_is_asked_for(
     assert steps[2].why_closed == "Needs a camera."
     assert shell.shown == "Start"
     assert "Needs a camera." in shell.window.words()
-
-
-def test_a_page_that_has_done_its_work_is_marked_done(shell: Shell) -> None:
-    shell.pages[0].field.setText("LP-04")
-    shell.pages[0].advance_requested.emit()
-
-    states = [step.state for step in shell.window.steps()]
-
-    assert states == [StepState.DONE, StepState.NOW, StepState.TO_DO]
 
 
 def test_every_step_can_be_reached_and_pressed_by_keys_alone(
@@ -416,29 +398,6 @@ def test_after_a_click_a_new_page_frames_no_control_until_tab_is_pressed(
 
     QTest.keyClick(handle, Key.Key_PageUp)
     assert shell.pages[0].field.hasFocus()
-
-
-def test_a_button_that_vanishes_leaves_the_focus_to_no_other_button(
-    shell: Shell,
-) -> None:
-    page = shell.pages[0]
-    page.button.setFocus()
-
-    page.button.hide()
-
-    assert QApplication.focusWidget() is page.field
-
-
-def test_space_presses_buttons_on_other_pages(
-    shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
-) -> None:
-    page = shell.pages[0]
-    page.button.setFocus()
-
-    with qtbot.waitSignal(page.button.clicked):
-        press(Key.Key_Space)
-
-    assert page.log == ["entered"]
 
 
 def test_b_mutes_but_can_be_typed(shell: Shell, press: Callable[[Key], None]) -> None:

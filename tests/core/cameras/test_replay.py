@@ -12,7 +12,6 @@ import pytest
 from lightpen.arrays import Image
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import (
-    CameraSettings,
     DeviceLost,
     DeviceNotFound,
     EndOfImages,
@@ -101,19 +100,6 @@ def test_images_come_at_the_frame_rate(tmp_path: Path) -> None:
 
     gaps = np.diff([frame.host_ts_ns for frame in frames])
     np.testing.assert_array_equal(gaps, 100_000_000)
-
-
-def test_the_frame_rate_can_be_set(tmp_path: Path) -> None:
-    write_images(tmp_path)
-    camera = opened(tmp_path)
-    camera.stop()
-    assert camera.configure(CameraSettings(frame_rate=5.0)).frame_rate == 5.0
-    camera.start()
-    frames = read_all(camera)
-
-    np.testing.assert_array_equal(
-        np.diff([frame.host_ts_ns for frame in frames]), 200_000_000
-    )
 
 
 def test_images_come_as_fast_as_asked_without_a_rate(tmp_path: Path) -> None:

@@ -33,7 +33,6 @@ from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, Came
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
-from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.pooling import pooled
 from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.steps.camera.board_window import BoardWindow
@@ -388,25 +387,6 @@ def test_a_calibration_under_way_ends_where_other_views_are_begun(
 
     assert (remark(window), views_listed(window)) == ("", 0)
     press(window, "Stop")
-
-
-@pytest.mark.slow
-def test_what_was_calibrated_is_reported_in_the_language_that_is_chosen(
-    window: BoardWindow,
-    images: list[Image],
-    tmp_path: Path,
-    qtbot: QtBot,
-    qapp: QApplication,
-) -> None:
-    window.read_folder(written(tmp_path, images))
-    qtbot.waitUntil(lambda: views_listed(window) == 7)
-    english = window.findChildren(QListWidget)[0].item(0).text()
-    LanguageSwitch(qapp).set_language("zh_CN")
-    QApplication.processEvents()
-
-    assert "cross-validated" in english
-    assert "cross-validated" not in window.findChildren(QListWidget)[0].item(0).text()
-    assert not remark(window).isascii()
 
 
 @pytest.mark.slow

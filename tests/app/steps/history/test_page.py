@@ -23,8 +23,6 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QMenu,
     QPushButton,
-    QStyle,
-    QStyleOptionFrame,
     QTabWidget,
     QWidget,
 )
@@ -70,7 +68,6 @@ from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
-from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.steps.history.history_table import (
     PEN,
     STATION,
@@ -241,21 +238,33 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     assert desk.statuses[-1] == "2 entries"
 
 
-def test_a_pass_that_was_not_accepted_is_listed_as_repeated(desk: Desk) -> None:
+def test_a_pass_that_was_not_accepted_and_the_tasks_of_a_verification_are_told_apart(
+    desk: Desk,
+) -> None:
     logbook = desk.workbench.run.logbook.opened()
-    for n, grade in enumerate((Grade.PASS, Grade.CHECK, Grade.REPEAT)):
+    entries = [
+        *((Kind.REFUSED, grade, {}) for grade in (Grade.PASS, Grade.REPEAT)),
+        *(
+            (Kind.VERIFICATION, Grade.PASS, {"verified": task})
+            for task in ("conclusion", "circle", "fixed point")
+        ),
+    ]
+    for n, (kind, grade, settings) in enumerate(entries):
         event = Event(
-            kind=Kind.REFUSED,
+            kind=kind,
             at=NOON + timedelta(days=n),
             names=names("T-10"),
             program="lightpen 1",
             grade=grade,
-            swing=f"2026-01-0{n + 2}",
+            swing=f"2026-01-0{n + 2}" if kind is Kind.REFUSED else "",
+            settings=settings,
         )
         append(logbook.database, logbook.chain, event)
     desk.open()
 
-    assert desk.column(WHAT) == ["Rejected", "Rejected", "Repeated"]
+    assert desk.column(WHAT) == [
+        *("Fixed point", "Ring", "Verification", "Rejected", "Repeated")
+    ]
 
 
 def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
@@ -270,23 +279,6 @@ def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
         *("RECORDED, current", "SIMULATED, saved", "SIMULATED, replaced"),
         "Calibration, current",
     ]
-
-
-def test_the_tasks_of_a_verification_are_told_apart(desk: Desk) -> None:
-    logbook = desk.workbench.run.logbook.opened()
-    for n, verified in enumerate(("conclusion", "circle", "fixed point")):
-        event = Event(
-            kind=Kind.VERIFICATION,
-            at=NOON + timedelta(days=n),
-            names=names("T-10"),
-            program="lightpen 1",
-            grade=Grade.PASS,
-            settings={"verified": verified},
-        )
-        append(logbook.database, logbook.chain, event)
-    desk.open()
-
-    assert desk.column(WHAT) == ["Fixed point", "Ring", "Verification"]
 
 
 @pytest.mark.slow
@@ -390,23 +382,6 @@ def test_what_is_no_day_is_marked_and_chooses_nothing(desk: Desk) -> None:
 
     assert field.property("tone") == "bad"
     assert len(desk.column(TIP)) == 2
-
-
-@pytest.mark.slow
-def test_an_example_of_a_date_is_seen_whole_in_a_small_window(
-    desk: Desk, qtbot: QtBot
-) -> None:
-    bar = FilterBar()
-    qtbot.addWidget(bar)
-    bar.resize(637, bar.sizeHint().height())
-    bar.show()
-
-    for day in bar.findChildren(DateField):
-        text = day.fontMetrics().horizontalAdvance(day.placeholderText())
-        option = QStyleOptionFrame()
-        day.initStyleOption(option)
-        contents = QStyle.SubElement.SE_LineEditContents
-        assert text <= day.style().subElementRect(contents, option, day).width() - 4
 
 
 def test_lines_are_read_when_they_are_seen(desk: Desk) -> None:

@@ -40,10 +40,6 @@ def type_into(table: LedTable, led: int, column: int, text: str) -> None:
     QApplication.processEvents()  # the view takes the text when it is back
 
 
-def test_it_shows_numbers_and_coordinates(table: LedTable) -> None:
-    assert [shown(table, 8, column) for column in range(4)] == ["8", "25", "35", "0"]
-
-
 def test_long_numbers_are_shown_rounded_but_kept_whole(table: LedTable) -> None:
     table.set_value(DRAFT.with_cell(0, 0, "12.345678"))
 
@@ -101,21 +97,6 @@ def test_enter_opens_a_cell_and_goes_no_further(table: LedTable) -> None:
     QTest.keyClick(table, Qt.Key.Key_Return)
 
     assert isinstance(QApplication.focusWidget(), QLineEdit)
-
-
-def test_the_misfit_of_each_led_is_shown_where_it_is_known(table: LedTable) -> None:
-    table.set_misfits({7: 1.468})
-
-    assert shown(table, 7, MISFIT) == "1.468"
-    assert shown(table, 6, MISFIT) == ""
-
-
-def test_an_led_that_does_not_fit_is_marked_with_the_reason(table: LedTable) -> None:
-    table.set_marked({7: "LED 7 sits off its place."})
-
-    reported = cell(table, 7, 0).data(Qt.ItemDataRole.ToolTipRole)
-    assert reported == "LED 7 sits off its place."
-    table.grab()
 
 
 def test_normals_are_hidden_until_they_are_asked_for(table: LedTable) -> None:
