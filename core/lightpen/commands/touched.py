@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.commands.arguments import add_cameras_and_pen
+from lightpen.commands.arguments import add_bits, add_cameras_and_pen
 from lightpen.commands.console import lacking, progress, require_other_file
 from lightpen.commands.entering import limits_in_force
 from lightpen.detection.observations import Observations, Report, observe_centers
@@ -68,6 +68,7 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
         parser,
         "give a folder that contains one folder per camera, named as in this file",
     )
+    add_bits(parser)
     parser.add_argument(
         "--tip", type=Path, required=True, metavar="RESULT.json", help=tip_help
     )
@@ -173,7 +174,7 @@ def measure_runs(
     calibration = read_calibration(options.tip)
     given = read_viewers(options.camera, options.rig)
     rig = None if given is None else given.rig
-    found = [touch_place(each, rig) for each in places if each]
+    found = [touch_place(p, rig).of_bits(options.bits) for p in places if p]
     viewers = given or (found[0].viewers if found else None)
     if viewers is None:
         raise lacking("--camera or --rig")

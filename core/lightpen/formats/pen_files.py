@@ -9,6 +9,11 @@ Standard uncertainties (k = 1) are optional columns, the same number in each row
 of the pen in 1/K, ``expansion_sigma`` and ``temperature_c``, at which the
 LEDs were measured.
 
+The first column may have names that end in numbers, such as ``LED1``, or in none. Units
+may stand in a row of their own. Of nominal and actual coordinates (``x_nom``, ``X
+actual``) the actual ones are taken. The table may be a workbook (.xlsx, .ods, .xls), if
+python-calamine is installed. Lists of other programs: `marker_lists`.
+
 A JSON file has
 
 ================== ===================================================================
@@ -45,9 +50,23 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
-from lightpen.formats.documents import parse_json
-from lightpen.formats.files import MEGABYTE, quoted, read_text, write_whole
-from lightpen.formats.pen_content import LARGEST_DIAMETER, UNITS, PenContent
+from lightpen.formats.documents import Tree, parse_json, parse_yaml
+from lightpen.formats.entries import Entries
+from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text, write_whole
+from lightpen.formats.marker_lists import (
+    is_workbook,
+    markers_of,
+    refuse_rom,
+    workbook_text,
+)
+from lightpen.formats.pen_content import (
+    LARGEST_DIAMETER,
+    UNIT_NAMES,
+    UNITS,
+    PenContent,
+    agreed_unit,
+    unit_normal,
+)
 from lightpen.formats.pen_json import from_json, json_text
 from lightpen.formats.pen_tables import csv_text, from_table
 from lightpen.formats.tables import parse_table
@@ -169,8 +188,36 @@ def _read(path: Path, units: str | None) -> PenContent:
         raise UsageError(
             "pen-file.unknown-unit", unit=quoted(units), known=", ".join(UNITS)
         )
+    data, name = read_bytes(path, PEN_FILE, PEN_FILE_LIMIT), printable(path.name)
+    refuse_rom(data, name)
+    if is_workbook(data):
+        return from_table(parse_table(workbook_text(data, name), name), units)
     text = read_text(path, PEN_FILE, PEN_FILE_LIMIT)
-    name = printable(path.name)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return _of_document(parse_yaml(text, name), units, name)
     if text.lstrip().startswith(("{", "[")):
-        return from_json(parse_json(text, name), units, name)
+        return _of_document(parse_json(text, name), units, name)
     return from_table(parse_table(text, name), units)
+
+
+def _of_document(tree: Tree, units: str | None, name: str) -> PenContent:
+    """Return the pen of a document of this or of another program."""
+    markers = None
+    if not (isinstance(tree, dict) and "leds" in tree):
+        markers = markers_of(tree, name)
+    if markers is None:
+        return from_json(tree, units, name)
+    stated = ""
+    if isinstance(tree, dict):
+        entries = Entries.of(tree, name)
+        stated = UNIT_NAMES.get(entries.word("units", "unit").casefold(), "")
+    size = UNITS[agreed_unit(stated, units or markers.unit or None, name)]
+    normals = markers.normals
+    if normals is not None:
+        normals = np.array(
+            [
+                unit_normal(normal, message("pen-file.led", led=number, name=name))
+                for number, normal in enumerate(normals, 1)
+            ]
+        )
+    return PenContent(markers.points * size, normals, None)

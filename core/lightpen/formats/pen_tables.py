@@ -18,15 +18,20 @@ from lightpen.formats.pen_content import (
     stated_numbers,
     unit_normal,
 )
-from lightpen.formats.tables import Table
+from lightpen.formats.tables import Table, number_flaw
 from lightpen.messages import message
 from lightpen.model.pen import Pen
 
-_LED_NAMES = ("led", "no", "no.", "nr", "nr.", "number", "id", "point")
+_LED_NAMES = (
+    *("led", "no", "no.", "nr", "nr.", "number", "id", "point"),
+    *("name", "label", "marker", "feature", "element", "led name", "led_name"),
+)
 _COORDINATES = (("x",), ("y",), ("z",))
+_NOMINAL = " nominal"
 _NORMALS = (("nx",), ("ny",), ("nz",))
 _COLUMN = (
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
+    r"(?:[\s_]*(act|actual|meas|measured|ist)|[\s_]*(nom|nominal|soll))?"
     r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 )
 
@@ -36,7 +41,14 @@ def from_table(table: Table, units: str | None) -> PenContent:
 
     ``units`` apply to lengths of a file that states none; see `agreed_unit`.
     """
+    table, row_of_units = _without_units(table)
     named = [_name_and_unit(column) for column in table.header]
+    if not any(name in ("x", "y", "z") for name, _ in named):
+        # Nominal coordinates are better than none.
+        named = [(name.removesuffix(_NOMINAL), unit) for name, unit in named]
+    if row_of_units:
+        pairs = zip(named, row_of_units, strict=True)
+        named = [(name, unit or below) for (name, unit), below in pairs]
     stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}
     if len(stated) > 1:
         one, other = sorted(stated)[:2]
@@ -74,12 +86,38 @@ def _name_and_unit(column: str) -> tuple[str, str]:
     match = re.fullmatch(_COLUMN, column)
     if not match:
         return column, ""
-    unit = UNIT_NAMES.get(match[2] or "", "")
-    return (match[1], unit) if unit or not match[2] else (column, "")
+    unit = UNIT_NAMES.get(match[4] or "", "")
+    name = match[1] + (_NOMINAL if match[3] else "")
+    return (name, unit) if unit or not match[4] else (column, "")
+
+
+def _without_units(table: Table) -> tuple[Table, list[str]]:
+    """Return a table without its row of units, and the units; none without one."""
+    first = [
+        UNIT_NAMES.get(cell.strip("[]() ").casefold(), "") for cell in table.rows[0]
+    ]
+    if not table.header or sum(map(bool, first)) < 3 or len(table.rows) < 2:
+        return table, []
+    return replace(table, rows=table.rows[1:], lines=table.lines[1:]), first
 
 
 def _check_numbering(table: Table, column: int) -> None:
-    """Refuse LEDs that are not numbered 1, 2, 3 and so on from row to row."""
+    """Refuse LEDs that are not numbered 1, 2, 3 and so on from row to row.
+
+    Names without numbers, or numbers from 0 in names, are in order.
+    """
+    cells = [row[column] for row in table.rows]
+    if any(number_flaw(cell) for cell in cells):
+        ends = [re.search(r"(?a)\d+$", cell) for cell in cells]
+        if not all(ends) or not all(cells):
+            if all(cells) and len(set(cells)) == len(cells) and not any(ends):
+                return
+            table.whole_numbers(column)  # names the line
+        shown = [end[0] for end in ends if end is not None]
+        least = min(int(shown[0]), 1)
+        places = [str(int(each) - least + 1) for each in shown]
+        rows = [[place] for place in places]
+        table, column = replace(table, rows=rows), 0
     numbers = table.whole_numbers(column)
     wrong = numbers != np.arange(1, len(numbers) + 1)
     if not np.any(wrong):

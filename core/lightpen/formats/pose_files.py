@@ -77,7 +77,7 @@ def foreign_poses(table: Table, tool: str | None) -> GivenPoses:
         raise FileError(
             "poses.unknown-columns", name=table.name, header=", ".join(table.header)
         )
-    rows = _rows_by_tool(table)
+    rows = _rows_by_tool(table, tools)
     if len(tools) == 1 and len(rows) > 1:
         named = dict.fromkeys(rows, tools[0])
     else:
@@ -139,10 +139,11 @@ def _given(
     )
 
 
-def _rows_by_tool(table: Table) -> dict[str, list[int]]:
+def _rows_by_tool(table: Table, tools: Sequence[ToolColumns]) -> dict[str, list[int]]:
     """Return the rows of each tool, where a column names one in each row."""
+    poses = {i for each in tools for i in (*each.translation, *each.quaternion)}
     for column, name in enumerate(table.header):
-        if not re.fullmatch(_TOOL_COLUMN, name):
+        if column in poses or not re.fullmatch(_TOOL_COLUMN, name):
             continue
         rows: dict[str, list[int]] = {}
         for i, row in enumerate(table.rows):
@@ -226,7 +227,9 @@ def motive_table(text: str, name: str) -> str:
         raise FileError("poses.unknown-columns", name=name, header=", ".join(axes))
     width = len(axes)
     rows = [row + [""] * (width - len(row)) for row in above]
-    names = next((row for row in rows if "Name" in row), rows[0])
+    # Before version 2 of Motive the rows have no titles; the names are in the second.
+    titled = [row for row in rows if "Name" in row[:2]]
+    names = (titled or rows[1:] or rows)[0]
     is_body = [any(row[i] == "Rigid Body" for row in rows) for i in range(width)]
     unit = {"Meters": "[m]", "Millimeters": "[mm]", "Centimeters": "[cm]"}.get(
         stated.get("Length Units", "Meters"), ""

@@ -7053,6 +7053,14 @@ mm</translation>
         <translation>{name} 是 {program} 的相机，镜头模型为 {model}，无法读取。{remedy}</translation>
     </message>
     <message>
+        <source>{name} is a tool definition of NDI, whose coordinates cannot be read. Write the markers that 6D Architect shows as a table: led,x_mm,y_mm,z_mm.</source>
+        <translation>{name} 是 NDI 的工具定义文件，其坐标无法读取。请将 6D Architect 显示的标志点写成表格：led,x_mm,y_mm,z_mm。</translation>
+    </message>
+    <message>
+        <source>{name} is a workbook; to read it, python-calamine is needed, which is not installed. Save it as CSV.</source>
+        <translation>{name} 是工作簿；读取它需要 python-calamine，但未安装。请另存为 CSV。</translation>
+    </message>
+    <message>
         <source>{name} is an intrinsics file of {program}, which cannot be read. {remedy}</source>
         <translation>{name} 是 {program} 的内参文件，无法读取。{remedy}</translation>
     </message>
@@ -7069,6 +7077,10 @@ mm</translation>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查文件是否正确。</translation>
     </message>
     <message>
+        <source>{name} is no workbook with a sheet that can be read. Save the sheet with the LEDs as CSV.</source>
+        <translation>{name} 不是含有可读工作表的工作簿。请将含 LED 的工作表另存为 CSV。</translation>
+    </message>
+    <message>
         <source>{name} is not valid TOML ({problem}). The file may be cut short: copy or export it again.</source>
         <translation>{name} 不是有效的 TOML（{problem}）。文件可能被截断：请重新复制或导出。</translation>
     </message>
@@ -7079,6 +7091,10 @@ mm</translation>
     <message>
         <source>{name} is {width} x {height} px, the other images are {usual_width} x {usual_height} px. Replay only images of one camera together.</source>
         <translation>{name} 为 {width} × {height} px，其他图像为 {usual_width} × {usual_height} px。请只回放同一台相机的图像。</translation>
+    </message>
+    <message>
+        <source>{name} unpacks to more than 50 MB. Save the sheet with the LEDs as CSV.</source>
+        <translation>{name} 解压后超过 50 MB。请将含 LED 的工作表另存为 CSV。</translation>
     </message>
     <message>
         <source>{other} was calibrated with another LED file than {first}. Give calibrations of one pen with one LED file.</source>
@@ -9779,6 +9795,10 @@ mm</translation>
     <message>
         <source>{path} is the name of a device on Windows, not of a file. Choose another name.</source>
         <translation>{path} 是 Windows 上的设备名，而不是文件名。请选择其他名称。</translation>
+    </message>
+    <message>
+        <source>{place} has {count} numbers; three coordinates are needed, with three more for the normal, the same for all LEDs. Correct it.</source>
+        <translation>{place} 有 {count} 个数；需要三个坐标，法向另需三个，所有 LED 须相同。请更正。</translation>
     </message>
     <message>
         <source>{quantity} {of}</source>

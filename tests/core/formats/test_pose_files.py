@@ -99,3 +99,113 @@ def test_angles_are_refused_by_name(tmp_path: Path) -> None:
 
     with pytest.raises(FileError, match=r"quaternions or matrices|columns of poses"):
         read_poses(path)
+
+
+def plus(sign: str, end: str) -> bytes:
+    """Return a sequence of PLUS: a pen, a reference that stands, a lost frame."""
+    lines = ["ObjectType = Image", "NDims = 3", "DimSize = 2 2 12"]
+    if sign == ":=":
+        lines = ["NRRD0004", "type: unsigned char", "sizes: 2 2 12"]
+    for i in range(N_POSES):
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = ROTATIONS[i].as_matrix(), MOVED[i]
+        for name, matrix in (("Pen", pose), ("Reference", np.eye(4))):
+            numbers = " ".join(map(repr, matrix.ravel().tolist()))
+            status = "INVALID" if i == LOST and name == "Pen" else "OK"
+            lines.append(f"Seq_Frame{i:04}_{name}ToTrackerTransform {sign} {numbers}")
+            lines.append(
+                f"Seq_Frame{i:04}_{name}ToTrackerTransformStatus {sign} {status}"
+            )
+        lines.append(f"Seq_Frame{i:04}_Timestamp {sign} {i / 20}")
+    return "\n".join([*lines, end, ""]).encode() + bytes(range(128, 176))
+
+
+@pytest.mark.parametrize(
+    ("name", "sign", "end"),
+    [
+        ("tracked.igs.mha", "=", "ElementDataFile = LOCAL"),
+        ("tracked.igs.nrrd", ":=", ""),
+    ],
+)
+def test_a_sequence_of_plus_is_read(
+    tmp_path: Path, name: str, sign: str, end: str
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(plus(sign, end))
+
+    found = read_poses(path)
+
+    kept = np.delete(np.arange(N_POSES), LOST)
+    np.testing.assert_allclose(found.rotations, ROTATIONS.as_matrix()[kept], atol=1e-12)
+    np.testing.assert_allclose(found.translations, MOVED[kept], atol=1e-12)
+    assert (found.places.tolist(), found.n_lost) == ((kept + 1).tolist(), 1)
+
+
+def test_a_sequence_without_moving_transforms_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "tracked.mha"
+    text = plus("=", "ElementDataFile = LOCAL").replace(b"Transform", b"Matrix")
+    path.write_bytes(text)
+
+    with pytest.raises(FileError, match=r"tracked\.mha"):
+        read_poses(path)
+
+
+def motive(bodies: list[str], *, is_labelled: bool, unit: str = "Meters") -> str:
+    """Return a recording of Motive, each body followed by a marker of it."""
+    kinds = ["Rotation"] * 4 + ["Position"] * 3 + ["Mean Marker Error"]
+    columns = [("Rigid Body", body, kind) for body in bodies for kind in kinds]
+    axes = [*"XYZWXYZ", ""] * len(bodies)
+    markers = [("Rigid Body Marker", f"{body}:1", "Position") for body in bodies]
+    columns += [marker for marker in markers for _ in "XYZ"]
+    axes += list("XYZ") * len(bodies)
+    heads = [["", label if is_labelled else ""] for label in ("Type", "Name", "ID", "")]
+    heads[0] += [kind for kind, _, _ in columns]
+    heads[1] += [name for _, name, _ in columns]
+    heads[2] += ["ABC"] * len(columns)
+    heads[3] += [what for _, _, what in columns]
+    size = {"Meters": 1000.0, "Millimeters": 1.0}[unit]
+    lines = [
+        "Format Version,1.23,Take Name,a,Rotation Type,Quaternion,Length Units,"
+        f"{unit},Coordinate Space,Global",
+        "",
+        *(",".join(head) for head in heads),
+        ",".join(["Frame", "Time (Seconds)", *axes]),
+    ]
+    for i in range(N_POSES):
+        own = [*QUATERNIONS[i], *(MOVED[i] / size), 0.0002]
+        other = [0, 0, 0, 1, *((MOVED[i] + 500) / size), 0.0002]
+        cells = [[str(each) for each in (own, other)[b]] for b in range(len(bodies))]
+        if i == LOST:
+            cells[0] = [""] * 8
+        flat = [cell for body in cells for cell in body] + ["0.1"] * 3 * len(bodies)
+        lines.append(",".join([str(i), str(i / 120), *flat]))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("is_labelled", [False, True])
+@pytest.mark.parametrize("unit", ["Meters", "Millimeters"])
+@pytest.mark.parametrize("bodies", [["Rigid Body 1"], ["Pen", "Table"]])
+def test_a_recording_of_motive_is_read(
+    tmp_path: Path, bodies: list[str], unit: str, *, is_labelled: bool
+) -> None:
+    path = tmp_path / "take.csv"
+    path.write_text(motive(bodies, is_labelled=is_labelled, unit=unit))
+
+    found = read_poses(path, "pen" if len(bodies) > 1 else None)
+
+    kept = np.delete(np.arange(N_POSES), LOST)
+    np.testing.assert_allclose(found.rotations, ROTATIONS.as_matrix()[kept], atol=1e-9)
+    np.testing.assert_allclose(found.translations, MOVED[kept], rtol=1e-12)
+    assert found.n_lost == 1
+    if len(bodies) > 1:
+        with pytest.raises(FileError, match=r"(?i)pen.*table"):
+            read_poses(path)
+
+
+def test_euler_angles_of_motive_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "take.csv"
+    text = motive(["Pen"], is_labelled=True).replace("Type,Quaternion", "Type,XYZ")
+    path.write_text(text)
+
+    with pytest.raises(FileError, match="quaternions"):
+        read_poses(path)

@@ -157,7 +157,7 @@ class LedFilePanel(Translated, QWidget):
         self._path.pick(
             QFileDialog.FileMode.ExistingFile,
             self.tr("LEDs of the pen"),
-            self.tr("LEDs of a pen ({0})").format("*.csv *.txt *.json"),
+            self.tr("LEDs of a pen ({0})").format("*.csv *.txt *.json *.xlsx *.yaml"),
         )
 
     def _on_exchange_clicked(self) -> None:

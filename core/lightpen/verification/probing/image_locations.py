@@ -4,7 +4,7 @@ Those of a rig are in a folder for each camera, named as the rig file names it, 
 folder of a run; or in a record.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpen.arrays import FloatArray
@@ -62,6 +62,10 @@ class ImageLocation:
     pen_file: Path | None = None
     masks: tuple[FloatArray | None, ...] = (None,)  # (M, 3), stray light, px
     touches: tuple[RecordedTouch, ...] | None = None
+
+    def of_bits(self, bits: int | None) -> "ImageLocation":
+        """Return the place with images of so many bits; see `ImageSource.of_bits`."""
+        return replace(self, images=tuple(each.of_bits(bits) for each in self.images))
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -54,6 +54,15 @@ def test_a_run_of_one_camera_is_its_folder_alone(
     assert len(images.files) == 2
 
 
+def test_the_bit_depth_is_that_of_the_images_of_each_camera(tmp_path: Path) -> None:
+    write_images(tmp_path / "run" / "left")
+    write_images(tmp_path / "run" / "right")
+    found = touch_place((str(tmp_path / "run"),), TWO)
+
+    assert [each.full_scale for each in found.of_bits(10).images] == [1023, 1023]
+    assert [each.full_scale for each in found.of_bits(None).images] == [None, None]
+
+
 def test_a_run_without_the_images_of_a_camera_is_refused(tmp_path: Path) -> None:
     write_images(tmp_path / "run" / "left")
 

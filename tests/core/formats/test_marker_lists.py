@@ -1,0 +1,258 @@
+"""Tests of reading LED coordinates of other programs, and of workbooks."""
+
+import io
+import json
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.core.formats.test_pen_files import LEDS, refusal, saved
+
+from lightpen.errors import FileError, UsageError
+from lightpen.formats.pen_files import read_pen
+
+ACTUAL = LEDS + 0.0125
+SHEET = """<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main">
+<sheetData>{}</sheetData></worksheet>"""
+BOOK = {
+    "[Content_Types].xml": """<Types
+xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default
+Extension="rels"
+ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="xml" ContentType="application/xml"/></Types>""",
+    "_rels/.rels": """<Relationships
+xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="r1"
+Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument"
+Target="xl/workbook.xml"/></Relationships>""",
+    "xl/workbook.xml": """<workbook
+xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+xmlns:r="http://schemas.openxmlformats.org/officeDocument/2006/relationships"><sheets>
+<sheet name="Notes" sheetId="1" r:id="r1"/><sheet name="LEDs" sheetId="2" r:id="r2"/>
+</sheets></workbook>""",
+    "xl/_rels/workbook.xml.rels": """<Relationships
+xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Id="r1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" Target="worksheets/sheet1.xml"/>
+<Relationship Id="r2" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" Target="worksheets/sheet2.xml"/>
+</Relationships>""",  # noqa: E501
+    "xl/worksheets/sheet1.xml": SHEET.format(""),
+}
+
+
+def workbook(rows: list[list[str | float]]) -> bytes:
+    """Return an .xlsx whose first sheet is empty and whose second has the rows."""
+    cells = "".join(
+        f'<row r="{r}">'
+        + "".join(
+            f'<c r="{"ABCDEFG"[c]}{r}" t="inlineStr"><is><t>{cell}</t></is></c>'
+            if isinstance(cell, str)
+            else f'<c r="{"ABCDEFG"[c]}{r}"><v>{cell!r}</v></c>'
+            for c, cell in enumerate(row)
+            if cell != ""
+        )
+        + "</row>"
+        for r, row in enumerate(rows, 3)
+    )
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as packed:
+        for name, text in BOOK.items():
+            packed.writestr(name, text)
+        packed.writestr("xl/worksheets/sheet2.xml", SHEET.format(cells))
+    return stream.getvalue()
+
+
+NAMED: list[list[str | float]] = [
+    [f"LED{i}", *row] for i, row in enumerate(ACTUAL.tolist(), 1)
+]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        [["Name", "X", "Y", "Z"], ["", "mm", "mm", "mm"]],
+        [["LED", "x_mm", "y_mm", "z_mm"]],
+        [["Marker", "X [mm]", "Y [mm]", "Z [mm]"]],
+    ],
+)
+def test_a_workbook_is_read(tmp_path: Path, head: list[list[str | float]]) -> None:
+    pytest.importorskip("python_calamine")
+    path = tmp_path / "leds.xlsx"
+    path.write_bytes(workbook([*head, *NAMED]))
+
+    np.testing.assert_array_equal(read_pen(path).leds, ACTUAL)
+
+
+def test_whole_numbers_of_a_workbook_are_the_numbers_of_leds(tmp_path: Path) -> None:
+    pytest.importorskip("python_calamine")
+    path = tmp_path / "leds.xlsx"
+    rows: list[list[str | float]] = [["led", "x_mm", "y_mm", "z_mm"]]
+    rows += [[float(i), *row] for i, row in enumerate(LEDS.tolist(), 1)]
+    path.write_bytes(workbook(rows))
+
+    np.testing.assert_array_equal(read_pen(path).leds, LEDS)
+
+
+def test_a_workbook_that_is_not_read_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("python_calamine")
+    path = tmp_path / "leds.xlsx"
+    path.write_bytes(workbook([["Name"]])[:-200])
+    with pytest.raises(FileError, match="no workbook with a sheet"):
+        read_pen(path)
+
+    bomb = io.BytesIO()
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("xl/worksheets/sheet1.xml", bytes(60_000_000))
+    path.write_bytes(bomb.getvalue())
+    with pytest.raises(FileError, match="unpacks to more than 50 MB"):
+        read_pen(path)
+
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
+    with pytest.raises(FileError, match="Save it as CSV"):
+        read_pen(path)
+
+
+def cmm(columns: str, values: str, units: str = "") -> str:
+    lines = [f"Name;{columns}", *([units] if units else [])]
+    for i, (nominal, actual) in enumerate(zip(LEDS, ACTUAL, strict=True), 1):
+        named = {f"n{axis}": round(nominal["xyz".index(axis)]) for axis in "xyz"}
+        named |= {axis: f"{actual['xyz'.index(axis)]:.4f}" for axis in "xyz"}
+        lines.append(f"LED{i};" + values.format(**named).replace(".", ","))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("columns", "values", "units"),
+    [
+        (
+            "X_nom;X_act;Y_nom;Y_act;Z_nom;Z_act",
+            "{nx};{x};{ny};{y};{nz};{z}",
+            ";mm;mm;mm;mm;mm;mm",
+        ),
+        ("x_act_mm;y_act_mm;z_act_mm", "{x};{y};{z}", ""),
+        (
+            "x_nom_mm;y_nom_mm;z_nom_mm;x_act_mm;y_act_mm;z_act_mm",
+            "{nx};{ny};{nz};{x};{y};{z}",
+            "",
+        ),
+        ("X actual [mm];Y actual [mm];Z actual [mm]", "{x};{y};{z}", ""),
+        ("X;Y;Z", "{x};{y};{z}", ";[mm];[mm];[mm]"),
+    ],
+)
+def test_the_actual_coordinates_of_a_report_are_taken(
+    tmp_path: Path, columns: str, values: str, units: str
+) -> None:
+    path = saved(tmp_path, cmm(columns, values, units))
+
+    np.testing.assert_allclose(read_pen(path).leds, ACTUAL, atol=6e-5)
+
+
+def test_nominal_coordinates_alone_are_taken(tmp_path: Path) -> None:
+    text = cmm("X_nom;Y_nom;Z_nom", "{nx};{ny};{nz}")
+
+    found = read_pen(saved(tmp_path, text), units="mm")
+
+    np.testing.assert_array_equal(found.leds, LEDS.round())
+    assert "does not state the unit" in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("names", "fault"),
+    [
+        ([f"P{i}" for i in range(10)], ""),
+        (list("ABCDEFGHIJ"), ""),
+        ([f"LED{i}" for i in (1, 3, 2, 4, 5, 6, 7, 8, 9, 10)], "LED 3 is listed"),
+        (["LED1", *[f"LED{i}" for i in range(1, 10)]], "listed already"),
+        (["A", "A", *"CDEFGHIJ"], "not a number"),
+        (["A", "LED2", *"CDEFGHIJ"], "not a number"),
+    ],
+)
+def test_names_of_leds_are_their_order(
+    tmp_path: Path, names: list[str], fault: str
+) -> None:
+    rows = zip(names, LEDS.tolist(), strict=True)
+    lines = [f"{name},{x!r},{y!r},{z!r}" for name, (x, y, z) in rows]
+    text = "\n".join(["name,x_mm,y_mm,z_mm", *lines, ""])
+    if fault:
+        assert fault in refusal(tmp_path, text)
+    else:
+        leds = read_pen(saved(tmp_path, text)).leds
+        np.testing.assert_array_equal(leds, LEDS)
+
+
+POINTS = LEDS.tolist()
+MAPPINGS = [dict(zip("xyz", point, strict=True)) for point in POINTS]
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {"units": "mm", "markers": POINTS},
+        {"unit": "mm", "Markers": MAPPINGS},
+        {"units": "mm", "RigidBody": {"Markers": MAPPINGS}},
+        {
+            "units": "mm",
+            "TrackedObject": {
+                "FlsFormatVersion": "1.0.10",
+                "ModelPoints": {
+                    f"Point{i}": [*point, 0, 0, 1, 0, 0, 0]
+                    for i, point in enumerate(POINTS)
+                },
+            },
+        },
+        {"units": "mm", "points": [{"position": point} for point in POINTS]},
+    ],
+)
+def test_lists_of_markers_are_read(tmp_path: Path, document: dict[str, Any]) -> None:
+    path = saved(tmp_path, json.dumps(document), "leds.json")
+
+    found = read_pen(path)
+
+    np.testing.assert_array_equal(found.leds, LEDS)
+    np.testing.assert_array_equal(found.normals, np.tile([0, 0, 1.0], (10, 1)))
+
+
+def test_a_list_without_unit_needs_one(tmp_path: Path) -> None:
+    path = saved(tmp_path, json.dumps({"markers": (LEDS / 1e3).tolist()}), "a.json")
+
+    with pytest.raises(UsageError, match="does not state the unit"):
+        read_pen(path)
+    np.testing.assert_allclose(read_pen(path, "m").leds, LEDS, rtol=1e-14)
+
+
+def test_marker_positions_of_rpg_are_in_metres(tmp_path: Path) -> None:
+    text = "marker_positions:\n" + "".join(
+        f"  - x: {x / 1e3}\n    y: {y / 1e3}\n    z: {z / 1e3}\n" for x, y, z in POINTS
+    )
+    leds = read_pen(saved(tmp_path, text, "marker_positions.yaml")).leds
+
+    np.testing.assert_allclose(leds, LEDS, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("points", "fault"),
+    [
+        ([[1.0, 2.0]], "LED 1 of leds.csv has 2 numbers"),
+        ([*POINTS, [1, 2, 3, 0, 0, 1]], "LED 11 of leds.csv has 6 numbers"),
+        ([*POINTS[:3], ["a", 1, 2]], "LED 4 of leds.csv cannot be read"),
+        ([*POINTS[:3], {"a": 1}], "LED 4 of leds.csv has no position"),
+    ],
+)
+def test_a_flaw_of_a_list_is_named(
+    tmp_path: Path, points: list[Any], fault: str
+) -> None:
+    text = json.dumps({"units": "mm", "markers": points})
+
+    assert fault in refusal(tmp_path, text)
+
+
+def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "8700339.rom"
+    path.write_bytes(b"NDI\x00\x92\x1e\x00\x00\x01" + bytes(743))
+
+    with pytest.raises(FileError, match=r"8700339\.rom is a tool definition of NDI"):
+        read_pen(path)
