@@ -61,7 +61,7 @@ class Outcome:
     ----------
     by_u, tip : (3,) array
         Error of the tip by U, and by its share of what the trial draws: noise and
-        the diameter of the discs, not lens and mechanics.
+        the diameter of the discs, not the lens.
     later, same : (3,) array
         Of a calibration with both files by another swing, and by the images that they
         were found from, by the same share; None beyond `N_AGAIN`.
@@ -137,7 +137,7 @@ def rows_of(every: Sequence[Outcome | None]) -> list[Row]:
             )
         ),
         Row(
-            "U of tip x y z, which also counts lens and mechanics, covers the truth",
+            "U of tip x y z, which also counts the lens, covers the truth",
             f"{numbers(covered('by_u'), 1)} %",
         ),
         Row(

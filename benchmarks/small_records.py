@@ -66,7 +66,7 @@ SMALL: Mapping[str, Any] = {
         "disc_diameter_mm": 10.0,
         "disc_diameter_by_areas_mm": None,
         "contradictions": [],
-        "effects": [],
+        "image_fields": [],
     },
     "assumptions": {},
     "fixed_lamps": [],
@@ -135,8 +135,8 @@ SECOND_CONE = {
     "stated_distance_mm": 100.0,
     "stated_standard_uncertainty_mm": 0.001,
     "distance_mm": 100.0,
-    "expanded_uncertainty_without_mm": [0.01, 0.01, 0.01],
-    "expanded_uncertainty_with_mm": [0.01, 0.01, 0.01],
+    "pen_scale": 1.0,
+    "pen_scale_expanded_uncertainty": 2e-5,
 }
 
 

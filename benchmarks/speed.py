@@ -162,7 +162,7 @@ def speed_rows(workers: Workers) -> list[Row]:
             f"two-stage (paper) {fits.two_stage:.1f}",
         ),
         _row(
-            f"whole calibration of {N_FRAMES} images: estimators, effects, uncertainty",
+            f"whole calibration of {N_FRAMES} images: estimators, fields, uncertainty",
             *(fits.calibration, "calibration"),
         ),
         _row(

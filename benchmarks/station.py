@@ -19,13 +19,15 @@ from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
+from lightpen.model.effective_tip import effective_tip
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import fit_rigid, rotation_from_vector
 from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
+    PAPER_TIP,
     Swing,
     paper_camera,
     paper_pen,
@@ -228,7 +230,7 @@ def calibrated(
         rig = from_first(row)
         swing = swing_poses(n_images, rng, kind)  # type: ignore[arg-type]
         swing = seen_from(swing, row.rotations[0], row.translations[0])
-    pixels = _centers(effects, rig, pen, swing, rng)
+    pixels, truth = _centers(effects, rig, pen, swing, rng)
     file, pen_file = drawn_rig(rig, rng), _drawn_pen(effects, pen, rng)
     if effects.copies:
         copied = rng.random(n_images) < effects.copies
@@ -243,16 +245,14 @@ def calibrated(
     ]
     found = calibrate_rig(file, pen_file, seen)
     return Trial(
-        found.joint.tip_pen - swing.tip_pen,
-        found.budget.expanded_uncertainty[:3],
-        found,
+        found.joint.tip_pen - truth, found.budget.expanded_uncertainty[:3], found
     )
 
 
 def _centers(
     effects: Effects, rig: Rig, pen: Pen, swing: Swing, rng: np.random.Generator
-) -> FloatArray:
-    """Return LED centres (N, C, L, 2), px, in the order of the swing."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return LED centres (N, C, L, 2), px, and the effective tip (3,), mm."""
     R, n_images = swing.rotations, len(swing.rotations)
     # Gravity is along the mean pen, as the cone stands upright.
     up = R[:, :, 1].mean(axis=0)
@@ -268,13 +268,12 @@ def _centers(
     bend = effects.sag * rng.uniform() * TOP * (heights / heights.max()) ** 2
     leds = pen.leds + fall[:, None] * bend[:, None]
     seat = effects.seat * rng.uniform() * rng.standard_normal((n_images, 3))
-    points = np.einsum("nij,nlj->nli", R, leds - tips_pen[:, None])
-    points += (swing.cone_cam + seat)[:, None]
+    balls = swing.cone_cam + seat
+    levers = np.einsum("nij,nlj->nli", R, leds - tips_pen[:, None])
     normals = pen.normals @ np.swapaxes(R, 1, 2)
+    truth = _effective(pen, levers + balls[:, None])
     warmth = 1 + (pen.expansion or 0.0) * rng.normal(0, effects.warmth)
-    middle = np.einsum("nij,j->ni", R, pen.leds.mean(axis=0) - swing.tip_pen)
-    middle = (middle + swing.cone_cam)[:, None]
-    points = middle + warmth * (points - middle)
+    points = balls[:, None] + warmth * levers
     side = np.cross(up, [0.0, 0.0, 1.0])
     lean = np.stack([R[:, :, 1] @ side, R[:, :, 1] @ np.cross(up, side)], axis=1)
     views = []
@@ -289,7 +288,14 @@ def _centers(
         centers += noise[:, None] * rng.standard_normal(centers.shape)
         faces = np.einsum("nli,nli->nl", there, turned) < 0
         views.append(np.where(faces[..., None], centers, np.nan))
-    return np.stack(views, axis=1)
+    return np.stack(views, axis=1), truth
+
+
+def _effective(pen: Pen, points: FloatArray) -> FloatArray:
+    """Return the effective tip by LEDs (N, L, 3) in place, (3,), mm."""
+    poses = [fit_rigid(pen.leds, each) for each in points]
+    rotations, translations = map(np.array, zip(*poses, strict=True))
+    return effective_tip(rotations, translations)[:3]
 
 
 def _lens_field(
@@ -347,10 +353,9 @@ def _drawn_pen(effects: Effects, pen: Pen, rng: np.random.Generator) -> Pen:
     turn = (U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt).T
     leds = one @ turn.T + pen.leds.mean(axis=0)
     scale = 1 + rng.normal(0, pen.scale_sigma or 0.0)
-    middle = leds.mean(axis=0)
     return replace(
         pen,
-        leds=middle + scale * (leds - middle),
+        leds=PAPER_TIP + scale * (leds - PAPER_TIP),  # the tip keeps its place
         led_sigma=effects.led_sigma,
         diameter=pen.diameter + rng.normal(0, pen.diameter_sigma or 0.0),
     )

@@ -1,7 +1,6 @@
 """Calibrations with erroneous files, seats and noise.
 
-Mechanics are unknowns of every fit and widen U, but are not drawn here, so that more
-than 95 % of the intervals cover. Section `station` draws all.
+Section `station` also draws the lens and mechanics.
 """
 
 from collections.abc import Callable
@@ -18,20 +17,17 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import fit_poses
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, tilt_modes
+from lightpen.estimation.bundle.seat_modes import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.reports.verdict import Grade, judge
-from lightpen.estimation.uncertainty.budget import (
-    POSTURES,
-    SHARES_OF_EFFECTS,
-    one_wave_variance,
-)
+from lightpen.estimation.uncertainty.budget import POSTURES, ContributionName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
+from lightpen.model.effective_tip import effective_tip
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import directions_of
@@ -39,6 +35,7 @@ from lightpen.model.rig import Rig, from_first, rig_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
+    PAPER_TIP,
     Swing,
     paper_camera,
     paper_pen,
@@ -197,7 +194,7 @@ def _reported(
         passed &= median <= limit
         asked = f"<= {1000 * limit:.0f} \u00b5m, {asked}"
     return Row(
-        f"{name}: median error; 95 % intervals, lens and mechanics apart, that cover, "
+        f"{name}: median error; 95 % intervals, lens apart, that cover, "
         f"x y z; {SIGMA} px, {n_calibrations} calibrations",
         f"{1000 * median:.1f} \u00b5m; {numbers(covered, 1)} %",
         asked,
@@ -228,17 +225,19 @@ def _errors(trial: Flaws, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
         pivot.tip_pen,
         pivot.pivot_cam,
     )
+    truth = effective_tip(swing.rotations, translations)[:3]
     return (
-        calibration.joint.tip_pen - swing.tip_pen,
+        calibration.joint.tip_pen - truth,
         _stated(calibration),
-        held.tip_pen - swing.tip_pen,
+        held.tip_pen - truth,
     )
 
 
 def _stated(calibration: Calibration) -> FloatArray:
-    """Return the standard uncertainty of the tip without lens and mechanics, mm."""
-    not_drawn = set(SHARES_OF_EFFECTS.values())
-    shares = [s for s in calibration.budget.shares if s.name not in not_drawn]
+    """Return the standard uncertainty of the tip without the lens, mm."""
+    shares = [
+        s for s in calibration.budget.shares if s.name is not ContributionName.LENS
+    ]
     covariance = np.sum([share.covariance for share in shares], axis=0)
     return np.asarray(np.sqrt(np.diag(covariance)[:3]))
 
@@ -295,9 +294,6 @@ def _moves_of_seat(trial: Flaws, swing: Swing, rng: np.random.Generator) -> Floa
     one_way = np.stack([out * np.cos(directions), zero, out * np.sin(directions)], 1)
     forms = tilt_modes(swing.rotations)
     by_form = USUAL.form_error * rng.standard_normal((forms.shape[1], 3))
-    by_form[: MODE_COUNTS[0]] @= np.linalg.cholesky(
-        one_wave_variance(swing.rotations)
-    ).T
     return jitter + one_way + forms @ by_form
 
 
@@ -344,10 +340,10 @@ def _drawn_pen(trial: Flaws, pen: Pen, rng: np.random.Generator) -> Pen:
         scale_sigma=trial.scale_sigma or pen.scale_sigma,
     )
     priors = priors_of(rig_of(paper_camera()), stated, USUAL)
-    basis, center = led_basis(pen.leds), pen.leds.mean(axis=0)
+    basis = led_basis(pen.leds)
     moves = basis @ (trial.led_sigma * rng.standard_normal(basis.shape[1]))
     scale = rng.normal(0, np.sqrt(priors.size_covariance[0, 0]))
-    moves += scale * (pen.leds - center).ravel()
+    moves += scale * (pen.leds - PAPER_TIP).ravel()  # the tip keeps its place
     width = rng.normal(0, np.sqrt(priors.diameter.covariance[0, 0]))
     return replace(
         stated, leds=pen.leds + moves.reshape(-1, 3), diameter=pen.diameter + width

@@ -17,6 +17,7 @@ from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pairing import pair_images
 from lightpen.model.camera import Camera
+from lightpen.model.effective_tip import effective_tip
 from lightpen.model.ellipse import disc_images
 from lightpen.model.lens_field import LensField
 from lightpen.model.pen import Pen, grown
@@ -26,6 +27,7 @@ from lightpen.simulator.postures import Postures
 from lightpen.simulator.samples import row_of_cameras
 from lightpen.simulator.swings import (
     PAPER_CONE,
+    PAPER_TIP,
     Swing,
     leds_in_camera,
     paper_camera,
@@ -85,16 +87,20 @@ def usual() -> Calibration:
     return calibrate(CAMERA, PEN, observed(moved, errors))
 
 
-def restless() -> Calibration:
-    """Noise that lasts, a seat that jitters and wanders, and a slow drift."""
+def restless_swing() -> Swing:
     rng = np.random.default_rng(2)
     swing = swing_of(2, 60)
     moves = 0.008 * rng.standard_normal((60, 3))
     moves += np.linspace(0, 0.06, 60)[:, None] * [1.0, 0.0, 0.5]
     turns = 2 * np.arctan2(swing.rotations[:, 0, 1], swing.rotations[:, 2, 1])
     moves[:, 0] += 0.02 * np.cos(turns)
-    moved = replace(swing, translations=swing.translations + moves)
-    return calibrate(CAMERA, PEN, observed(moved, 0.05 * lasting(2, 0.8, 60)))
+    return replace(swing, translations=swing.translations + moves)
+
+
+def restless() -> Calibration:
+    """Noise that lasts, a seat that jitters and wanders, and a slow drift."""
+    errors = 0.05 * lasting(2, 0.8, 60)
+    return calibrate(CAMERA, PEN, observed(restless_swing(), errors))
 
 
 def spoilt_files() -> Calibration:
@@ -102,7 +108,7 @@ def spoilt_files() -> Calibration:
     wrong = replace(
         CAMERA, fx=1.004 * CAMERA.fx, fy=1.004 * CAMERA.fy, cx=CAMERA.cx + 4
     )
-    leds = grown(PEN, 3e-4).leds.copy()
+    leds = grown(PEN, 3e-4, PAPER_TIP).leds.copy()
     leds[2] += [0.05, -0.08, 0.0]
     pen = replace(PEN, leds=leds)
     return calibrate(
@@ -218,44 +224,39 @@ def by_a_late_camera() -> Calibration:
     return calibrate_rig(filed, PEN, weighed)
 
 
-def loose() -> Calibration:
-    """A stylus that jumps to the side of the lean, in an oval seat that jitters.
-
-    The LED file has a covariance, and one of the normals.
-    """
-    swing, basis = swing_of(11, 30), led_basis(PEN.leds)
+def loose_swing() -> Swing:
+    swing = swing_of(11, 30)
     across = swing.rotations[:, :, 1] - swing.rotations[:, :, 1].mean(axis=0)
     across[:, 1] = 0.0
     angle = np.arctan2(across[:, 2], across[:, 0])
     moves = 0.03 * across / np.linalg.norm(across, axis=1, keepdims=True)
     moves[:, 0] += 0.03 * (np.cos(angle) + np.cos(3 * angle))
     moves[:, 2] += 0.03 * (np.sin(3 * angle) - np.sin(angle))
+    return replace(swing, translations=swing.translations + moves)
+
+
+def loose() -> Calibration:
+    """A stylus that jumps to the side of the lean, in an oval seat.
+
+    The LED file has a covariance, and one of the normals.
+    """
+    basis = led_basis(PEN.leds)
     pen = replace(
         PEN,
         led_sigma=None,
         led_covariance=0.002**2 * basis @ basis.T,
         normal_covariance=0.01**2 * np.eye(3),
     )
-    moved = replace(swing, translations=swing.translations + moves)
-    return calibrate(
-        CAMERA, pen, observed(moved, 0.02 * lasting(11, 0.0, 30), CAMERA, pen)
-    )
+    errors = 0.02 * lasting(11, 0.0, 30)
+    return calibrate(CAMERA, pen, observed(loose_swing(), errors, CAMERA, pen))
 
 
 def uneven() -> Calibration:
-    """LEDs that blink in turn and differ in noise, on a stylus that bends."""
-
-    def at(times: FloatArray) -> Swing:
-        swing = steadily(times)
-        axes = swing.rotations[:, :, 1]
-        bent = swing.translations + 0.06 * (axes - axes.mean(axis=0))
-        return replace(swing, translations=bent)
-
-    rng, pixels = np.random.default_rng(8), np.zeros((N_IMAGES, PEN.n_leds, 2))
-    for j in range(PEN.n_leds):
-        swing = at(np.arange(N_IMAGES, dtype=float) + 0.004 * (j - 4.5))
-        poses = swing.rotations, swing.translations
-        pixels[:, j] = simulate_centers(CAMERA, PEN, *poses, 0.0, rng)[:, j]
+    """LEDs that differ in noise, on a stylus that bends."""
+    swing, rng = steadily(np.arange(N_IMAGES, dtype=float)), np.random.default_rng(8)
+    axes = swing.rotations[:, :, 1]
+    bent = swing.translations + 0.06 * (axes - axes.mean(axis=0))
+    pixels = simulate_centers(CAMERA, PEN, swing.rotations, bent, 0.0, rng)
     sigmas = 0.03 * np.exp(0.5 * rng.standard_normal(pixels.shape[:2]))
     sigmas[:, 3] *= 5
     pixels += sigmas[..., None] * rng.standard_normal(pixels.shape)
@@ -265,15 +266,18 @@ def uneven() -> Calibration:
     return calibrate(CAMERA, PEN, replace(seen, sigmas=sigmas))
 
 
-def oval_seat() -> Calibration:
-    """A seat 10 um out of round."""
+def oval_swing() -> Swing:
     swing = swing_of(11)
     right, away = swing.rotations[:, 0, 1], swing.rotations[:, 2, 1]
     angle = np.arctan2(away, right)
     sides = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
     moves = 0.01 * np.cos(2 * angle - 0.7)[:, None] * sides
-    moved = replace(swing, translations=swing.translations + moves)
-    return calibrate(CAMERA, PEN, observed(moved, 0.03 * lasting(11, 0.0)))
+    return replace(swing, translations=swing.translations + moves)
+
+
+def oval_seat() -> Calibration:
+    """A seat 10 um out of round."""
+    return calibrate(CAMERA, PEN, observed(oval_swing(), 0.03 * lasting(11, 0.0)))
 
 
 SWINGS: dict[str, Callable[[], Calibration]] = {
@@ -283,3 +287,12 @@ SWINGS: dict[str, Callable[[], Calibration]] = {
         *(oval_seat, by_two_cones, by_two_cameras, by_a_late_camera),
     )
 }
+_MOVED = {"restless": restless_swing, "loose": loose_swing, "oval_seat": oval_swing}
+
+
+def true_tip(name: str) -> FloatArray:
+    """Return the effective tip of one of these swings, (3,), mm."""
+    if name not in _MOVED:
+        return PAPER_TIP
+    swing = _MOVED[name]()
+    return effective_tip(swing.rotations, swing.translations)[:3]

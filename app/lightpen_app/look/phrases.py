@@ -84,25 +84,15 @@ _AT_THE_SCREEN: dict[Code, str] = {
 }
 _SHARES: dict[ContributionName, str] = {
     ContributionName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
-    ContributionName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centres"),
     ContributionName.FORM: QT_TRANSLATE_NOOP("phrases", "form of ball, cone"),
-    ContributionName.TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "temperature"),
-    ContributionName.DISTANCE: QT_TRANSLATE_NOOP("phrases", "cone distance"),
     ContributionName.SEAT: QT_TRANSLATE_NOOP("phrases", "seating"),
     ContributionName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
     ContributionName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),
-    ContributionName.SCALE: QT_TRANSLATE_NOOP("phrases", "scale"),
     ContributionName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "disc diameter"),
     ContributionName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
     ContributionName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
     ContributionName.METHOD: QT_TRANSLATE_NOOP("phrases", "two-stage method"),
     ContributionName.LENS: QT_TRANSLATE_NOOP("phrases", "lens"),
-    ContributionName.COMPLIANCE: QT_TRANSLATE_NOOP("phrases", "compliance"),
-    ContributionName.LOOSE: QT_TRANSLATE_NOOP("phrases", "loose stylus"),
-    ContributionName.SAG: QT_TRANSLATE_NOOP("phrases", "sag"),
-    ContributionName.TILT: QT_TRANSLATE_NOOP("phrases", "camera tilt"),
-    ContributionName.TIMING: QT_TRANSLATE_NOOP("phrases", "timing"),
-    ContributionName.SHRINKAGE: QT_TRANSLATE_NOOP("phrases", "unmodelled effects"),
 }
 _LACKS: dict[MissingInput, str] = {
     MissingInput.STATION: QT_TRANSLATE_NOOP(

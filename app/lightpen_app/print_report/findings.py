@@ -239,31 +239,17 @@ def _halves(calibration: CalibrationRecord) -> list[tuple[str, ...]]:
 def _share_name(name: ContributionName) -> str:
     return {
         ContributionName.NOISE: translate("paper", "Image noise"),
-        ContributionName.CENTERS: translate("paper", "LED centres, systematic"),
         ContributionName.SEAT: translate("paper", "Seating of the tip in the cone"),
         ContributionName.FORM: translate("paper", "Form error of ball and cone"),
         ContributionName.DRIFT: translate("paper", "Drift of cone and camera"),
         ContributionName.LEDS: translate("paper", "LED positions of the LED file"),
-        ContributionName.SCALE: translate("paper", "Scale of the LED file"),
-        ContributionName.TEMPERATURE: translate("paper", "Pen temperature"),
-        ContributionName.DISTANCE: translate("paper", "Distance of the cones"),
         ContributionName.DIAMETER: translate("paper", "Diameter of the LED discs"),
         ContributionName.CAMERA: translate("paper", "Intrinsics of the camera"),
         ContributionName.EXTRINSICS: translate("paper", "Extrinsics of the cameras"),
         ContributionName.METHOD: translate(
             "paper", "Two-stage method, difference from the joint fit"
         ),
-        ContributionName.LENS: translate("paper", "Lens beyond its distortion model"),
-        ContributionName.COMPLIANCE: translate(
-            "paper", "Compliance of stylus, seat and stand"
-        ),
-        ContributionName.LOOSE: translate("paper", "Loose stylus"),
-        ContributionName.SAG: translate("paper", "Sag of the pen"),
-        ContributionName.TILT: translate("paper", "Tilt of the camera with the pen"),
-        ContributionName.TIMING: translate("paper", "Images not of the same moment"),
-        ContributionName.SHRINKAGE: translate(
-            "paper", "Effects too uncertain to be fitted"
-        ),
+        ContributionName.LENS: translate("paper", "Lens and LED centres"),
     }[name]
 
 

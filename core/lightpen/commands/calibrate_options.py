@@ -81,13 +81,6 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         help="standard uncertainty due to the form error of ball and cone (0.0002)",
     )
     parser.add_argument(
-        "--compliance",
-        type=number_from(1e-7, 1.0, "compliance", "mm"),
-        metavar="MM",
-        help="standard uncertainty of the deflection of stylus, seat and stand, which "
-        "is in proportion to the sine of the tilt (0.004)",
-    )
-    parser.add_argument(
         "--center-bias",
         type=number_from(1e-6, 10.0, "uncertainty", "px"),
         metavar="PX",
@@ -148,7 +141,6 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
         "humidity_percent": options.humidity,
         temperature: options.temperature_sigma,
         "form_error": options.form_error,
-        "compliance": options.compliance,
         "center_bias": options.center_bias,
     }
     return replace(assumed, **{n: x for n, x in given.items() if x is not None})

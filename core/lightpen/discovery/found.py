@@ -35,7 +35,7 @@ class Discovery:
     # (q, q), of tip, camera, diameter and LEDs, as `parameters` has them, in the frame
     # in which the LEDs fit the true ones best
     covariance: FloatArray
-    # (3, 3), share of lens and mechanics in the covariance of the tip, mm^2
+    # (3, 3), share of the lens in the covariance of the tip, mm^2
     beyond_fit: FloatArray
     calibration: Calibration  # the final adjustment
     lengths: tuple[KnownLength, ...]

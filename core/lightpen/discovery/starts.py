@@ -288,7 +288,7 @@ def _weighted(view: CameraView, sigma: float) -> CameraView:
         cone=each * view.cone,
         led=each * view.led,
         own=each * view.own,
-        effects=each * view.effects,
+        fields=each * view.fields,
         diameter=0.0 * np.nan_to_num(view.diameter),
     )
 

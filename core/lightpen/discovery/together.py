@@ -117,8 +117,8 @@ def joined(swings: Sequence[Discovery]) -> Discovery:
     """Return the joint result of swings, in the frame of the first.
 
     Prior information on camera and discs counts once: each swing adds the information
-    of its images, which is its total less the prior. Uncertainty beyond the fits (lens,
-    mechanics) counts as common to all swings up to the amount that all have, and as
+    of its images, which is its total less the prior. Uncertainty beyond the fits (the
+    lens) counts as common to all swings up to the amount that all have, and as
     independent beyond that.
     """
     first, at = swings[0], swings[0].parameters

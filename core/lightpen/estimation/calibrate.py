@@ -28,9 +28,9 @@ from lightpen.estimation.bundle.adjustment import Adjustment, adjust
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.consistency_findings import Contradiction
 from lightpen.estimation.bundle.disc_diameter import read_diameter
-from lightpen.estimation.bundle.effect_findings import FoundEffect, found_effects
+from lightpen.estimation.bundle.field_findings import FoundField, found_fields
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.estimation.bundle.priors import Priors, priors_of, thermal_growth
+from lightpen.estimation.bundle.priors import Priors, priors_of
 from lightpen.estimation.bundle.self_check import SelfCheck, check_prediction
 from lightpen.estimation.bundle.tip_frames import TipFrames, tip_frames
 from lightpen.estimation.contact.camera_motion import (
@@ -166,9 +166,9 @@ class Calibration:
         return max([*by_lamps, self.bundle.drift if is_certain else 0.0])
 
     @cached_property
-    def effects(self) -> tuple[FoundEffect, ...]:
-        """Effects of lens and mechanics that the images support."""
-        return found_effects(self.bundle, self.observations.interval_ms)
+    def fields(self) -> tuple[FoundField, ...]:
+        """Shifts of the images that these support."""
+        return found_fields(self.bundle)
 
     @cached_property
     def self_check(self) -> SelfCheck | None:
@@ -237,11 +237,10 @@ def calibrate_rig(
 
 
 class _Inputs(NamedTuple):
-    """Prior knowledge of the rig, and of the pen at the temperature of the swing."""
+    """Prior knowledge of rig and pen."""
 
     rig: Rig
     pen: Pen
-    growth: float
     assumptions: Assumptions
     shares_images: bool
 
@@ -256,8 +255,8 @@ def _before_images(
             cameras[c], shares = cameras[c].before_images(), True
         if pen.is_found_from(seen.pixels):
             pen, shares = pen.before_images(), True
-    rig, growth = replace(rig, cameras=tuple(cameras)), thermal_growth(pen, assumptions)
-    return _Inputs(rig, grown(pen, growth), growth, assumptions, shares)
+    rig = replace(rig, cameras=tuple(cameras))
+    return _Inputs(rig, pen, assumptions, shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +308,7 @@ class _Adjusted:
     adjustment: Adjustment
     joint: JointFit
     stated: Priors
-    # (M, C, L, 2), LED centres less the effects of lens and mechanics, px
+    # (M, C, L, 2), LED centres less the fields of the images, px
     pixels: FloatArray
     second: SecondImages | None  # of a second swing; the last of the adjusted images
 
@@ -402,12 +401,12 @@ def _adjust_jointly(
     adjustment = adjust(state, pixels, priors, start.extrinsics, shifts, sigmas)
     bundle, found = adjustment.bundle, adjustment.bundle.state
     n = len(moments)
-    corrected = (pixels - bundle.effect_shifts)[:n]
+    corrected = (pixels - bundle.field_shifts)[:n]
     joint = joint_at(
         ContactModel(found.rig, found.pen, corrected),
         found.rotations[:n],
-        found.tip_pen,
-        found.cone_rig,
+        bundle.tip_pen,
+        bundle.cone_rig,
         bundle.used[:n].reshape(n, -1),
     )
     return _Adjusted(adjustment, joint, priors, corrected, others)
@@ -451,7 +450,7 @@ def _calibration_of(
         stated=adjusted.stated,
         priors=adjustment.priors,
         assumptions=inputs.assumptions,
-        growth=inputs.growth,
+        growth=adjustment.priors.growth,
         shares_images=inputs.shares_images,
         contradictions=adjustment.contradictions,
         two_stage=two_stage,
@@ -463,13 +462,18 @@ def _calibration_of(
         budget=budget,
         instrument=adjusted_instrument(adjustment, budget),
         halves=compare_halves(joint),
-        leds=measure_leds(state.rig, pen, adjusted.pixels, joint),
+        leds=measure_leds(
+            state.rig,
+            grown(pen, adjustment.bundle.scale, joint.tip_pen),
+            adjusted.pixels,
+            joint,
+        ),
         coverage=measure_coverage(joint.rotations),
         lags=start.lags,
         second=(
             None
             if adjusted.second is None
-            else second_cone(adjustment, budget, adjusted.second)
+            else second_cone(adjustment, adjusted.second)
         ),
     )
 

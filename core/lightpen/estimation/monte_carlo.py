@@ -1,10 +1,10 @@
 """Monte Carlo evaluation of the tip's uncertainty [1]_, as a check of the budget.
 
 The estimate is taken for the truth. Each trial draws files of camera and pen about it,
-with the stated or assumed uncertainties, a seat and a drift as U counts them, mechanics
-of usual size, centres that are off in each posture, the areas of the discs, and noise
-in the images; then it calibrates with these files alone. The scatter of the tips is
-their uncertainty, including all nonlinear effects.
+with the stated or assumed uncertainties, a seat and a drift as U counts them, centres
+that are off in each posture, the areas of the discs, and noise in the images; then it
+calibrates with these files alone. The scatter of the tips is their uncertainty,
+including all nonlinear effects.
 
 References
 ----------
@@ -24,24 +24,24 @@ from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.components import NONE
 from lightpen.estimation.bundle.disc_diameter import modelled_areas
-from lightpen.estimation.bundle.effects import mechanics_of, prior_of
-from lightpen.estimation.bundle.linearised import N_CONE, BundleState, views_at
+from lightpen.estimation.bundle.linearised import N_CONE, BundleState
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.statistics.workers import Map
 from lightpen.estimation.uncertainty.budget import (
     POSTURES,
     ContributionName,
+    center_errors,
     drift_variance,
     seat_covariance,
 )
 from lightpen.messages import Message, message
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
+from lightpen.model.effective_tip import effective_tip
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.information import symmetric_root
-from lightpen.model.pen import Pen
+from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import rig_of
 
 SEED = 0
@@ -49,12 +49,8 @@ MIN_TRIALS = 20  # fewer give a standard deviation to worse than a sixth
 COVERED = 0.95
 BY_CHANCE = 3.0  # standard errors, largest difference of three axes by chance
 IMMATERIAL = 10.0  # percent of U: about half a unit of its only significant digit
-OF_OTHERS = {
-    ContributionName.DISTANCE,
-    ContributionName.EXTRINSICS,
-    ContributionName.LENS,
-    ContributionName.TIMING,
-}  # cones, cameras, or models of them; not drawn
+# Not drawn: other cameras, and of the lens only the errors of the centres.
+OF_OTHERS = {ContributionName.EXTRINSICS, ContributionName.LENS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +70,6 @@ class Trials:
     # (3 m, 3 m), of the moves of the cone in these modes, mm^2.
     move_covariance: FloatArray
     jitter: FloatArray  # (3, 3), covariance of the seat from image to image, mm^2
-    # (N, L, 2, k), derivative of the LEDs' images by the mechanics, px per mm or px.
-    mechanics: FloatArray
-    mechanics_covariance: FloatArray  # (k, k), of these unknowns by their priors
     edge_widths: FloatArray  # (N,), of the LEDs, px; NaN where no areas are known
     priors: Priors
     assumptions: Assumptions
@@ -130,16 +123,6 @@ def trials_of(calibration: Calibration) -> Trials:
     instrument, joint = calibration.instrument, calibration.joint
     bundle, pen = calibration.bundle, calibration.instrument.pen
     n_images = len(joint.rotations)
-    state = BundleState(
-        *(rig_of(instrument.camera), pen, joint.tip_pen, joint.cone_cam),
-        joint.rotations,
-    )
-    mechanics = mechanics_of(
-        views_at(state, np.zeros((n_images, 1, pen.n_leds, 2))),
-        *(joint.rotations, axes_of_cone(joint.rotations), pen.leds),
-        calibration.priors.compliance,
-    )
-    means = np.concatenate([each.mean for each in mechanics])
     basis, jitter = bundle.unknowns.basis, bundle.components.jitter
     leds = bundle.budget_components.leds
     led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
@@ -165,8 +148,6 @@ def trials_of(calibration: Calibration) -> Trials:
             if jitter.covariance is None
             else jitter.covariance
         ),
-        mechanics=np.concatenate([each.columns[:, 0] for each in mechanics], axis=-1),
-        mechanics_covariance=prior_of(mechanics) + np.outer(means, means),
         edge_widths=_edge_widths(calibration, n_images),
         priors=calibration.priors,
         assumptions=calibration.assumptions,
@@ -189,6 +170,7 @@ def run_monte_carlo(
     trials = trials_of(calibration)
     outcomes = in_workers(partial(run_trial, trials), range(n_trials), report)
     errors = [error for error in outcomes if error is not None]
+    drawn = np.diag(center_errors(calibration.bundle, float(calibration.used.sum())))
     if 2 * len(errors) < n_trials:
         raise CalibrationError(
             "monte-carlo.failed", n_failed=n_trials - len(errors), n_trials=n_trials
@@ -197,9 +179,12 @@ def run_monte_carlo(
         errors=np.array(errors),
         linear=np.sqrt(
             sum(
-                share.standard_uncertainty**2
-                for share in calibration.budget.shares
-                if share.name not in OF_OTHERS
+                (
+                    share.standard_uncertainty**2
+                    for share in calibration.budget.shares
+                    if share.name not in OF_OTHERS
+                ),
+                drawn[:3],
             )
         ),
         n_failed=n_trials - len(errors),
@@ -210,14 +195,14 @@ def run_trial(trials: Trials, number: int) -> FloatArray | None:
     """Return the error of the tip in one trial, (3,), mm; None if it fails."""
     rng = np.random.default_rng([SEED, number])
     levers = (trials.pen.leds - trials.tip_pen) @ np.swapaxes(trials.rotations, 1, 2)
+    moves = _drawn_moves(trials, rng)
     exact = ellipse_centers(
         trials.camera,
-        levers + (trials.cone_cam + _drawn_moves(trials, rng))[:, None],
+        levers + (trials.cone_cam + moves)[:, None],
         trials.pen.normals @ np.swapaxes(trials.rotations, 1, 2),
         trials.pen.diameter / 2,
     )
     errors = trials.sigma * rng.standard_normal(exact.shape) + _biases(trials, rng)
-    errors += trials.mechanics @ _drawn(trials.mechanics_covariance, rng)
     pixels = np.where(trials.seen[..., None], exact + errors, np.nan)
     areas = _drawn_areas(trials, rng)
     off = _drawn(trials.priors.cameras[0].covariance, rng)
@@ -228,7 +213,8 @@ def run_trial(trials: Trials, number: int) -> FloatArray | None:
         found = calibrate(camera, pen, seen, trials.assumptions)
     except CalibrationError:
         return None
-    return found.joint.tip_pen - trials.tip_pen
+    truth = trials.tip_pen + effective_tip(trials.rotations, moves)[:3]
+    return found.joint.tip_pen - truth
 
 
 def _edge_widths(calibration: Calibration, n_images: int) -> FloatArray:
@@ -292,9 +278,8 @@ def _observed(trials: Trials, pixels: FloatArray, areas: FloatArray) -> Observat
 def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
     pen, priors = trials.pen, trials.priors
     moves = _drawn(trials.led_covariance, rng)
-    middle = pen.leds.mean(axis=0)
-    scale = 1 + float(_drawn(priors.size_covariance, rng)[0])
-    leds = middle + scale * (pen.leds - middle) + moves.reshape(-1, 3)
+    scale = float(_drawn(priors.size_covariance, rng)[0])
+    leds = grown(pen, scale, trials.tip_pen).leds + moves.reshape(-1, 3)
     if priors.reading is not None:
         leds += priors.reading.shift * rng.standard_normal() * pen.normals
     diameter = pen.diameter + float(_drawn(priors.diameter.covariance, rng)[0])

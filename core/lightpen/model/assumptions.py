@@ -12,7 +12,7 @@ class Assumptions:
 
     Those of the camera are typical errors of the file of a lens that was mounted and
     focused again after its calibration. The others concern the station: temperature of
-    the pen, form of ball and cone, compliance.
+    the pen, form of ball and cone.
 
     Attributes
     ----------
@@ -48,9 +48,6 @@ class Assumptions:
     center_bias : float
         Standard uncertainty of the centre of an LED's image, px, by errors that do not
         average out: different in each posture, equal whenever the posture returns.
-    compliance : float
-        Standard uncertainty of the deflection of stylus, seat and stand, mm, divided by
-        the sine of the tilt.
     rotation, translation : float
         Standard uncertainty of the pose of a camera in its rig about and along each
         axis, rad and mm.
@@ -72,7 +69,6 @@ class Assumptions:
     diameter: float = 0.05
     form_error: float = 0.0002
     center_bias: float = 0.003
-    compliance: float = 0.004
     rotation: float = 0.02
     translation: float = 20.0
 

@@ -97,12 +97,11 @@ class Pen:
         )
 
 
-def grown(pen: Pen, growth: float) -> Pen:
-    """Return a pen scaled about the centroid of its LEDs by a relative growth."""
-    middle = pen.leds.mean(axis=0)
+def grown(pen: Pen, growth: float, about: FloatArray) -> Pen:
+    """Return a pen scaled by a relative growth about a point (3,), mm: its tip."""
     return replace(
         pen,
-        leds=middle + (1 + growth) * (pen.leds - middle),
+        leds=about + (1 + growth) * (pen.leds - about),
         diameter=(1 + growth) * pen.diameter,
     )
 

@@ -128,10 +128,6 @@
         <translation>测球和锥孔的形状误差</translation>
     </message>
     <message>
-        <source>Compliance of stylus, seat and stand</source>
-        <translation>测杆、锥座和支架的柔度</translation>
-    </message>
-    <message>
         <source>Systematic error of LED centres</source>
         <translation>LED 中心的系统误差</translation>
     </message>
@@ -6421,10 +6417,6 @@ mm</translation>
         <translation>实时数据流需要 pyigtl 软件包，但尚未安装。安装命令：pip install &quot;lightpen[stream]&quot;。</translation>
     </message>
     <message>
-        <source>Stylus, seat or stand yield with the tilt, by {size:.4f} mm at 90°; the result is corrected and U includes the rest. Press gently, use a stiffer stylus, and clamp the cone.</source>
-        <translation>探针、锥座或支架随倾斜变形，90° 时为 {size:.4f} mm；结果已修正，其余计入 U。请轻压、使用更刚的探针并夹紧锥孔。</translation>
-    </message>
-    <message>
         <source>Swing: max. U (k = 2)</source>
         <translation>摆动：U (k = 2) 上限</translation>
     </message>
@@ -6809,10 +6801,6 @@ mm</translation>
         <translation>直线度</translation>
     </message>
     <message>
-        <source>the compliance of stylus, seat and stand. Use a stiffer stylus, press gently, and clamp cone and camera</source>
-        <translation>探针、锥座和支架的柔度。请使用更刚的探针、轻压，并夹紧锥孔和相机</translation>
-    </message>
-    <message>
         <source>the covariance c11 to c66 has a direction without uncertainty, which is implausible. Correct or remove these columns.</source>
         <translation>协方差 c11 至 c66 有一个方向没有不确定度，这不合理。请更正或删除这些列。</translation>
     </message>
@@ -6847,10 +6835,6 @@ mm</translation>
     <message>
         <source>upwards</source>
         <translation>向上</translation>
-    </message>
-    <message>
-        <source>what is not simultaneous. Trigger all cameras by one signal, use a global shutter, and light all LEDs at once</source>
-        <translation>不同步的影响。请用同一信号触发所有相机、使用全局快门，并同时点亮所有 LED</translation>
     </message>
     <message>
         <source>x, y, z in mm, separated by tabs</source>
@@ -7439,6 +7423,10 @@ mm</translation>
     <message>
         <source>the file would be larger than allowed here. Write to another disk.</source>
         <translation>文件超过此处允许的大小。请写到其他磁盘。</translation>
+    </message>
+    <message>
+        <source>the lens, beyond its distortion model, and the systematic error of the LED centres. Calibrate the camera with views that fill the image, so that its file states the lens field, focus the lens, and illuminate the LEDs evenly</source>
+        <translation>镜头超出畸变模型的部分以及 LED 中心的系统误差。请以布满图像的视图标定相机，使其文件给出镜头残余场；对焦镜头，并使 LED 发光均匀</translation>
     </message>
     <message>
         <source>the name is a link that leads back to itself. Choose another name.</source>
@@ -8437,10 +8425,6 @@ mm</translation>
         <translation>大多数图像中 LED 宽度为 {width:.1f} px；至少需要 {needed:.0f} px。请将相机移近，或使用更长的焦距或更高分辨率的相机。</translation>
     </message>
     <message>
-        <source>The LEDs light one after the other, {time} apart; the result is corrected and U includes the rest. Light all LEDs at once, or hold the pen still for each image.</source>
-        <translation>LED 依次发光，间隔 {time}；结果已修正，其余部分计入 U。请同时点亮全部 LED，或在每次取图时保持光笔静止。</translation>
-    </message>
-    <message>
         <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
         <translation>本数据文件夹的档案不是其限值所属的档案。在从副本恢复档案之前，不接受任何结果。</translation>
     </message>
@@ -8745,10 +8729,6 @@ mm</translation>
         <translation>坐标系无法确定：LED 1-4 的连线与 LED 5-10 的平面和列不平行，或相距太近。</translation>
     </message>
     <message>
-        <source>The images are {time}; the result is corrected and U includes the rest. Trigger all cameras by one signal.</source>
-        <translation>图像{time}；结果已修正，其余部分计入 U。请用同一信号触发全部相机。</translation>
-    </message>
-    <message>
         <source>The images contradict the LED file: the standard deviation of its coordinates is {found:.4f} mm, stated {stated:.4f} mm. Measure the pen again, or check that the file belongs to this pen.</source>
         <translation>图像与 LED 文件矛盾：其坐标的标准差为 {found:.4f} mm，文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
     </message>
@@ -8863,10 +8843,6 @@ mm</translation>
     <message>
         <source>The password has {length} characters. Enter at least {needed}.</source>
         <translation>密码有 {length} 个字符。请至少输入 {needed} 个。</translation>
-    </message>
-    <message>
-        <source>The pen bends under its weight by {size:.4f} mm at its upper end when horizontal; the result is corrected and U includes the rest. Hold it near its middle, or stiffen it.</source>
-        <translation>光笔水平时其上端因自重弯曲 {size:.4f} mm；结果已修正，U 包含其余部分。请握住其中部附近，或提高其刚度。</translation>
     </message>
     <message>
         <source>The pen frame depends on LED {leds}: the tip is {by_file} mm by the LED file without it, {by_all} mm by all LEDs as they are. Result and U refer to the former. Measure with this result, which contains the LEDs as they are; to measure with the LED file, leave out LED {leds}.</source>
@@ -8993,10 +8969,6 @@ mm</translation>
         <translation>旋转矩阵似乎被转置：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，转置后为 {undone:.3g} mm。请按行给出 r11 至 r33，且旋转与平移均为 cam_from_pen。</translation>
     </message>
     <message>
-        <source>The rows of the images are read one after the other, over {time} (rolling shutter); the result is corrected and U includes the rest. Use a global shutter, or hold the pen still for each image.</source>
-        <translation>图像逐行读出，历时 {time}（卷帘快门）；结果已修正，其余部分计入 U。请使用全局快门，或在每次取图时保持光笔静止。</translation>
-    </message>
-    <message>
         <source>The same as {name}.</source>
         <translation>与 {name} 相同。</translation>
     </message>
@@ -9113,10 +9085,6 @@ mm</translation>
         <translation>测头偏离其标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，总计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头是否被更换、弯曲或重新安装，或属于另一支光笔？</translation>
     </message>
     <message>
-        <source>The tip jumps by {size:.4f} mm with the side of the tilt: the stylus is loose. The result is corrected and U includes the rest. Tighten the stylus and repeat the swing.</source>
-        <translation>测头随倾斜侧跳动 {size:.4f} mm：测杆松动。结果已修正，U 包含其余部分。请拧紧测杆并重新摆动。</translation>
-    </message>
-    <message>
         <source>The tip library {file} was modified or damaged after it was saved. Restore the file from a copy.</source>
         <translation>测头库 {file} 在保存后被更改或损坏。请从副本恢复该文件。</translation>
     </message>
@@ -9163,6 +9131,10 @@ mm</translation>
     <message>
         <source>The probed points of {name} come from both sides of the surface. Probe the feature again from one side.</source>
         <translation>{name} 的测点来自表面的两侧。请从一侧重新触测该要素。</translation>
+    </message>
+    <message>
+        <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
+        <translation>图像随光笔倾斜平移 {size:.3f} px（均方根）：相机随操作员移动而转动。结果已修正，其余部分计入 U。请将相机置于脚步不会影响的稳固支架上。</translation>
     </message>
     <message>
         <source>The probed points of {name} do not show on which side of the surface the ball was. State &apos;side: inside&apos; or &apos;side: outside&apos; in the plan.</source>
@@ -9641,10 +9613,6 @@ mm</translation>
         <translation>LED 文件。请更准确地测量 LED，并给出其不确定度</translation>
     </message>
     <message>
-        <source>the distance of the two cones. Measure it more accurately</source>
-        <translation>两个锥孔的间距。请更准确地测量</translation>
-    </message>
-    <message>
         <source>the extrinsics of the cameras. Calibrate the rig, and state the uncertainty</source>
         <translation>相机的外参。请标定相机组，并给出其不确定度</translation>
     </message>
@@ -9653,24 +9621,8 @@ mm</translation>
         <translation>测球与锥孔的形状误差。请换用更好的，并给出其形状误差</translation>
     </message>
     <message>
-        <source>the lens, beyond its distortion model. Calibrate the camera with views that fill the image; its file then states the lens field</source>
-        <translation>镜头畸变模型之外的残差。请用布满图像的视图标定相机；其文件将给出镜头残差场</translation>
-    </message>
-    <message>
-        <source>the scale of the LED file. Calibrate the LED coordinates against a better length standard and state the uncertainty, or swing in two cones at a known distance</source>
-        <translation>LED 文件的尺度。请用更准确的长度标准标定 LED 坐标并给出其不确定度，或在间距已知的两个锥孔中摆动</translation>
-    </message>
-    <message>
         <source>the scatter of the poses and its correlation from pose to pose</source>
         <translation>位姿的散布，以及相邻位姿之间的相关性</translation>
-    </message>
-    <message>
-        <source>the systematic error of the LED centres. Focus the lens, illuminate the LEDs evenly, and state the remaining error</source>
-        <translation>LED 中心的系统误差。请对焦镜头，使 LED 发光均匀，并给出剩余误差</translation>
-    </message>
-    <message>
-        <source>the temperature of the pen. State its thermal expansion in the LED file, and measure its temperature during the swing</source>
-        <translation>光笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
     </message>
     <message>
         <source>tip library file</source>
@@ -9927,10 +9879,6 @@ mm</translation>
     <message>
         <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.</source>
         <translation>漂移参考点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未夹紧，或相机未预热。其间测量的点有同样大小的误差。</translation>
-    </message>
-    <message>
-        <source>The image shifts by {size:.3f} px with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
-        <translation>图像随光笔倾斜移动 {size:.3f} px：相机随操作员移动而转动。结果已修正，其余计入 U。请将相机放在脚步不会使其移动的稳固支架上。</translation>
     </message>
     <message>
         <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen, or measure the pen again.</source>
@@ -10621,8 +10569,8 @@ mm</translation>
         <translation>图像噪声</translation>
     </message>
     <message>
-        <source>LED centres, systematic</source>
-        <translation>LED 中心的系统误差</translation>
+        <source>Lens and LED centres</source>
+        <translation>镜头与 LED 中心</translation>
     </message>
     <message>
         <source>Seating of the tip in the cone</source>
@@ -10635,10 +10583,6 @@ mm</translation>
     <message>
         <source>LED positions of the LED file</source>
         <translation>LED 文件中的 LED 位置</translation>
-    </message>
-    <message>
-        <source>Scale of the LED file</source>
-        <translation>LED 文件的尺度</translation>
     </message>
     <message>
         <source>Pen temperature</source>
@@ -10873,10 +10817,6 @@ mm</translation>
         <translation>锥孔与相机的漂移</translation>
     </message>
     <message>
-        <source>Distance of the cones</source>
-        <translation>锥孔间距</translation>
-    </message>
-    <message>
         <source>Diameter of the LED discs</source>
         <translation>LED 发光面直径</translation>
     </message>
@@ -10887,34 +10827,6 @@ mm</translation>
     <message>
         <source>Two-stage method, difference from the joint fit</source>
         <translation>两步法，与联合拟合之差</translation>
-    </message>
-    <message>
-        <source>Lens beyond its distortion model</source>
-        <translation>镜头畸变模型之外的残差</translation>
-    </message>
-    <message>
-        <source>Compliance of stylus, seat and stand</source>
-        <translation>测杆、锥座和支架的柔度</translation>
-    </message>
-    <message>
-        <source>Loose stylus</source>
-        <translation>测杆松动</translation>
-    </message>
-    <message>
-        <source>Sag of the pen</source>
-        <translation>光笔下垂</translation>
-    </message>
-    <message>
-        <source>Tilt of the camera with the pen</source>
-        <translation>相机随光笔的倾斜</translation>
-    </message>
-    <message>
-        <source>Images not of the same moment</source>
-        <translation>图像不是同一时刻</translation>
-    </message>
-    <message>
-        <source>Effects too uncertain to be fitted</source>
-        <translation>尚不确定而未拟合的影响</translation>
     </message>
     <message>
         <source>joint adjustment of all images</source>
@@ -11096,10 +11008,6 @@ mm</translation>
         <translation>已就位</translation>
     </message>
     <message>
-        <source>centres</source>
-        <translation>中心</translation>
-    </message>
-    <message>
         <source>Tilt right</source>
         <translation>向右倾斜</translation>
     </message>
@@ -11196,20 +11104,12 @@ mm</translation>
         <translation>噪声</translation>
     </message>
     <message>
-        <source>cone distance</source>
-        <translation>锥孔间距</translation>
-    </message>
-    <message>
         <source>drift</source>
         <translation>漂移</translation>
     </message>
     <message>
         <source>LEDs</source>
         <translation>LED</translation>
-    </message>
-    <message>
-        <source>scale</source>
-        <translation>尺度</translation>
     </message>
     <message>
         <source>camera</source>
@@ -11344,10 +11244,6 @@ mm</translation>
         <translation>球与锥孔形状</translation>
     </message>
     <message>
-        <source>temperature</source>
-        <translation>温度</translation>
-    </message>
-    <message>
         <source>seating</source>
         <translation>就位</translation>
     </message>
@@ -11362,30 +11258,6 @@ mm</translation>
     <message>
         <source>lens</source>
         <translation>镜头</translation>
-    </message>
-    <message>
-        <source>compliance</source>
-        <translation>柔度</translation>
-    </message>
-    <message>
-        <source>loose stylus</source>
-        <translation>测杆松动</translation>
-    </message>
-    <message>
-        <source>sag</source>
-        <translation>下垂</translation>
-    </message>
-    <message>
-        <source>camera tilt</source>
-        <translation>相机倾斜</translation>
-    </message>
-    <message>
-        <source>timing</source>
-        <translation>时间同步</translation>
-    </message>
-    <message>
-        <source>unmodelled effects</source>
-        <translation>未建模影响</translation>
     </message>
     <message>
         <source>No image received from the camera yet.</source>

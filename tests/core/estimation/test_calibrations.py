@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.small_records import entries_of
-from tests.simulated_calibrations import SWINGS
+from tests.simulated_calibrations import SWINGS, true_tip
 
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.monte_carlo import run_trial, trials_of
@@ -18,7 +18,7 @@ from lightpen.estimation.uncertainty.prediction import predict_uncertainty
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.swings import PAPER_TIP, paper_pen
+from lightpen.simulator.swings import paper_pen
 
 FILE = InputFile(Path("file"), 64 * "0")
 INPUTS = Inputs(FILE, FILE, (FILE,), paper_pen().nominal_tip)
@@ -50,7 +50,7 @@ def calibrated() -> Calibrated:
 @pytest.mark.parametrize("name", AS_STATED)
 def test_u_covers_the_error_of_the_tip(name: str, calibrated: Calibrated) -> None:
     found = calibrated(name)
-    error = np.abs(found.joint.tip_pen - PAPER_TIP)
+    error = np.abs(found.joint.tip_pen - true_tip(name))
 
     # One in twenty may lie beyond U, by half of it one in four hundred.
     assert (error < 1.5 * found.budget.expanded_uncertainty[:3]).all()
@@ -106,18 +106,12 @@ def test_record_and_text_have_the_second_cone(calibrated: Calibrated) -> None:
     assert f"18 images used, {second.distance:.4f} mm from the first" in text_of(found)
 
 
-def test_record_and_text_have_the_noisy_led_and_the_effects(
-    calibrated: Calibrated,
-) -> None:
+def test_the_record_has_the_noisy_led(calibrated: Calibrated) -> None:
     found = calibrated("uneven")
     (led_noise,) = [
         each for each in recorded(found)["warnings"] if each["code"].endswith("-noise")
     ]
     assert led_noise["values"]["led"] == 4
-
-    effects = recorded(found)["adjusted"]["effects"]
-    assert [each["size"] for each in effects] == [each.size for each in found.effects]
-    assert effects
 
 
 def test_the_text_names_images_left_out_of_each_camera(calibrated: Calibrated) -> None:

@@ -1,13 +1,10 @@
-"""The whole adjustment: contradicted priors, correlated noise and shrinkage.
+"""The whole adjustment: fields of the images, contradicted files, correlated noise.
 
 Where a camera file states no uncertainty, the prior assumed in its place must allow for
 a bad file. Where the images do not show the file to be off, its values are better than
 an estimate from one swing. So the estimate uses the assumed prior shrunk to the
-deviation that the images show (empirical Bayes); its uncertainty follows from the
-unshrunk prior, and the shift of the estimate by shrinkage is a separate contribution.
-
-Likewise mechanics of usual size have their prior in the uncertainty; the estimate
-follows them where chance alone seldom makes them so much likelier than perfect ones.
+deviation that the images show (empirical Bayes). Its uncertainty counts what single
+numbers of the file may be off all the same, as far as the images leave it open.
 """
 
 from dataclasses import dataclass, replace
@@ -17,8 +14,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
-from lightpen.estimation.bundle.component_search import find_components
-from lightpen.estimation.bundle.components import NO_COMPONENTS
 from lightpen.estimation.bundle.consistency_findings import (
     ContradictedInputs,
     Contradiction,
@@ -26,24 +21,17 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_contradicted_inputs,
     find_pen_contradictions,
 )
-from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
-from lightpen.estimation.bundle.effects import (
-    Effect,
-    gain_of,
-    is_supported,
-    mechanics_of,
-    prior_of,
-)
+from lightpen.estimation.bundle.field_search import SearchedField, search_fields
 from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
-from lightpen.estimation.bundle.linearised import BundleState, views_at
+from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.noise_correlation import (
     Correlation,
     measure_correlation,
 )
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
+from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.statistics.variance_components import ALLOWED, find_component
-from lightpen.model.information import inverse, symmetric_root
+from lightpen.model.information import EXACT, inverse
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
 MAX_RELEASES = 8  # rounds in which contradicted numbers are sought
@@ -56,37 +44,21 @@ MOST_SHRUNK = 0.01  # of an assumed standard deviation
 class Adjustment:
     """An adjustment of tip, cone and all parameters of the files."""
 
-    # Estimate, with assumed camera priors shrunk and without unlikely mechanics.
-    bundle: Bundle
-    unshrunk: Bundle  # the same with the priors as assumed
-    whole: Bundle  # the same with all mechanics; its covariance is the uncertainty
-    priors: Priors  # priors of ``unshrunk`` with contradicted numbers released
+    bundle: Bundle  # with assumed camera priors shrunk
+    priors: Priors  # as stated or assumed, with contradicted numbers released
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
-    # Lens and timing; candidates are unknowns of all three bundles.
-    effects: tuple[SearchedEffect, ...]
-
-    def shift_from(self, other: Bundle) -> FloatArray:
-        """Return the change of (tip_pen, cone_rig) from another fit, (6,), mm."""
-        one, there = self.bundle.state, other.state
-        return np.concatenate(
-            [one.tip_pen - there.tip_pen, one.cone_rig - there.cone_rig]
-        )
+    fields: tuple[SearchedField, ...]  # those that are not fitted
 
 
 @dataclass(frozen=True, eq=False)
 class _ConsistentFit:
-    """A fit with contradicted parameters released from their priors.
-
-    Of the candidates, unlikely mechanics are held at 0.
-    """
+    """A fit with contradicted parameters released from their priors."""
 
     bundle: Bundle
     correlation: Correlation
     priors: Priors
     contradictions: tuple[Contradiction, ...]
-    effects: tuple[SearchedEffect, ...]
-    candidates: tuple[Effect, ...]
 
 
 def adjust(
@@ -117,40 +89,29 @@ def adjust(
     """
     modes = seat_modes_of(state.rotations, shifts)
     fit = partial(fit_bundle, pixels, state, modes=modes, places=places)
-
-    def consistent_fit(inflation: float) -> _ConsistentFit:
-        return _fit_consistent(
-            partial(fit, inflation=inflation), pixels, state, priors, sigmas
-        )
-
     inflation = 1.0
-    fitted = consistent_fit(inflation)
+    fitted = _fit_consistent(partial(fit, inflation=1.0), pixels, state, priors, sigmas)
     if fitted.correlation.factor > RELATED:
         # Correlated noise contradicts a file by chance more often.
         inflation = fitted.correlation.factor
-        fitted = consistent_fit(inflation)
-    bundle = unshrunk = whole = fitted.bundle
-    correlation, same = fitted.correlation, bundle.unknowns
-    again = partial(fit, inflation=inflation, noise=same.noise)
-    if fitted.candidates != same.effects:
-        whole = (
-            with_effects(bundle, fitted.candidates)
-            if correlation.components is None
-            else again(fitted.priors, effects=fitted.candidates)
-        )
-        correlation = measure_correlation(whole, pixels)
+        again = partial(fit, inflation=inflation)
+        fitted = _fit_consistent(again, pixels, state, priors, sigmas)
+    bundle, correlation = fitted.bundle, fitted.correlation
     shrunk = shrunk_priors(bundle, fitted.priors)
     if shrunk is not fitted.priors:
-        bundle = again(shrunk, effects=same.effects)
-    components = correlation.components
-    if components is not None:
-        bundle = replace(bundle, budget_components=components)
-        unshrunk = replace(unshrunk, budget_components=components)
-        whole = replace(whole, budget_components=components)
-    return Adjustment(
-        *(bundle, unshrunk, whole, fitted.priors, fitted.contradictions),
-        *(correlation, fitted.effects),
-    )
+        same = bundle.unknowns
+        bundle = fit(
+            shrunk,
+            inflation=inflation,
+            fields=same.fields,
+            noise=same.noise,
+            begin=bundle,
+        )
+        correlation = measure_correlation(bundle, pixels)
+    fields = search_fields(bundle, pixels)
+    if correlation.components is not None:
+        bundle = replace(bundle, budget_components=correlation.components)
+    return Adjustment(bundle, fitted.priors, fitted.contradictions, correlation, fields)
 
 
 def _fit_consistent(
@@ -161,52 +122,46 @@ def _fit_consistent(
     sigmas: FloatArray | None,
 ) -> _ConsistentFit:
     """Fit again and again, with contradicted numbers released, until none is left."""
-    rig, rotations = state.rig, state.rotations
-    candidates = mechanics_of(
-        views_at(state, pixels),
-        rotations,
-        axes_of_cone(rotations),
-        state.pen.leds,
-        priors.compliance,
-    )
-    held = tuple(each.at_zero for each in candidates)
-    bundle = fit(priors, effects=held)
+    rig = state.rig
+    bundle = fit(priors)
     of_centers = None
     if sigmas is not None:
         of_centers = find_center_noise(bundle.residuals, bundle.used, sigmas)
     if of_centers is not None:
         fit = partial(fit, noise=of_centers)
-        bundle = fit(priors, effects=held)
-    whole = with_effects(bundle, candidates)
-    effects = search_effects(whole, pixels, bundle.values)
-    found = tuple(each.effect for each in effects if each.is_candidate)
-    if found:
-        candidates += found
-        bundle = fit(priors, effects=held + found)
-        whole = with_effects(bundle, candidates)
-    likely = likely_effects(whole)
-    fit = partial(fit, effects=likely)
-    if likely != bundle.unknowns.effects:
-        bundle = fit(priors)
+        bundle = fit(priors, begin=bundle)
+    found = search_fields(bundle, pixels)
+    fields = tuple(each.field for each in found if each.component.sigma > 0)
+    if fields:
+        fit = partial(fit, fields=fields)
+        bundle = fit(priors, begin=bundle)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
+    of_pen: tuple[Contradiction, ...] = ()
+    if priors.separation is not None:  # which tells the scale, and must not be blamed
+        of_pen, priors = find_pen_contradictions(
+            state.pen, bundle, priors, correlation.excess
+        )
+        if of_pen:
+            bundle = fit(priors, begin=bundle)
+            correlation = measure_correlation(bundle, pixels)
     inputs = ContradictedInputs(priors)
     for _ in range(MAX_RELEASES):
         now = find_contradicted_inputs(rig, bundle, priors, correlation.excess, inputs)
         if now.numbers == inputs.numbers:
             break
-        inputs, bundle = now, fit(now.priors)
+        inputs, bundle = now, fit(now.priors, begin=bundle)
         correlation = measure_correlation(bundle, pixels)
     of_files = contradictions_of(rig, bundle, priors, correlation.excess, inputs)
-    of_pen, released = find_pen_contradictions(
-        state.pen, bundle, inputs.priors, correlation.excess
-    )
-    if of_pen:
-        bundle = fit(released)
-        correlation = measure_correlation(bundle, pixels)
-    return _ConsistentFit(
-        *(bundle, correlation, released, of_files + of_pen, effects, candidates)
-    )
+    released = inputs.priors
+    if not of_pen:
+        of_pen, released = find_pen_contradictions(
+            state.pen, bundle, released, correlation.excess
+        )
+        if of_pen:
+            bundle = fit(released, begin=bundle)
+            correlation = measure_correlation(bundle, pixels)
+    return _ConsistentFit(bundle, correlation, released, of_files + of_pen)
 
 
 def _with_led_noise(
@@ -227,68 +182,16 @@ def _with_led_noise(
         if noise is None or np.abs(noise / weights - 1).max() < NOISE_SETTLED:
             break
         weights, fit = noise, partial(fit, noise=known * noise)
-        bundle = fit(priors)
+        bundle = fit(priors, begin=bundle)
     return fit, bundle
-
-
-def with_effects(bundle: Bundle, effects: tuple[Effect, ...]) -> Bundle:
-    """Return a fit with other priors of its effects, by one linear step.
-
-    The residuals of the fit are kept.
-    """
-    unknowns = replace(bundle.unknowns, effects=effects)
-    information, right = bundle.information + bundle.measured_information, bundle.right
-    # Again, as other components may have absorbed the effects.
-    components = NO_COMPONENTS._replace(jitter=bundle.components.jitter)
-    components = components.with_no_effects(effects)
-    components = find_components(unknowns, information, right, components)
-    prior = unknowns.prior_information(components)
-    covariance = inverse(information + prior)
-    values = covariance @ (right + unknowns.prior_right(components))
-    return replace(
-        bundle,
-        unknowns=unknowns,
-        state=unknowns.moved(bundle.state, values, np.zeros(3)),
-        values=values,
-        components=components,
-        budget_components=components,
-        prior_information=prior,
-        covariance=covariance,
-    )
-
-
-def likely_effects(bundle: Bundle) -> tuple[Effect, ...]:
-    """Return the effects of a fit, mechanics held at 0 if the images deny them.
-
-    An effect that they support on its own stays.
-    """
-    effects, places = bundle.unknowns.effects, bundle.layout.effects
-    of_mechanics = [
-        (effect, place)
-        for effect, place, found in zip(
-            effects, places, bundle.components.effects, strict=True
-        )
-        if effect.is_mechanical and not (effect.is_exact or found.is_supported)
-    ]
-    if not of_mechanics:
-        return effects
-    chosen, slices = zip(*of_mechanics, strict=True)
-    at = np.concatenate([np.arange(place.start, place.stop) for place in slices])
-    known = inverse(bundle.covariance[np.ix_(at, at)])
-    S = known - bundle.prior_information[np.ix_(at, at)]
-    right = known @ bundle.values[at]
-    right -= bundle.unknowns.prior_right(bundle.components)[at]
-    means = np.concatenate([effect.mean for effect in chosen])
-    if is_supported(gain_of(S, right, prior_of(chosen), means)):
-        return effects
-    return tuple(effect.at_zero if effect in chosen else effect for effect in effects)
 
 
 def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:
     """Return priors with assumed intrinsics shrunk to the observed deviations.
 
     The standard deviation of the intrinsics in units of the assumed one is found by
-    restricted maximum likelihood, equation (5) of method.md.
+    restricted maximum likelihood, equation (5) of method.md. What a file may be off
+    beyond it is kept for the uncertainty.
     """
     cameras = list(priors.cameras)
     for c, place in enumerate(bundle.layout.cameras):
@@ -297,12 +200,31 @@ def shrunk_priors(bundle: Bundle, priors: Priors) -> Priors:
         known = inverse(bundle.covariance[place, place])
         own = known - bundle.prior_information[place, place]
         right = known @ bundle.values[place]
-        root = symmetric_root(cameras[c].covariance)
-        found = find_component(root @ own @ root, root @ right)
+        root = np.linalg.cholesky(cameras[c].covariance + EXACT**2 * np.eye(len(own)))
+        S, b = root.T @ own @ root, root.T @ right
+        found = find_component(S, b)
         ratio = max(found.sigma if found.exceeds(ALLOWED) else 0.0, MOST_SHRUNK)
         if ratio < 1:
-            shrunk = ratio**2 * cameras[c].covariance
-            cameras[c] = replace(cameras[c], covariance=shrunk)
+            expected = np.diag(_expected_squares(S, b, ratio))
+            cameras[c] = replace(
+                cameras[c],
+                covariance=ratio**2 * cameras[c].covariance,
+                beyond=root @ expected @ root.T,
+            )
     if all(new is old for new, old in zip(cameras, priors.cameras, strict=True)):
         return priors
     return replace(priors, cameras=tuple(cameras))
+
+
+def _expected_squares(S: FloatArray, right: FloatArray, ratio: float) -> FloatArray:
+    """Return the expected squares of k unknowns beyond a shrunk prior, (k,).
+
+    Each by itself is 0, or as large as was assumed, with even odds before the images;
+    ``S`` (k, k) and ``right`` (k,) are these, in units of the assumed deviations.
+    """
+    shrunk = inverse(np.eye(len(S)) + ratio**2 * S)
+    seen, right = np.diag(S @ shrunk), shrunk.T @ right
+    left = 1 / (1 + seen)
+    means = left * right
+    odds = np.sqrt(left) * np.exp(np.minimum(0.5 * means * right, 50.0))
+    return np.asarray(odds / (1 + odds) * (left + means**2))

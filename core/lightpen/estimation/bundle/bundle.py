@@ -28,7 +28,7 @@ from lightpen.detection.robust_residuals import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS, Components
-from lightpen.estimation.bundle.effects import Effect, EffectName
+from lightpen.estimation.bundle.image_fields import FieldName, ImageField
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -81,6 +81,30 @@ class Bundle:
     covariance: FloatArray  # (p, p), P of equation (14), images taken as independent
 
     @cached_property
+    def effective(self) -> FloatArray:
+        """The effective (tip_pen, cone_rig) by the unknowns, (6, p)."""
+        return self.unknowns.effective(self.state.rotations)
+
+    @cached_property
+    def gain(self) -> FloatArray:
+        """The effective (tip_pen, cone_rig) by the right side, (6, p)."""
+        return np.asarray(self.effective @ self.covariance)
+
+    @property
+    def tip_pen(self) -> FloatArray:
+        """Effective tip, (3,), mm."""
+        return np.asarray(self.state.tip_pen + self._followed[:3])
+
+    @property
+    def cone_rig(self) -> FloatArray:
+        """Centre of the ball that goes with it, (3,), mm."""
+        return np.asarray(self.state.cone_rig + self._followed[3:])
+
+    @property
+    def _followed(self) -> FloatArray:
+        return np.asarray(self.effective[:, 6:] @ self.values[6:])
+
+    @cached_property
     def budget_prior(self) -> FloatArray:
         """Prior information with the components of the budget, (p, p)."""
         if self.budget_components is self.components:
@@ -91,13 +115,17 @@ class Bundle:
     def right(self) -> FloatArray:
         """Right side of images and measurements, without priors, (p,)."""
         known = self.information + self.measured_information + self.prior_information
-        by_priors = self.unknowns.prior_right(self.components)
-        return np.asarray(known @ self.values - by_priors)
+        return np.asarray(known @ self.values - self.unknowns.prior_right())
 
     @property
     def layout(self) -> ParameterLayout:
         """Layout of ``values`` and of every matrix."""
         return self.unknowns.layout
+
+    @property
+    def scale(self) -> float:
+        """Scale of the pen in the swing against its file, relative."""
+        return float(self.values[self.layout.scale][0])
 
     @property
     def led_corrections(self) -> FloatArray:
@@ -116,16 +144,16 @@ class Bundle:
         return float(apart.max())
 
     @property
-    def effect_shifts(self) -> FloatArray:
-        """Fitted shift of each LED's image by effects, (N, C, L, 2), px."""
+    def field_shifts(self) -> FloatArray:
+        """Fitted shift of each LED's image by fields, (N, C, L, 2), px."""
         sizes = self.values[self.layout.extrinsics.stop : self.layout.diameter.start]
-        return np.asarray(self.unknowns.effect_columns @ sizes)
+        return np.asarray(self.unknowns.field_columns @ sizes)
 
     def lens_shifts(self, camera: int) -> FloatArray | None:
         """Return the lens field fitted at each LED, (N, L, 2), px; None if none."""
-        for effect, at in zip(self.unknowns.effects, self.layout.effects, strict=True):
-            if (effect.name, effect.camera) == (EffectName.LENS, camera):
-                return np.asarray(effect.columns[:, camera] @ self.values[at])
+        for field, at in zip(self.unknowns.fields, self.layout.fields, strict=True):
+            if (field.name, field.camera) == (FieldName.LENS, camera):
+                return np.asarray(field.columns[:, camera] @ self.values[at])
         return None
 
     @property
@@ -151,13 +179,12 @@ class Bundle:
 
         Of equation (17): fitted with one variance, budgeted with another.
         """
-        gain = self.covariance[:6, at] @ self.prior_information[at, at]
+        gain = self.gain[:, at] @ self.prior_information[at, at]
         return np.asarray(gain @ inverse(self.budget_prior[at, at]) @ gain.T)
 
     def propagated(self, information: FloatArray) -> FloatArray:
         """Return P I P of tip and cone, (6, 6), mm^2, of a part I of N + L + M."""
-        gain = self.covariance[:6]
-        return np.asarray(gain @ information @ gain.T)
+        return np.asarray(self.gain @ information @ self.gain.T)
 
     @property
     def independent_noise(self) -> FloatArray:
@@ -173,8 +200,9 @@ def fit_bundle(
     modes: SeatModes,
     inflation: float,
     places: FloatArray | None = None,
-    effects: tuple[Effect, ...] = (),
+    fields: tuple[ImageField, ...] = (),
     noise: FloatArray | None = None,
+    begin: Bundle | None = None,
 ) -> Bundle:
     """Fit tip, cone and the parameters of the files to the LED centres.
 
@@ -190,13 +218,19 @@ def fit_bundle(
         Factor on the variance of the noise beside the priors, for correlated noise.
     places : (6 (C - 1),) array, optional
         Start of the extrinsics less those of the rig file; 0 unless given.
-    effects : tuple of Effect
+    fields : tuple of ImageField
         To be fitted.
     noise : (C, L) or (N, C, L) array, optional
         Noise of the LEDs' centres, by that of a usual one.
+    begin : Bundle, optional
+        Another solution for these images, from which the iteration begins.
     """
-    unknowns = Unknowns.of(start, priors, modes, effects, noise)
-    now = _started(unknowns, start, pixels, places)
+    unknowns = Unknowns.of(start, priors, modes, fields, noise)
+    now = (
+        _started(unknowns, start, pixels, places)
+        if begin is None
+        else _begun(unknowns, begin, pixels)
+    )
     last = np.zeros(2 * N_CONE)
     for n_pass in range(MAX_PASSES):
         weight_sigma = max(now.sigma * float(np.sqrt(inflation)), FINEST)
@@ -240,7 +274,7 @@ class _Linearised(NamedTuple):
     sigma: float
 
 
-class _Solved(NamedTuple):
+class Solved(NamedTuple):
     """The linear solution about a state: matrices as of `Bundle`."""
 
     eliminated: Eliminated
@@ -253,6 +287,22 @@ class _Solved(NamedTuple):
     residuals: FloatArray
     components: Components
     sigma: float
+
+
+def with_fields(
+    bundle: Bundle, fields: tuple[ImageField, ...], pixels: FloatArray
+) -> tuple[Unknowns, Solved]:
+    """Return the linear solution about a fit with other fields, and its unknowns.
+
+    Components are estimated anew, as those of the fit may have absorbed a field;
+    ``pixels`` (N, C, L, 2) as fitted, px.
+    """
+    unknowns = bundle.unknowns.with_fields(fields)
+    now = _begun(unknowns, bundle, pixels)
+    jitter = bundle.components.jitter
+    components = NO_COMPONENTS._replace(jitter=jitter).with_no_fields(fields)
+    now = now._replace(components=components)
+    return unknowns, _solve(unknowns, now, bundle.weight_sigma, with_components=True)
 
 
 def _started(
@@ -270,13 +320,25 @@ def _started(
     residuals = np.stack([view.residuals for view in views], axis=1)
     used = inliers(_together(residuals)).reshape(residuals.shape[:-1])
     sigma = robust_sigma(_together(residuals), N_TURN)
-    components = NO_COMPONENTS.with_no_effects(unknowns.effects)
+    components = NO_COMPONENTS.with_no_fields(unknowns.fields)
     return _Linearised(state, values, views, used, components, sigma)
+
+
+def _begun(unknowns: Unknowns, begin: Bundle, pixels: FloatArray) -> _Linearised:
+    """Linearise the images about another solution."""
+    values, at, of = np.zeros(unknowns.number), unknowns.layout, begin.layout
+    for kind in ("extrinsics", "diameter", "scale", "leds", "between"):
+        values[getattr(at, kind)] = begin.values[getattr(of, kind)]
+    for place, known in zip(at.cameras, of.cameras, strict=True):
+        values[place] = begin.values[known]
+    views = unknowns.views_at(begin.state, pixels)
+    components = begin.components.with_no_fields(unknowns.fields)
+    return _Linearised(begin.state, values, views, begin.used, components, begin.sigma)
 
 
 def _solve(
     unknowns: Unknowns, now: _Linearised, weight_sigma: float, with_components: bool
-) -> _Solved:
+) -> Solved:
     """Solve the normal equations about a state, with new components if requested."""
     components, used = now.components, now.used
     jitter = components.jitter.covariance
@@ -290,7 +352,7 @@ def _solve(
         )
     prior = unknowns.prior_information(components)
     covariance = inverse(information + prior + measured)
-    values = covariance @ (right + unknowns.prior_right(components))
+    values = covariance @ (right + unknowns.prior_right())
     step, shifts = unknowns.step(values - now.values)
     own = _follow(eliminated, step, shifts)
     residuals = _left_over(now.views, step, shifts, own)
@@ -299,7 +361,7 @@ def _solve(
     squares = np.where(used[..., None], residuals, 0.0) ** 2
     n_free = max(2 * int(used.sum()) - n_fitted, 1.0)
     sigma = max(float(np.sqrt(squares.sum() / n_free)), NOISE_FLOOR)
-    return _Solved(
+    return Solved(
         eliminated,
         information,
         prior,
@@ -314,7 +376,7 @@ def _solve(
 
 
 def _jitter_beside(
-    unknowns: Unknowns, now: _Linearised, solved: _Solved, weight_sigma: float
+    unknowns: Unknowns, now: _Linearised, solved: Solved, weight_sigma: float
 ) -> RandomEffect:
     """Estimate the jitter of the seat about a solution."""
     without = solved.eliminated
@@ -329,7 +391,7 @@ def _jitter_beside(
 def _held_by_state(unknowns: Unknowns, values: FloatArray) -> FloatArray:
     """Return the values that the state contains."""
     at, held = unknowns.layout, values.copy()
-    for kind in (at.tip, at.cone, *at.effects, *at.seat, at.drift):
+    for kind in (at.tip, at.cone, *at.fields, *at.seat, at.drift):
         held[kind] = 0.0
     return held
 
@@ -338,7 +400,7 @@ def _bundle_of(
     unknowns: Unknowns,
     state: BundleState,
     used: BoolArray,
-    solved: _Solved,
+    solved: Solved,
     weight_sigma: float,
 ) -> Bundle:
     jitter, eliminated = solved.components.jitter, solved.eliminated
@@ -406,8 +468,8 @@ def _left_over(
     cone = step[:N_CONE] + shifts
     if unknown.shape[1] > N_TURN:
         cone = cone + unknown[:, N_TURN:]
-    n_effects = views[0].effects.shape[-1]
-    by_effects = step[-3 * n_leds - 1 - n_effects : -3 * n_leds - 1]
+    n_fields = views[0].fields.shape[-1]
+    by_fields = step[-3 * n_leds - 1 - n_fields : -3 * n_leds - 1]
     row, left = N_CONE, []
     for view in views:
         own = step[row : row + view.own.shape[-1]]
@@ -417,7 +479,7 @@ def _left_over(
             - np.einsum("nlik,nk->nli", view.turn, unknown[:, :N_TURN])
             - np.einsum("nlik,nk->nli", view.cone, cone)
             - view.own @ own
-            - view.effects @ by_effects
+            - view.fields @ by_fields
             - view.diameter * by_diameter
             - np.einsum("nlik,lk->nli", view.led, by_led)
         )

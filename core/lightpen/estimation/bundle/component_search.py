@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NO_COMPONENTS, NONE, Components
-from lightpen.estimation.bundle.effects import Effect, EffectComponent, size_of
+from lightpen.estimation.bundle.image_fields import FieldComponent, size_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.statistics.variance_components import (
     FITTED,
@@ -40,7 +40,7 @@ def _found_once(
 ) -> Components:
     at, prior = unknowns.layout, unknowns.prior_information(before)
     covariance = inverse(information + prior)
-    by_priors = unknowns.prior_right(before)
+    by_priors = unknowns.prior_right()
     values = covariance @ (right + by_priors)
 
     def own(place: slice) -> tuple[FloatArray, FloatArray]:
@@ -56,18 +56,18 @@ def _found_once(
         seat=seat,
         oval=oval,
         drift=_likely(find(at.drift)),
-        effects=tuple(
-            _likely_effect(effect, size_of(effect, *own(place)))
-            for effect, place in zip(unknowns.effects, at.effects, strict=True)
+        fields=tuple(
+            _likely_field(size_of(field, *own(place)))
+            for field, place in zip(unknowns.fields, at.fields, strict=True)
         ),
     )
 
 
-def _likely_effect(effect: Effect, found: EffectComponent) -> EffectComponent:
-    """Return the component if the images support more than the stated size; else it."""
-    if found.is_supported and found.sigma > effect.stated:
+def _likely_field(found: FieldComponent) -> FieldComponent:
+    """Return the component of a field, held at 0 unless the images support it."""
+    if found.is_supported:
         return found
-    return found._replace(sigma=effect.stated, covariance=effect.prior)
+    return found._replace(sigma=0.0, covariance=0.0 * found.covariance)
 
 
 def _found_seat(

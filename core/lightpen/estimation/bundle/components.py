@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.estimation.bundle.effects import Effect, EffectComponent, held
+from lightpen.estimation.bundle.image_fields import FieldComponent, ImageField, held
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.statistics.variance_components import Component, RandomEffect
 
@@ -19,20 +19,20 @@ class Components(NamedTuple):
     oval: Component  # of the two coefficients of an oval seat, see `oval_seat`, mm
     drift: Component  # of the cone over the whole range of each drift mode, mm
     jitter: RandomEffect  # seating from image to image
-    effects: tuple[EffectComponent, ...] = ()  # fitted ones
+    fields: tuple[FieldComponent, ...] = ()  # fitted ones
 
     @property
     def sigmas(self) -> list[float]:
         """Standard deviations by which the unknowns are fitted, mm."""
-        found: list[Component | EffectComponent] = [self.leds, *self.seat, self.oval]
-        found += [self.drift, *self.effects]
+        found: list[Component | FieldComponent] = [self.leds, *self.seat, self.oval]
+        found += [self.drift, *self.fields]
         jitter = self.jitter.covariance
         by_axis = [] if jitter is None else np.sqrt(np.diag(jitter)).tolist()
         return [*(each.sigma for each in found), *by_axis]
 
-    def with_no_effects(self, effects: tuple[Effect, ...]) -> "Components":
-        """Return these with the effects held at 0."""
-        return self._replace(effects=tuple(held(effect) for effect in effects))
+    def with_no_fields(self, fields: tuple[ImageField, ...]) -> "Components":
+        """Return these with the fields held at 0, or as stated."""
+        return self._replace(fields=tuple(held(field) for field in fields))
 
 
 NO_COMPONENTS = Components(

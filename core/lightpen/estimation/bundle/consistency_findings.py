@@ -179,9 +179,13 @@ def find_pen_contradictions(
     at, one = bundle.layout, np.ones(1)
 
     def tested(
-        statement: FileNumber, place: slice, stated: FloatArray, prior: Prior
+        statement: FileNumber,
+        place: slice,
+        stated: FloatArray,
+        prior: Prior,
+        mean: float = 0.0,
     ) -> tuple[list[Contradiction], Prior]:
-        fit = FileFit.of([statement], stated, bundle, place, excess)
+        fit = FileFit.of([statement], stated, bundle, place, excess, mean)
         found = _contradictions(fit, fit.contradicted)
         if any(each.estimated_uncertainty > VAGUE * each.stated for each in found):
             return [], prior
@@ -198,6 +202,7 @@ def find_pen_contradictions(
         at.scale,
         priors.size_covariance,
         priors.scale,
+        priors.growth,
     )
     found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
     return found, replace(priors, diameter=diameter, scale=scale)

@@ -80,11 +80,13 @@ class FileFit:
         bundle: Bundle,
         place: slice,
         excess: FloatArray | None,
+        mean: float = 0.0,
     ) -> "FileFit":
         """Return prior and likelihood of the unknowns at a place of a fit.
 
         ``stated`` (k, k) is the prior covariance, ``excess`` (p, p) that of
-        `lightpen.estimation.bundle.noise_correlation.Correlation`.
+        `lightpen.estimation.bundle.noise_correlation.Correlation`; deviations are from
+        the prior's ``mean``.
         """
         known = inverse(bundle.covariance[place, place])
         by_excess = np.zeros_like(known) if excess is None else excess[place, place]
@@ -92,7 +94,7 @@ class FileFit:
             numbers=tuple(numbers),
             stated=inverse(known_by(stated)),
             information=known - bundle.prior_information[place, place],
-            right=known @ bundle.values[place],
+            right=known @ (bundle.values[place] - mean),
             correlation_excess=known @ by_excess @ known,
         )
 

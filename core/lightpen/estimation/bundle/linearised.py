@@ -67,8 +67,8 @@ class CameraView:
     # (N, L, 2, k), derivative by the intrinsics and, unless the camera is the first of
     # the rig, by its rotation and translation in the rig.
     own: FloatArray
-    # (N, L, 2, E), by the unknowns of `lightpen.estimation.bundle.effects`.
-    effects: FloatArray
+    # (N, L, 2, E), by the unknowns of `lightpen.estimation.bundle.image_fields`.
+    fields: FloatArray
     diameter: FloatArray  # (N, L, 2), by the disc diameter
 
     def in_units_of(self, noise: FloatArray) -> "CameraView":
@@ -82,27 +82,27 @@ class CameraView:
             cone=self.cone / by_three,
             led=self.led / by_three,
             own=self.own / by_three,
-            effects=self.effects / by_three,
+            fields=self.fields / by_three,
             diameter=self.diameter / by_two,
         )
 
 
 def views_at(
-    state: BundleState, pixels: FloatArray, effects: FloatArray | None = None
+    state: BundleState, pixels: FloatArray, fields: FloatArray | None = None
 ) -> tuple[CameraView, ...]:
     """Linearise the images ``pixels`` (N, C, L, 2), px, of each camera about a state.
 
-    ``effects`` (N, C, L, 2, E) are columns of effects.
+    ``fields`` (N, C, L, 2, E) are columns of fields.
     """
-    if effects is None:
-        effects = np.zeros((*pixels.shape, 0))
+    if fields is None:
+        fields = np.zeros((*pixels.shape, 0))
     return tuple(
-        _view(state, c, pixels[:, c], effects[:, c]) for c in range(state.rig.n_cameras)
+        _view(state, c, pixels[:, c], fields[:, c]) for c in range(state.rig.n_cameras)
     )
 
 
 def _view(
-    state: BundleState, c: int, pixels: FloatArray, effects: FloatArray
+    state: BundleState, c: int, pixels: FloatArray, fields: FloatArray
 ) -> CameraView:
     rig, pen = state.rig, state.pen
     camera, R_c, t_c = rig.cameras[c], rig.rotations[c], rig.translations[c]
@@ -124,7 +124,7 @@ def _view(
         cone=by_point @ R_c,
         led=by_point @ (R_c @ state.rotations)[:, None],
         own=own,
-        effects=effects,
+        fields=fields,
         diameter=2 / pen.diameter * offset,
     )
 
@@ -133,7 +133,7 @@ def _view(
 class NormalEquations:
     """Normal equations of the images of a swing, in units of the noise.
 
-    Columns: cone (3), each camera's own, effects (E), diameter, LEDs (3 L).
+    Columns: cone (3), each camera's own, fields (E), diameter, LEDs (3 L).
     """
 
     N: FloatArray  # (K, K)
@@ -173,9 +173,9 @@ def eliminate(
     """
     n_images, _, n_leds = used.shape
     sizes = [view.own.shape[-1] for view in views]
-    n_effects = views[0].effects.shape[-1]
-    K = N_CONE + sum(sizes) + n_effects + 1 + 3 * n_leds
-    at_effects, at_leds = K - 3 * n_leds - 1 - n_effects, K - 3 * n_leds
+    n_fields = views[0].fields.shape[-1]
+    K = N_CONE + sum(sizes) + n_fields + 1 + 3 * n_leds
+    at_fields, at_leds = K - 3 * n_leds - 1 - n_fields, K - 3 * n_leds
     N, b = np.zeros((K, K)), np.zeros(K)
     q = N_TURN if jitter is None else N_TURN + N_CONE
     inner = np.zeros((n_images, q, q))
@@ -188,7 +188,7 @@ def eliminate(
         k = sizes[c]
         J = np.concatenate(
             [
-                *(view.turn, view.cone, view.own, view.effects),
+                *(view.turn, view.cone, view.own, view.fields),
                 *(view.diameter[..., None], view.led),
             ],
             axis=3,
@@ -196,9 +196,9 @@ def eliminate(
         mask = used[:, c, :, None]
         J = np.where(mask[..., None], J, 0.0) / sigma
         r = np.where(mask, view.residuals, 0.0) / sigma
-        shared = np.r_[0:N_CONE, own_start : own_start + k, at_effects:at_leds]
+        shared = np.r_[0:N_CONE, own_start : own_start + k, at_fields:at_leds]
         own_start += k
-        n = N_TURN + N_CONE + k + n_effects + 1  # columns that all LEDs share
+        n = N_TURN + N_CONE + k + n_fields + 1  # columns that all LEDs share
         rows = J[..., :n].reshape(n_images, 2 * n_leds, n)
         H = np.swapaxes(rows, 1, 2) @ rows
         g = (r.reshape(n_images, 1, -1) @ rows)[:, 0]

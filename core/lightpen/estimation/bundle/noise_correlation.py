@@ -103,7 +103,7 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     for i in np.flatnonzero(likely > NEGLIGIBLE).tolist():
         products = summed_products(through, TRIED[i])
         of_values += likely[i] * models[i].variance * products
-    noise = of_values[:6, :6]
+    noise = bundle.effective @ of_values @ bundle.effective.T
     as_weighed = bundle.information - bundle.jitter_information
     excess = of_values - bundle.covariance @ as_weighed @ bundle.covariance
     factor = float(np.trace(np.linalg.solve(independent, noise))) / 6
@@ -145,7 +145,7 @@ def _noise_model(
     """Find variance and components for one coefficient, starting from the given."""
     unknowns, at = bundle.unknowns, bundle.layout
     current = bundle.values.copy()
-    for kind in (at.tip, at.cone, *at.effects, *at.seat, at.drift):
+    for kind in (at.tip, at.cone, *at.fields, *at.seat, at.drift):
         current[kind] = 0.0
     right = each.gradient + each.information @ current
     floor = (NOISE_FLOOR / bundle.weight_sigma) ** 2
@@ -156,7 +156,7 @@ def _noise_model(
         components = find_components(unknowns, information, both, components)
         prior = unknowns.prior_information(components)
         covariance = inverse(information + prior)
-        by_priors = unknowns.prior_right(components)
+        by_priors = unknowns.prior_right()
         values = covariance @ (both + by_priors)
         change = values - current
         left = each.squares - 2 * float(change @ each.gradient)

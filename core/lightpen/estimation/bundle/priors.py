@@ -25,6 +25,8 @@ class Prior:
 
     covariance: FloatArray  # (k, k), of their deviation from what the file says
     assumed: bool  # whether the file states none
+    # (k, k), of what it may be off beyond this covariance; None if it cannot.
+    beyond: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,7 @@ class Priors:
     form_error: float  # standard deviation of the seat along each axis in each mode, mm
     # Standard deviation of errors of a centre that repeat with the posture, px
     center_bias: float
-    # Standard deviation by yielding of stylus, seat or stand, mm per sine of the tilt.
-    compliance: float = 0.0
+    growth: float = 0.0  # thermal growth of the pen against its file, relative
     # (3 L, 3 L), of all LED coordinates, mm^2; None: only ``led_sigma`` is known.
     led_covariance: FloatArray | None = None
     reading: DiameterReading | None = None  # disc diameter from the image areas
@@ -80,7 +81,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
         led_sigma=pen.led_sigma,
         form_error=assumptions.form_error,
         center_bias=assumptions.center_bias,
-        compliance=assumptions.compliance,
+        growth=thermal_growth(pen, assumptions),
         led_covariance=pen.led_covariance,
     )
 

@@ -150,8 +150,8 @@ def rows_of(
     n_images, _, n_leds = used.shape
     mixing = unknowns.mixing
     by_leds = mixing[-3 * n_leds :].reshape(n_leds, 3, -1)
-    n_effects = views[0].effects.shape[-1]
-    at_effects = slice(-3 * n_leds - 1 - n_effects, -3 * n_leds - 1)
+    n_fields = views[0].fields.shape[-1]
+    at_fields = slice(-3 * n_leds - 1 - n_fields, -3 * n_leds - 1)
     row, turns, cones, common = N_CONE, [], [], []
     for c, view in enumerate(views):
         k = view.own.shape[-1]
@@ -159,7 +159,7 @@ def rows_of(
             np.einsum("nlik,lkp->nlip", view.led, by_leds, optimize=True)
             + view.cone @ mixing[:N_CONE]
             + view.own @ mixing[row : row + k]
-            + view.effects @ mixing[at_effects]
+            + view.fields @ mixing[at_fields]
             + view.diameter[..., None] * mixing[-3 * n_leds - 1]
         )
         row += k

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NONE, Components
-from lightpen.estimation.bundle.effects import Effect
+from lightpen.estimation.bundle.image_fields import ImageField
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -23,6 +23,7 @@ from lightpen.estimation.bundle.linearised import (
 )
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, SeatModes
+from lightpen.model.effective_tip import effective_tip
 from lightpen.model.information import EXACT, inverse, known_by
 from lightpen.model.rigid import rotation_from_vector, skew
 
@@ -34,7 +35,7 @@ class ParameterLayout(NamedTuple):
     cone: slice
     cameras: tuple[slice, ...]
     extrinsics: slice
-    effects: tuple[slice, ...]
+    fields: tuple[slice, ...]
     diameter: slice
     scale: slice
     leds: slice
@@ -61,9 +62,10 @@ class Unknowns:
     forms: FloatArray
     oval: FloatArray  # (21, 2), moves in the seat modes by an oval seat
     basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs without moves of the whole pen
-    scaling: FloatArray  # (3 L,), move of the LEDs by a scale of 1
+    scaling: FloatArray  # (3 L,), move of the LEDs about the tip by a scale of 1
     priors: Priors
-    effects: tuple[Effect, ...]  # the fitted ones
+    modes: SeatModes
+    fields: tuple[ImageField, ...]  # the fitted ones
     noise: FloatArray  # (N, C, L), noise of each LED centre relative to a usual one
 
     @classmethod
@@ -72,7 +74,7 @@ class Unknowns:
         start: BundleState,
         priors: Priors,
         given: SeatModes,
-        effects: tuple[Effect, ...] = (),
+        fields: tuple[ImageField, ...] = (),
         noise: FloatArray | None = None,
     ) -> "Unknowns":
         """Return the unknowns of a fit that starts there."""
@@ -93,7 +95,7 @@ class Unknowns:
             cone=following(3),
             cameras=tuple(map(following, sizes)),
             extrinsics=following(n_extrinsics),
-            effects=tuple(following(effect.number) for effect in effects),
+            fields=tuple(following(field.number) for field in fields),
             diameter=following(1),
             scale=following(1),
             leds=following(basis.shape[1]),
@@ -101,9 +103,9 @@ class Unknowns:
             drift=following(3 * given.drift.shape[1]),
             between=following(0 if start.at_second is None else 3),
         )
-        scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
-        n_effects = sum(effect.number for effect in effects)
-        K = N_CONE + sum(sizes) + n_extrinsics + n_effects + 1 + 3 * n_leds
+        scaling = (pen.leds - start.tip_pen).ravel()
+        n_fields = sum(field.number for field in fields)
+        K = N_CONE + sum(sizes) + n_extrinsics + n_fields + 1 + 3 * n_leds
         mixing = np.zeros((K, layout.leds.stop))
         at_leds = slice(K - 3 * n_leds, K)
         mixing[at_leds, layout.tip] = -np.tile(np.eye(3), (n_leds, 1))
@@ -116,34 +118,54 @@ class Unknowns:
                 place = layout.extrinsics.start + 6 * (c - 1)
                 mixing[row : row + 6, place : place + 6] = np.eye(6)
                 row += 6
-        first = layout.diameter.start - n_effects
-        mixing[row : row + n_effects, first : layout.diameter.start] = np.eye(n_effects)
-        mixing[row + n_effects, layout.diameter] = 1.0
+        first = layout.diameter.start - n_fields
+        mixing[row : row + n_fields, first : layout.diameter.start] = np.eye(n_fields)
+        mixing[row + n_fields, layout.diameter] = 1.0
         mixing[at_leds, layout.scale.start] = scaling
         mixing[at_leds, layout.leds] = basis
         second = () if start.at_second is None else (start.at_second.astype(float),)
         forms = np.column_stack([given.lean, given.drift, *second])
         return cls(
             *(layout, start, mixing, forms, given.oval, basis, scaling, priors),
-            effects,
+            *(given, fields),
             np.broadcast_to(
                 1.0 if noise is None else noise,
                 (len(start.rotations), rig.n_cameras, n_leds),
             ),
         )
 
+    def with_fields(self, fields: tuple[ImageField, ...]) -> "Unknowns":
+        """Return the unknowns with other fields."""
+        return Unknowns.of(self.start, self.priors, self.modes, fields, self.noise)
+
     def views_at(
         self, state: BundleState, pixels: FloatArray
     ) -> tuple[CameraView, ...]:
         """Linearise the images about a state, each LED in units of its noise."""
-        views = views_at(state, pixels, self.effect_columns)
+        views = views_at(state, pixels, self.field_columns)
         return tuple(view.in_units_of(self.noise[:, c]) for c, view in enumerate(views))
 
     @property
-    def effect_columns(self) -> FloatArray:
-        """Columns of all effects, (N, C, L, 2, E)."""
+    def field_columns(self) -> FloatArray:
+        """Columns of all fields, (N, C, L, 2, E)."""
         none = np.zeros((*self.noise.shape, 2, 0))
-        return np.concatenate([none, *(each.columns for each in self.effects)], axis=-1)
+        return np.concatenate([none, *(each.columns for each in self.fields)], axis=-1)
+
+    def effective(self, rotations: FloatArray) -> FloatArray:
+        """Return the effective tip and cone by the unknowns, (6, p).
+
+        Moves of the ball by seat and drift move them as in `effective_tip`; rotations
+        (N, 3, 3) are rig_from_pen. Of two cones, the first counts.
+        """
+        at, second = self.layout, self.start.at_second
+        first = np.ones(len(rotations), dtype=bool) if second is None else ~second
+        forms = self.forms[first, : (at.drift.stop - at.seat[0].start) // N_CONE]
+        moves = np.einsum("nm,ij->nimj", forms, np.eye(N_CONE))
+        effective = np.eye(6, self.number)
+        effective[:, at.seat[0].start : at.drift.stop] = effective_tip(
+            rotations[first], moves.reshape(len(forms), N_CONE, -1)
+        )
+        return effective
 
     @property
     def number(self) -> int:
@@ -195,14 +217,8 @@ class Unknowns:
         ):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
-        for place, effect, found in zip(
-            at.effects, self.effects, components.effects, strict=True
-        ):
-            prior[place, place] = (
-                effect.prior_information
-                if found.covariance is effect.prior
-                else known_by(found.covariance)
-            )
+        for place, found in zip(at.fields, components.fields, strict=True):
+            prior[place, place] = known_by(found.covariance)
         variances, oval = self.seat_variances(components), components.oval.sigma
         prior[at.whole_seat, at.whole_seat] = (
             inverse(np.diag(variances) + oval**2 * self.oval @ self.oval.T)
@@ -215,14 +231,13 @@ class Unknowns:
             prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior
 
-    def prior_right(self, components: Components) -> FloatArray:
-        """Return the right side by the means of the priors, (p,)."""
-        right = np.zeros(self.number)
-        for place, effect, found in zip(
-            self.layout.effects, self.effects, components.effects, strict=True
-        ):
-            if found.covariance is effect.prior:
-                right[place] = effect.prior_information @ effect.mean
+    def prior_right(self) -> FloatArray:
+        """Return the right side by the means of the priors, (p,).
+
+        Only the scale has one: the thermal growth of the pen against its file.
+        """
+        right, at = np.zeros(self.number), self.layout.scale
+        right[at] = self._of_files[at, at] @ [self.priors.growth]
         return right
 
     @cached_property
@@ -281,7 +296,8 @@ class Unknowns:
             for camera, place in zip(rig.cameras, at.cameras, strict=True)
         )
         places = np.concatenate([np.zeros(6), values[at.extrinsics]]).reshape(-1, 6)
-        leds = self.basis @ values[at.leds] + self.scaling * values[at.scale]
+        tip = now.tip_pen + values[at.tip]
+        leds = start.pen.leds + (self.basis @ values[at.leds]).reshape(-1, 3)
         between = start.between_rig
         if now.at_second is not None:
             between = between + values[at.between]
@@ -295,10 +311,10 @@ class Unknowns:
             ),
             pen=replace(
                 start.pen,
-                leds=start.pen.leds + leds.reshape(-1, 3),
+                leds=leds + values[at.scale] * (leds - tip),
                 diameter=start.pen.diameter + float(values[at.diameter][0]),
             ),
-            tip_pen=now.tip_pen + values[at.tip],
+            tip_pen=tip,
             cone_rig=now.cone_rig + values[at.cone],
             rotations=rotation_from_vector(turns) @ now.rotations,
             between_rig=between,

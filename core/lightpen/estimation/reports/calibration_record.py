@@ -12,7 +12,7 @@ from typing import Annotated, TypeAlias
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from lightpen.detection.reasons import Reason
-from lightpen.estimation.bundle.effects import EffectName
+from lightpen.estimation.bundle.image_fields import FieldName
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.json_records import FileRecord, ProgramName
@@ -131,25 +131,15 @@ class UncertaintyRecord(Struct, frozen=True):
 
     shares: tuple[ContributionRecord, ...]
     noise_mm: Triple | None
-    led_centres_mm: Triple | None
     seat_mm: Triple | None
     ball_and_cone_mm: Triple | None
     drift_mm: Triple | None
     led_geometry_mm: Triple | None
-    pen_scale_mm: Triple | None
-    temperature_mm: Triple | None
-    cone_distance_mm: Triple | None
     disc_diameter_mm: Triple | None
     camera_mm: Triple | None
     rig_mm: Triple | None
     method_mm: Triple | None
     lens_mm: Triple | None
-    compliance_mm: Triple | None
-    loose_stylus_mm: Triple | None
-    sag_mm: Triple | None
-    camera_tilt_mm: Triple | None
-    timing_mm: Triple | None
-    not_followed_mm: Triple | None
     independent_noise_mm: Triple | None
     blocks_mm: Triple | None
     block_ratio: Number
@@ -189,24 +179,20 @@ class ContradictionRecord(Struct, frozen=True, omit_defaults=True):
     camera: str = ""
 
 
-class EffectRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """An effect of the station that the images support.
+class ImageFieldRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """A shift of the images of a camera beside its model, which these support.
 
     Attributes
     ----------
-    size
-        Standard deviation of the effect, or its value if it has one unknown: in mm, of
-        lens and camera tilt in px, of timing in image intervals.
-    standard_uncertainty
-        Of the value, if it has one unknown.
+    size_px
+        Root mean square.
     gain
-        Twice the logarithm of the likelihood ratio of this effect to no effect.
+        Twice the logarithm of the likelihood ratio of this shift to none.
     """
 
-    name: EffectName
+    name: FieldName
     camera: str = ""
-    size: Number
-    standard_uncertainty: Number | None = None
+    size_px: Number
     gain: Number
 
 
@@ -222,7 +208,7 @@ class AdjustmentRecord(Struct, frozen=True):
     disc_diameter_mm: Number
     disc_diameter_by_areas_mm: Estimate | None
     contradictions: tuple[ContradictionRecord, ...]
-    effects: tuple[EffectRecord, ...]
+    image_fields: tuple[ImageFieldRecord, ...]
 
 
 class TipFramesRecord(Struct, frozen=True):
@@ -438,8 +424,8 @@ class SecondConeRecord(Struct, frozen=True, omit_defaults=True):
     stated_distance_mm: Number
     stated_standard_uncertainty_mm: Number
     distance_mm: Number
-    expanded_uncertainty_without_mm: Triple
-    expanded_uncertainty_with_mm: Triple
+    pen_scale: Number
+    pen_scale_expanded_uncertainty: Number
     frames: tuple[FrameRecord, ...] = ()
 
 

@@ -20,10 +20,10 @@ from lightpen.estimation.reports.calibration_record import (
     Convergence,
     CoverageRecord,
     DirectionRecord,
-    EffectRecord,
     Estimate,
     FrameRecord,
     ImageCounts,
+    ImageFieldRecord,
     InputsRecord,
     InstrumentRecord,
     LampRecord,
@@ -232,15 +232,14 @@ def _adjusted(calibration: Calibration) -> AdjustmentRecord:
             )
             for each in calibration.contradictions
         ),
-        effects=tuple(
-            EffectRecord(
+        image_fields=tuple(
+            ImageFieldRecord(
                 name=each.name,
                 camera=each.camera,
-                size=plain(each.size),
-                standard_uncertainty=plain(each.sigma),
+                size_px=plain(each.size),
                 gain=plain(each.gain),
             )
-            for each in calibration.effects
+            for each in calibration.fields
         ),
     )
 
@@ -271,8 +270,8 @@ def _second_cone(second: SecondCone | None) -> SecondConeRecord | None:
         stated_distance_mm=plain(second.separation.distance),
         stated_standard_uncertainty_mm=plain(second.separation.sigma),
         distance_mm=plain(second.distance),
-        expanded_uncertainty_without_mm=plain(second.uncertainty_without),
-        expanded_uncertainty_with_mm=plain(second.uncertainty_with),
+        pen_scale=plain(1 + second.scale),
+        pen_scale_expanded_uncertainty=plain(second.scale_uncertainty),
         frames=tuple(_frames_of(second)),
     )
 

@@ -7,7 +7,6 @@ import numpy as np
 from lightpen.detection.reasons import Reason
 from lightpen.detection.small_spots import LARGEST_RADIUS
 from lightpen.estimation.bundle.disc_diameter import SMALL_DOME_DEPTH, modelled_areas
-from lightpen.estimation.bundle.effects import EffectName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.calibrate import Calibration
@@ -43,7 +42,7 @@ def warnings_of(calibration: Calibration) -> list[Message]:
         *(each.message for each in calibration.contradictions),
         *lamp_warnings(calibration),
         *_seat_warnings(calibration),
-        *(each.message for each in calibration.effects if each.is_certain),
+        *(each.message for each in calibration.fields if each.is_certain),
         *_copy_warnings(calibration),
         *([message("warning.own-images")] if calibration.shares_images else []),
         *_noise_warnings(calibration),
@@ -159,18 +158,15 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
 
 
 def late_cameras(calibration: Calibration) -> list[Message]:
-    """Return warnings on cameras with a time lag that is not corrected."""
+    """Return warnings on cameras with a time lag."""
     names = calibration.bundle.state.rig.names[1:]
     interval_ms = calibration.observations.interval_ms
-    corrected = [
-        each.camera for each in calibration.effects if each.name is EffectName.DELAY
-    ]
     return [
         message(
             Code.NOT_SIMULTANEOUS, camera=name, lag=lateness(lag.value, interval_ms)
         )
         for name, lag in zip(names, calibration.lags, strict=True)
-        if lag is not None and lag.is_noticeable and name not in corrected
+        if lag is not None and lag.is_noticeable
     ]
 
 

@@ -198,8 +198,8 @@ def _pen_lines(calibration: Calibration) -> list[str]:
             f"Second cone  {second.n_used} images used, {second.distance:.4f} mm from "
             f"the first; certified {second.separation.distance:.4f} mm, U = "
             f"{COVERAGE_FACTOR * second.separation.sigma:.4f} mm",
-            _numbers("  U without the distance", second.uncertainty_without),
-            _numbers("  U with it", second.uncertainty_with),
+            f"  Scale      of the LED file by this distance {1 + second.scale:.6f}, "
+            f"U = {second.scale_uncertainty:.6f}",
         ]
     return lines
 

@@ -15,7 +15,6 @@ from lightpen.estimation.reports.methods import reported, two_stage_difference
 from lightpen.estimation.reports.report_warnings import late_cameras
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
-    POSTURES,
     ContributionName,
     SplitHalfCheck,
 )
@@ -104,18 +103,12 @@ class Verdict:
 
 # Causes of a large U, each with the remedy.
 _CAUSES = {
-    ContributionName.CENTERS: (message("share.centers"), NextStep.SEE_TO_CAUSE),
     ContributionName.LEDS: (message("share.leds"), NextStep.CHECK_LEDS),
-    ContributionName.SCALE: (message("share.scale"), NextStep.CHECK_LEDS),
     ContributionName.FORM: (message("share.form"), NextStep.SEE_TO_CAUSE),
-    ContributionName.TEMPERATURE: (message("share.temperature"), NextStep.SEE_TO_CAUSE),
-    ContributionName.DISTANCE: (message("share.distance"), NextStep.SEE_TO_CAUSE),
     ContributionName.DIAMETER: (message("share.diameter"), NextStep.CHECK_LEDS),
     ContributionName.CAMERA: (message("share.camera"), NextStep.CHECK_CAMERA),
     ContributionName.EXTRINSICS: (message("share.rig"), NextStep.CHECK_RIG),
     ContributionName.LENS: (message("share.lens"), NextStep.CHECK_CAMERA),
-    ContributionName.COMPLIANCE: (message("share.compliance"), NextStep.SEE_TO_CAUSE),
-    ContributionName.TIMING: (message("share.timing"), NextStep.CHECK_FILES),
 }
 # By the value that a reason names, as its code alone is ambiguous.
 _BY_CAUSE = {
@@ -271,10 +264,7 @@ def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
             distance=float(np.linalg.norm(two_stage_difference(calibration)[:3])),
             bias=float(np.linalg.norm(calibration.projection_bias[:3])),
         )
-    is_same_in_more = (
-        largest.name is ContributionName.CENTERS and calibration.used.sum() >= POSTURES
-    )
-    if largest.name in IMAGES_SHRINK and not is_same_in_more:
+    if largest.name in IMAGES_SHRINK:
         return message(Code.UNCERTAIN, uncertainty=uncertainty, limit=limit)
     share, sigma = budget.weakest_share(largest), calibration.led_sigma
     if largest.name is ContributionName.LEDS and sigma > DISPLACED:

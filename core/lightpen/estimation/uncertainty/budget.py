@@ -6,21 +6,22 @@ have the covariance P = (N + L + M)^-1, equation (14). `contributions_of` propag
 each source of error through P and adds up the covariances of (tip, cone), as the GUM
 [2]_ combines independent components:
 
-=================  ========  =========================================================
-contribution       equation  source
-=================  ========  =========================================================
-noise              (15)      image noise, enlarged where it is correlated or scatters
-led centres        (18)      errors of centres that repeat with the posture
-seat               (15-17)   jitter, and waves beyond the form error
-ball and cone      (17)      form error, assumed
-drift              (17)      of cone against camera
-led geometry       (17)      errors of the LED file
-pen scale, temperature, cone distance, disc diameter, camera, rig
-                   (16)      prior or measurement of each
-lens, compliance, loose stylus, sag, camera tilt, timing
-                   (17)      effects of the station (`effects`)
-not followed       (19)      shift of the estimate by shrinkage of assumed priors
-=================  ========  =========================================================
+================  ========  ==========================================================
+contribution      equation  source
+================  ========  ==========================================================
+noise             (15)      image noise, enlarged where it is correlated or scatters
+seat              (15-17)   jitter, and waves beyond the form error
+ball and cone     (17)      form error, assumed
+drift             (17)      of cone against camera
+led geometry      (17)      errors of the LED file: coordinates, normals, domes
+disc diameter     (16)      prior or measurement
+camera            (16-17)   prior of the intrinsics; a camera that turns with the lean
+lens              (17-18)   field of the lens; centres off alike in every posture
+rig               (16)      prior of the extrinsics
+================  ========  ==========================================================
+
+Each is the error of the effective tip (`Bundle.effective`), in the scale of the LED
+file: scale and temperature of the pen act when the tip measures.
 
 Sizes of random effects are estimated from the images. One that is not significant is
 not fitted, but budgeted by its expected variance, equation (6). U = 2 sqrt(diag C) with
@@ -47,11 +48,10 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import Adjustment
 from lightpen.estimation.bundle.bundle import Bundle
-from lightpen.estimation.bundle.effect_search import SearchedEffect
-from lightpen.estimation.bundle.effects import MECHANICS, EffectName
+from lightpen.estimation.bundle.field_search import SearchedField
+from lightpen.estimation.bundle.image_fields import FieldName
 from lightpen.estimation.bundle.linearised import N_CONE
-from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, axes_of_cone
+from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.disc_normals import (
@@ -65,10 +65,6 @@ MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
 BY_CHANCE = 0.01  # probability that independent noise scatters blocks as much
 POSTURES = 30  # number with independent errors of the centres
-# A seat mode of one wave is hardly observable beside the tip. Along the cone it is
-# budgeted with this share of the other modes' deviation, as a ball or cone that is not
-# round moves the tip sideways, and little up and down. `./run bench files` shows both.
-ALONG = 0.4
 NEGLIGIBLE = 1e-5  # mm, of a standard uncertainty
 
 
@@ -76,49 +72,18 @@ class ContributionName(StrEnum):
     """Source of uncertainty of a tip."""
 
     NOISE = "noise"
-    CENTERS = "led centres"  # errors that repeat with the posture
     SEAT = "seat"
     FORM = "ball and cone"
     DRIFT = "drift"
     LEDS = "led geometry"
-    SCALE = "pen scale"
-    TEMPERATURE = "temperature"
-    DISTANCE = "cone distance"
     DIAMETER = "disc diameter"
     CAMERA = "camera"
-    EXTRINSICS = "rig"
     METHOD = "method"  # its difference from the joint fit
     LENS = "lens"
-    COMPLIANCE = "compliance"
-    LOOSE = "loose stylus"
-    SAG = "sag"
-    TILT = "camera tilt"
-    TIMING = "timing"
-    SHRINKAGE = "not followed"  # assumed priors beyond the shrunk ones
+    EXTRINSICS = "rig"
 
 
-SHARES_OF_EFFECTS = {
-    EffectName.LENS: ContributionName.LENS,
-    EffectName.COMPLIANCE: ContributionName.COMPLIANCE,
-    EffectName.LOOSE: ContributionName.LOOSE,
-    EffectName.SAG: ContributionName.SAG,
-    EffectName.TILT: ContributionName.TILT,
-    EffectName.DELAY: ContributionName.TIMING,
-    EffectName.SHUTTER: ContributionName.TIMING,
-    EffectName.STROBE: ContributionName.TIMING,
-}
-ASSUMED_EFFECTS = {SHARES_OF_EFFECTS[name] for name in MECHANICS}
-IMAGES_SHRINK = (
-    ContributionName.NOISE,
-    ContributionName.CENTERS,
-    ContributionName.SEAT,
-    ContributionName.DRIFT,
-    ContributionName.SHRINKAGE,
-    ContributionName.LOOSE,
-    ContributionName.SAG,
-    ContributionName.TILT,
-    ContributionName.TIMING,
-)
+IMAGES_SHRINK = ContributionName.NOISE, ContributionName.SEAT, ContributionName.DRIFT
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,19 +163,13 @@ class SplitHalfCheck:
 
 def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
     """Make the budget of an adjustment; ``joint`` is the joint fit at its estimate."""
-    bundle, correlation = adjustment.whole, adjustment.correlation
-    blocks, ratio, blocks_count = _block_scatter(joint, adjustment.bundle)
+    bundle, correlation = adjustment.bundle, adjustment.correlation
+    blocks, ratio, blocks_count = _block_scatter(joint, bundle)
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     n_images = int(bundle.used.any(axis=(1, 2)).sum())
     return Budget(
         shares=contributions_of(
-            bundle,
-            adjustment.priors,
-            n_images,
-            noise=raised * correlation.noise,
-            shift=adjustment.shift_from(bundle),
-            effects=adjustment.effects,
-            estimate=adjustment.bundle,
+            bundle, n_images, raised * correlation.noise, adjustment.fields
         ),
         independent_noise=bundle.independent_noise,
         blocks=blocks,
@@ -222,71 +181,44 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
 
 def contributions_of(
     bundle: Bundle,
-    priors: Priors,
     n_images: float,
     noise: FloatArray,
-    shift: FloatArray,
-    effects: Sequence[SearchedEffect] = (),
-    estimate: Bundle | None = None,
+    fields: Sequence[SearchedField] = (),
 ) -> tuple[UncertaintyContribution, ...]:
-    """Return the contributions to the covariance of (tip, cone), equations (15)-(19).
+    """Return the contributions to the covariance of (tip, cone), equations (15)-(18).
 
     Parameters
     ----------
-    bundle : Bundle
-        Adjustment with unshrunk priors and all mechanics.
     n_images : float
         Images that take part.
     noise : (6, 6) array
         Covariance by image noise, mm^2.
-    shift : (6,) array
-        Of the estimate from that adjustment, mm.
-    effects : sequence of SearchedEffect
-        Beside the fit.
-    estimate : Bundle, optional
-        Adjustment with shrunk priors, moved by errors of the centres that repeat; the
-        other unless given.
+    fields : sequence of SearchedField
+        That are not fitted.
     """
-    at, estimate = bundle.layout, estimate or bundle
+    at, priors = bundle.layout, bundle.unknowns.priors
     jitter = bundle.propagated(bundle.jitter_information + bundle.insignificant_jitter)
     moved, by_form = _of_seat(bundle, priors.form_error)
     drift = bundle.component_contribution(at.drift)
     drift *= drift_variance(bundle) / _prior_variance(bundle, at.drift)
-    # Equation (18): errors of the centres, independent from posture to posture.
-    biased = max(n_images / POSTURES, 1.0) * estimate.independent_noise
-    biased *= (priors.center_bias / estimate.sigma) ** 2
-    if priors.reading is not None:
-        along_normals = priors.reading.shift * _by_shift_along_normals(estimate)
-        biased += np.outer(along_normals, along_normals)
-    of_turn = covariance_of_turn(estimate.unknowns.start.pen)
-    if of_turn is not None and estimate.state.rig.n_cameras == 1:
-        biased += effect_of_normals(estimate).covariance(of_turn)[:6, :6]
-    size = bundle.part(at.scale)
-    warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
+    leds = bundle.component_contribution(at.leds) + _of_faces(bundle)
+    lens = center_errors(bundle, n_images) + _of_fields(bundle, fields, FieldName.LENS)
+    camera = _of_cameras(bundle) + _of_fields(bundle, fields, FieldName.TILT)
     shares = [
         UncertaintyContribution(ContributionName.NOISE, noise),
-        UncertaintyContribution(ContributionName.CENTERS, biased, assumed=True),
         UncertaintyContribution(ContributionName.SEAT, jitter + moved),
         UncertaintyContribution(ContributionName.FORM, by_form, assumed=True),
         UncertaintyContribution(ContributionName.DRIFT, drift),
-        UncertaintyContribution(
-            ContributionName.LEDS, bundle.component_contribution(at.leds)
-        ),
-        UncertaintyContribution(
-            ContributionName.SCALE, (1 - warm) * size, priors.scale.assumed
-        ),
-        UncertaintyContribution(
-            ContributionName.TEMPERATURE, warm * size, priors.temperature.assumed
-        ),
-        UncertaintyContribution(ContributionName.DISTANCE, bundle.part(at.between)),
+        UncertaintyContribution(ContributionName.LEDS, leds),
         UncertaintyContribution(
             ContributionName.DIAMETER, bundle.part(at.diameter), priors.diameter.assumed
         ),
         UncertaintyContribution(
             ContributionName.CAMERA,
-            bundle.part(*at.cameras),
+            camera,
             any(camera.assumed for camera in priors.cameras),
         ),
+        UncertaintyContribution(ContributionName.LENS, lens),
     ]
     if priors.extrinsics is not None:
         rig = bundle.part(at.extrinsics)
@@ -295,38 +227,62 @@ def contributions_of(
                 ContributionName.EXTRINSICS, rig, priors.extrinsics.assumed
             )
         )
-    shares += _of_effects(bundle, effects)
-    shares.append(
-        UncertaintyContribution(ContributionName.SHRINKAGE, np.outer(shift, shift))
-    )
     return tuple(
         share for share in shares if share.standard_uncertainty.max() > NEGLIGIBLE
     )
 
 
-def _of_effects(
-    bundle: Bundle, effects: Sequence[SearchedEffect]
-) -> list[UncertaintyContribution]:
-    """Return the shares of effects: of those fitted, and of those held at 0."""
-    parts = [
-        (each.effect.name, each.covariance) for each in effects if not each.is_candidate
-    ]
-    for effect, place, found in zip(
-        bundle.unknowns.effects,
-        bundle.layout.effects,
-        bundle.components.effects,
+def center_errors(bundle: Bundle, n_images: float) -> FloatArray:
+    """Return the covariance (6, 6) by errors of centres, independent by posture: (18).
+
+    ``n_images`` take part.
+    """
+    bias = bundle.unknowns.priors.center_bias / bundle.sigma
+    times = max(n_images / POSTURES, 1.0) * bias**2
+    return np.asarray(times * bundle.independent_noise)
+
+
+def _of_faces(bundle: Bundle) -> FloatArray:
+    """Return the covariance (6, 6) by the LEDs' faces: normals, and domes."""
+    covariance, reading = np.zeros((6, 6)), bundle.unknowns.priors.reading
+    if reading is not None:
+        along_normals = reading.shift * _by_shift_along_normals(bundle)
+        covariance += np.outer(along_normals, along_normals)
+    of_turn = covariance_of_turn(bundle.unknowns.start.pen)
+    if of_turn is not None and bundle.state.rig.n_cameras == 1:
+        by_turn = bundle.effective @ effect_of_normals(bundle).gain
+        covariance += by_turn @ of_turn @ by_turn.T
+    return covariance
+
+
+def _of_cameras(bundle: Bundle) -> FloatArray:
+    """Return the covariance (6, 6) by the intrinsics of the cameras."""
+    at, priors = bundle.layout.cameras, bundle.unknowns.priors.cameras
+    covariance = bundle.part(*at)
+    for place, prior in zip(at, priors, strict=True):
+        if prior.beyond is not None:
+            gain = bundle.gain[:, place] @ bundle.prior_information[place, place]
+            covariance = covariance + gain @ prior.beyond @ gain.T
+    return covariance
+
+
+def _of_fields(
+    bundle: Bundle, fields: Sequence[SearchedField], name: FieldName
+) -> FloatArray:
+    """Return the covariance (6, 6) by fields: of those held at 0, and those fitted."""
+    held = (each.covariance for each in fields if each.field.name is name)
+    covariance = sum(held, np.zeros((6, 6)))
+    for field, place, found in zip(
+        bundle.unknowns.fields,
+        bundle.layout.fields,
+        bundle.components.fields,
         strict=True,
     ):
-        budgeted = found.covariance if found.sigma > 0 else found.expected
-        gain = bundle.covariance[:6, place] @ bundle.prior_information[place, place]
-        parts.append((effect.name, gain @ budgeted @ gain.T))
-    shares = []
-    for share in dict.fromkeys(SHARES_OF_EFFECTS.values()):
-        own = (part for name, part in parts if SHARES_OF_EFFECTS[name] is share)
-        covariance = sum(own, np.zeros((6, 6)))
-        assumed = share in ASSUMED_EFFECTS
-        shares.append(UncertaintyContribution(share, covariance, assumed))
-    return shares
+        if field.name is name:
+            budgeted = found.covariance if found.sigma > 0 else found.expected
+            gain = bundle.gain[:, place] @ bundle.prior_information[place, place]
+            covariance = covariance + gain @ budgeted @ gain.T
+    return covariance
 
 
 def seat_covariance(bundle: Bundle) -> FloatArray:
@@ -339,7 +295,7 @@ def seat_covariance(bundle: Bundle) -> FloatArray:
         for form, expected in zip(seat, [max(likely), *likely[1:]], strict=True)
     ]
     by_oval = max(oval.sigma, oval.expected_sigma) * bundle.unknowns.oval
-    return _by_forms(bundle, variances) + by_oval @ by_oval.T
+    return _by_forms(variances) + by_oval @ by_oval.T
 
 
 def drift_variance(bundle: Bundle) -> float:
@@ -353,24 +309,15 @@ def drift_variance(bundle: Bundle) -> float:
 def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]:
     """Return covariances (6, 6) by seat modes: beyond the form error, and by it."""
     at = bundle.layout.whole_seat
-    gain = bundle.covariance[:6, at] @ bundle.prior_information[at, at]
-    known = _by_forms(bundle, [form_error**2] * len(MODE_COUNTS))
+    gain = bundle.gain[:, at] @ bundle.prior_information[at, at]
+    known = _by_forms([form_error**2] * len(MODE_COUNTS))
     moved = gain @ (seat_covariance(bundle) - known) @ gain.T
     return moved, gain @ known @ gain.T
 
 
-def _by_forms(bundle: Bundle, variances: Sequence[float]) -> FloatArray:
+def _by_forms(variances: Sequence[float]) -> FloatArray:
     """Return the covariance (21, 21) of seat modes by the variance of each kind."""
-    alike = np.eye(N_CONE)
-    # Where it is significant, its size is estimated from the images.
-    is_seen = bundle.budget_components.seat[0].sigma > 0
-    axes = alike if is_seen else one_wave_variance(bundle.state.rotations)
-    by_form = np.repeat(variances, MODE_COUNTS)
-    each = np.arange(len(by_form))
-    goes_once = (each < MODE_COUNTS[0])[:, None, None]
-    whole = np.zeros((len(by_form), N_CONE, len(by_form), N_CONE))
-    whole[each, :, each] = by_form[:, None, None] * np.where(goes_once, axes, alike)
-    return whole.reshape(N_CONE * len(by_form), -1)
+    return np.diag(np.repeat(variances, N_CONE * np.array(MODE_COUNTS)))
 
 
 def _by_shift_along_normals(bundle: Bundle) -> FloatArray:
@@ -384,19 +331,10 @@ def _by_shift_along_normals(bundle: Bundle) -> FloatArray:
         2, 3
     )
     at, shape = bundle.layout.leds, bundle.unknowns.basis.T @ moves
-    off = -bundle.covariance[:6, at] @ bundle.prior_information[at, at] @ shape
+    off = -bundle.gain[:, at] @ bundle.prior_information[at, at] @ shape
     # A move of the whole pen is no error of its LEDs but moves the tip.
     off[:3] += np.cross(turn, pen.leds.mean(axis=0) - tip) - shift
     return np.asarray(off)
-
-
-def one_wave_variance(rotations: FloatArray) -> FloatArray:
-    """Return the budgeted covariance of a seat mode of one wave, (3, 3), rig frame.
-
-    In units of the variance of the other modes; rotations (N, 3, 3) are rig_from_pen.
-    """
-    along = axes_of_cone(rotations)[2]
-    return np.eye(3) - (1 - ALONG**2) * np.outer(along, along)
 
 
 def _prior_variance(bundle: Bundle, at: slice) -> float:

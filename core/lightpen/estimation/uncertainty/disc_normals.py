@@ -28,7 +28,7 @@ TURN = 1e-3  # rad, of a difference
 
 
 class NormalEffect(NamedTuple):
-    """Effect of a rotation of all normals on a bundle with fixed normals."""
+    """ImageField of a rotation of all normals on a bundle with fixed normals."""
 
     gain: FloatArray  # (p, 2), change of the unknowns per rad of rotation
     # (2, 2), of the images on the rotation, all else unknown, 1/rad^2.
@@ -43,7 +43,7 @@ def effect_of_normals(bundle: Bundle) -> NormalEffect:
     """Return the first-order effect of a rotation of all normals, by one camera."""
     state, unknowns = bundle.state, bundle.unknowns
     there = np.zeros_like(bundle.residuals)
-    view = views_at(state, there, unknowns.effect_columns)[0]
+    view = views_at(state, there, unknowns.field_columns)[0]
     extended = with_normal(view, state).in_units_of(unknowns.noise[:, 0])
     jitter = bundle.components.jitter.covariance
     each = eliminate((extended,), bundle.used, bundle.weight_sigma, jitter)

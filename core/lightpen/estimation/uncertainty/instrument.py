@@ -75,25 +75,23 @@ class Instrument:
 
 
 def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
-    """Return the instrument as adjusted by a swing.
-
-    Its covariance is without mechanics that are held at 0: in a measurement they act
-    as they did in the swing.
-    """
-    bundle, unshrunk = adjustment.bundle, adjustment.unshrunk
-    state = bundle.state
-    spread = _with_budget_noise(adjustment, budget)
-    shift = unshrunk.values - bundle.values
-    shift[:6] = adjustment.shift_from(unshrunk)
-    spread = spread + np.outer(shift, shift)
+    """Return the instrument as adjusted by a swing."""
+    bundle, state = adjustment.bundle, adjustment.bundle.state
+    spread = _with_budget_noise(bundle, budget)
+    for at, prior in zip(
+        bundle.layout.cameras, bundle.unknowns.priors.cameras, strict=True
+    ):
+        if prior.beyond is not None:
+            gain = bundle.covariance[:, at] @ bundle.prior_information[at, at]
+            spread = spread + gain @ prior.beyond @ gain.T
     of_turn = covariance_of_turn(state.pen)
     if of_turn is not None and state.rig.n_cameras == 1:
-        spread = spread + effect_of_normals(unshrunk).covariance(of_turn)
+        spread = spread + effect_of_normals(bundle).covariance(of_turn)
     mixing = instrument_mixing(bundle)
     return Instrument(
         rig=state.rig,
         pen=state.pen,
-        tip_pen=state.tip_pen,
+        tip_pen=bundle.tip_pen,
         covariance=mixing @ spread @ mixing.T,
         sigma=bundle.sigma,
     )
@@ -113,7 +111,7 @@ def instrument_of_files(
     covariance[at.tip, at.tip] = tip_covariance
     _put_cameras(covariance, at, priors)
     covariance[at.diameter, at.diameter] = priors.diameter.covariance
-    scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
+    scaling = (pen.leds - tip_pen).ravel()
     basis = led_basis(pen.leds)
     covariance[at.leds, at.leds] = (
         (pen.led_sigma or 0.0) ** 2 * basis @ basis.T
@@ -146,17 +144,18 @@ def _put_cameras(covariance: FloatArray, at: Parameters, priors: Priors) -> None
         covariance[at.extrinsics, at.extrinsics] = priors.extrinsics.covariance
 
 
-def _with_budget_noise(adjustment: Adjustment, budget: Budget) -> FloatArray:
+def _with_budget_noise(bundle: Bundle, budget: Budget) -> FloatArray:
     """Return the covariance (p, p) of all unknowns with the noise of the budget."""
-    bundle = adjustment.unshrunk
     noise = next(
         (each for each in budget.shares if each.name is ContributionName.NOISE), None
     )
     if noise is None:
         return bundle.covariance
-    independent = _by_images(adjustment.whole)[:3, :3]
-    factor = float(np.trace(noise.covariance[:3, :3]) / np.trace(independent))
-    return np.asarray(bundle.covariance + (factor - 1) * _by_images(bundle))
+    by_images, tip = _by_images(bundle), bundle.effective[:3]
+    factor = float(
+        np.trace(noise.covariance[:3, :3]) / np.trace(tip @ by_images @ tip.T)
+    )
+    return np.asarray(bundle.covariance + (factor - 1) * by_images)
 
 
 def _by_images(bundle: Bundle) -> FloatArray:
@@ -172,7 +171,8 @@ def instrument_mixing(bundle: Bundle) -> FloatArray:
     at = parameters_of(state.rig, state.pen)
     of = unknowns.layout
     mixing = np.zeros((at.number, unknowns.number))
-    kinds = ("tip", "extrinsics", "diameter")
+    mixing[at.tip] = bundle.effective[:3]
+    kinds = ("extrinsics", "diameter")
     alike = [(getattr(at, kind), getattr(of, kind)) for kind in kinds]
     for place, column in (*alike, *zip(at.cameras, of.cameras, strict=True)):
         mixing[place, column] = np.eye(place.stop - place.start)

@@ -3,7 +3,7 @@
 During a swing tip and cone are fitted with the parameters of the files held. U is that
 of the whole budget all the same (`budget.contributions_of`), by one step of the bundle
 adjustment about the joint fit: its normal equations are kept, and a new image adds its
-own. What lens and timing may add is searched for when all images are linearised
+own. What fields of the images may add is searched for when all images are linearised
 again, as it needs the LEDs one by one. Correlated noise is left to the calibration.
 """
 
@@ -16,12 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.adjustment import likely_effects, shrunk_priors
+from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.components import NO_COMPONENTS
-from lightpen.estimation.bundle.effect_search import SearchedEffect, search_effects
-from lightpen.estimation.bundle.effects import Effect, held, mechanics_of
+from lightpen.estimation.bundle.field_search import SearchedField, search_fields
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -30,7 +29,7 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import Priors, priors_of
-from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
+from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import (
@@ -38,6 +37,7 @@ from lightpen.estimation.uncertainty.budget import (
     POSTURES,
     ContributionName,
     UncertaintyContribution,
+    center_errors,
     contributions_of,
 )
 from lightpen.model.assumptions import Assumptions
@@ -49,7 +49,7 @@ from lightpen.model.rig import Rig
 T = TypeVar("T", bound=np.generic)
 
 SEAT_ROUNDS = 2  # in which the jitter of the seat is found beside other errors
-GROWTH = 1.25  # of the number of images, after which all are linearised again
+GROWTH = 1.1  # of the number of images, after which all are linearised again
 ENDLESS = 100.0  # times the images, more than anyone takes
 
 
@@ -74,9 +74,7 @@ class UncertaintyPrediction:
     state: BundleState  # about which the equations are, with the rotation of each image
     equations: NormalEquations  # for a noise of 1 px
     n_whole: int  # images that were linearised together
-    mechanics: tuple[Effect, ...]  # with their columns in these images
-    # Of lens and timing, as far as these images determine them.
-    effects: tuple[SearchedEffect, ...] = ()
+    fields: tuple[SearchedField, ...] = ()  # as far as these images determine them
     # Contributions that remain with endless images of this kind.
     lasting: tuple[UncertaintyContribution, ...] = ()
 
@@ -89,40 +87,35 @@ class UncertaintyPrediction:
         self, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> PredictedUncertainty:
         """Predict U of the tip by the fit to these images, of noise ``sigma``, px."""
-        priors, bundle = self._adjusted(joint, sigma, assumed)
-        shift = _shift_from(bundle, priors)
+        bundle = self._adjusted(joint, sigma, assumed)
         n_images = int(joint.used.any(axis=1).sum())
-        noise = bundle.independent_noise
-        now = contributions_of(bundle, priors, n_images, noise, shift, self.effects)
+        now = contributions_of(bundle, n_images, bundle.independent_noise, self.fields)
         share = min(n_images / POSTURES, 1.0)  # of the errors that do not average out
-        centers = [
-            replace(each, covariance=share * each.covariance)
-            for each in now
-            if each.name is ContributionName.CENTERS
-        ]
-        return PredictedUncertainty(_weakest(now), _weakest([*self.lasting, *centers]))
+        centers = UncertaintyContribution(
+            ContributionName.LENS, share * center_errors(bundle, n_images)
+        )
+        return PredictedUncertainty(_weakest(now), _weakest([*self.lasting, centers]))
 
-    def _with_effects(
+    def _with_fields(
         self, pixels: FloatArray, joint: JointFit, sigma: float, assumed: Assumptions
     ) -> "UncertaintyPrediction":
-        """Search images, pixels (N, C, L, 2), for lens, timing and what lasts."""
-        priors, bundle = self._adjusted(joint, sigma, assumed)
-        found = search_effects(bundle, pixels, np.zeros_like(bundle.values))
-        held = tuple(replace(each, is_candidate=False) for each in found)
-        endless, nothing = _with_endless_images(bundle), np.zeros((6, 6))
-        at_last = contributions_of(endless, priors, self.n_whole, nothing, nothing[0])
+        """Search images, pixels (N, C, L, 2), for fields and what lasts."""
+        bundle = self._adjusted(joint, sigma, assumed)
+        there = replace(bundle, values=np.zeros_like(bundle.values))
+        fields = search_fields(there, pixels)
+        endless = _with_endless_images(bundle)
+        at_last = contributions_of(endless, self.n_whole, np.zeros((6, 6)))
         lasting = tuple(each for each in at_last if each.name not in IMAGES_SHRINK)
-        return replace(self, effects=held, lasting=lasting)
+        return replace(self, fields=fields, lasting=lasting)
 
-    def _adjusted(
-        self, joint: JointFit, sigma: float, assumed: Assumptions
-    ) -> tuple[Priors, Bundle]:
+    def _adjusted(self, joint: JointFit, sigma: float, assumed: Assumptions) -> Bundle:
         state = self.state
         priors = priors_of(state.rig, state.pen, assumed)
-        modes = seat_modes_of(state.rotations)
-        unknowns = Unknowns.of(state, priors, modes, self.mechanics)
+        unknowns = Unknowns.of(state, priors, seat_modes_of(state.rotations))
         equations = _weighed(self.equations, sigma)
-        return priors, _linear_bundle(unknowns, equations, joint, sigma)
+        bundle = _linear_bundle(unknowns, equations, joint, sigma)
+        shrunk = shrunk_priors(bundle, priors)
+        return bundle if shrunk is priors else _with_priors(bundle, shrunk)
 
 
 def predict_uncertainty(
@@ -150,44 +143,24 @@ def predict_uncertainty(
     n_images = len(pixels)
     state = BundleState(rig, pen, joint.tip_pen, joint.cone_cam, joint.rotations)
     if before is None or n_images > GROWTH * before.n_whole:
-        mechanics, equations = _linearised(state, pixels, joint, assumed, n_images, 0)
-        whole = UncertaintyPrediction(state, equations, n_images, mechanics)
-        return whole._with_effects(pixels, joint, sigma, assumed)
-    n_before, n_whole = before.n_images, before.n_whole
-    added, fresh = _linearised(state, pixels, joint, assumed, n_whole, n_before)
-    mechanics = tuple(
-        replace(old, columns=np.concatenate([old.columns, new.columns]))
-        for old, new in zip(before.mechanics, added, strict=True)
-    )
+        equations = _linearised(state, pixels, joint, 0)
+        whole = UncertaintyPrediction(state, equations, n_images)
+        return whole._with_fields(pixels, joint, sigma, assumed)
+    fresh = _linearised(state, pixels, joint, before.n_images)
     return UncertaintyPrediction(
         replace(before.state, rotations=joint.rotations),
         _joined(before.equations, _moved(fresh, state, before.state)),
-        *(n_whole, mechanics, before.effects, before.lasting),
+        *(before.n_whole, before.fields, before.lasting),
     )
 
 
 def _linearised(
-    state: BundleState,
-    pixels: FloatArray,
-    joint: JointFit,
-    assumed: Assumptions,
-    n_whole: int,
-    first: int,
-) -> tuple[tuple[Effect, ...], NormalEquations]:
-    """Return mechanics and equations of the images from the first on.
-
-    The cone stands as the pen did in the images that were linearised together.
-    """
-    axes = axes_of_cone(state.rotations[:n_whole])
+    state: BundleState, pixels: FloatArray, joint: JointFit, first: int
+) -> NormalEquations:
+    """Return the equations of the images from the first on."""
     state = replace(state, rotations=state.rotations[first:])
-    views = views_at(state, pixels[first:])
-    mechanics = mechanics_of(
-        views, state.rotations, axes, state.pen.leds, assumed.compliance
-    )
-    columns = np.concatenate([each.columns for each in mechanics], axis=-1)
-    views = tuple(replace(v, effects=columns[:, c]) for c, v in enumerate(views))
     used = _by_camera(joint.used[first:], state.rig.n_cameras)
-    return mechanics, eliminate(views, used, 1.0)
+    return eliminate(views_at(state, pixels[first:]), used, 1.0)
 
 
 def _by_camera(values: npt.NDArray[T], n_cameras: int) -> npt.NDArray[T]:
@@ -237,11 +210,11 @@ def _linear_bundle(
     seen = np.trace(equations.cone_rows[..., :N_CONE], axis1=1, axis2=2) > 0
     spread = unknowns.sensitivity(equations.cone_rows)
     alone = information, right = unknowns.system(equations)
-    components = NO_COMPONENTS.with_no_effects(unknowns.effects)
+    components = NO_COMPONENTS
     for _ in range(SEAT_ROUNDS):
         # The jitter first: without it, other errors would absorb it.
         covariance = inverse(information + unknowns.prior_information(components))
-        change = covariance @ (right + unknowns.prior_right(components))
+        change = covariance @ (right + unknowns.prior_right())
         jitter = jitter_of(unknowns, equations, spread, seen, change, covariance)
         information, right = (
             alone
@@ -263,7 +236,7 @@ def _linear_bundle(
     return Bundle(
         unknowns=unknowns,
         state=unknowns.start,
-        values=covariance @ (right + unknowns.prior_right(components)),
+        values=covariance @ (right + unknowns.prior_right()),
         components=components,
         budget_components=components,
         residuals=_by_camera(joint.residuals, n_cameras),
@@ -293,33 +266,29 @@ def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
     )
 
 
-def _shift_from(bundle: Bundle, priors: Priors) -> FloatArray:
-    """Return the change of (tip, cone) from this fit to the estimate, (6,), mm."""
-    shrunk, likely = shrunk_priors(bundle, priors), likely_effects(bundle)
-    if shrunk is priors and likely == bundle.unknowns.effects:
-        return np.zeros(6)
-    unknowns = replace(bundle.unknowns, priors=shrunk, effects=likely)
-    information = bundle.information
-    right = bundle.right
-    of_effects = zip(likely, bundle.components.effects, strict=True)
-    components = bundle.components._replace(
-        effects=tuple(held(one) if one.is_exact else own for one, own in of_effects)
+def _with_priors(bundle: Bundle, priors: Priors) -> Bundle:
+    """Return the adjustment after a single step with other priors."""
+    unknowns = replace(bundle.unknowns, priors=priors)
+    prior = unknowns.prior_information(bundle.components)
+    covariance = inverse(bundle.information + prior)
+    return replace(
+        bundle,
+        unknowns=unknowns,
+        values=covariance @ (bundle.right + unknowns.prior_right()),
+        prior_information=prior,
+        covariance=covariance,
     )
-    prior = unknowns.prior_information(components)
-    right = right + unknowns.prior_right(components)
-    return np.asarray((inverse(information + prior) @ right - bundle.values)[:6])
 
 
 def _with_endless_images(bundle: Bundle) -> Bundle:
     """Return the adjustment with endless images of the same kind."""
     information = ENDLESS * bundle.information
     nothing = np.zeros_like(information)
-    components = NO_COMPONENTS.with_no_effects(bundle.unknowns.effects)
-    prior = bundle.unknowns.prior_information(components)
+    prior = bundle.unknowns.prior_information(NO_COMPONENTS)
     return replace(
         bundle,
-        components=components,
-        budget_components=components,
+        components=NO_COMPONENTS,
+        budget_components=NO_COMPONENTS,
         information=information,
         prior_information=prior,
         jitter_information=nothing,

@@ -18,10 +18,8 @@ from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.contact.camera_motion import pose_steadily, without_field
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.contact.single_images import require_fit
-from lightpen.estimation.uncertainty.budget import Budget
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.model.information import inverse
 from lightpen.model.pen import Pen
 
 
@@ -82,7 +80,7 @@ def second_images(camera: Camera, pen: Pen, swing: SecondSwing) -> SecondImages:
 
 @dataclass(frozen=True, eq=False)
 class SecondCone:
-    """Effect of a second swing on the tip."""
+    """What a second swing says of the pen's scale."""
 
     cone_cam: FloatArray  # (3,), cone point in the camera frame, mm
     swing: SecondSwing
@@ -92,10 +90,8 @@ class SecondCone:
     rms: FloatArray
     leds_used: BoolArray  # (N, L)
     distance: float  # of the cones as they were adjusted, mm
-    # `uncertainty_without` and `uncertainty_with`: (3,), U (k = 2) of the tip by both
-    # swings without the distance, and with it, mm
-    uncertainty_without: FloatArray
-    uncertainty_with: FloatArray
+    scale: float  # of the pen against its file, relative
+    scale_uncertainty: float  # U (k = 2)
 
     @property
     def observations(self) -> Observations:
@@ -113,16 +109,9 @@ class SecondCone:
         return self.reasons.count(Reason.NONE)
 
 
-def second_cone(
-    adjusted: Adjustment, budget: Budget, images: SecondImages
-) -> SecondCone:
-    """Return the effect of a second swing, whose images are the last adjusted."""
-    bundle, whole = adjusted.bundle, adjusted.whole
-    at = whole.layout.between
-    measured = whole.measured_information.copy()
-    measured[at, at] = 0.0
-    without = inverse(whole.information + whole.prior_information + measured)
-    grown = budget.covariance + (without - whole.covariance)[:6, :6]
+def second_cone(adjusted: Adjustment, images: SecondImages) -> SecondCone:
+    """Return what a second swing says, whose images are the last adjusted."""
+    bundle, at = adjusted.bundle, adjusted.bundle.layout.scale.start
     state, n = bundle.state, len(images.pixels)
     used, residuals = bundle.used[-n:, 0], bundle.residuals[-n:, 0]
     reasons = np.array(images.reasons, dtype=object)
@@ -141,6 +130,6 @@ def second_cone(
         rms=np.sqrt(np.where(n_leds > 0, totals / np.maximum(n_leds, 1), np.nan)),
         leds_used=leds_used,
         distance=float(np.linalg.norm(state.between_rig)),
-        uncertainty_without=COVERAGE_FACTOR * np.sqrt(np.diag(grown)[:3]),
-        uncertainty_with=budget.expanded_uncertainty[:3],
+        scale=bundle.scale,
+        scale_uncertainty=COVERAGE_FACTOR * float(np.sqrt(bundle.covariance[at, at])),
     )

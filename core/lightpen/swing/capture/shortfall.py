@@ -77,7 +77,7 @@ def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
     limit, floor = limits.max_uncertainty, state.kept.predicted.floor
     if state.kept.uncertainty <= limit or floor >= limit:
         return 0
-    # Noise goes with one over the number of images; what lens and mechanics may be is
+    # Noise goes with one over the number of images; what lens and camera may be is
     # known more slowly.
     ratio = (state.kept.uncertainty**2 - floor**2) / (limit**2 - floor**2)
     times = float(ratio) ** (1 / DECAY) - 1

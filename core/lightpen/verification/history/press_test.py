@@ -6,7 +6,7 @@ cone are averaged: errors of camera, LEDs and scale cancel. The rest, due to dif
 postures, is about as large as the disagreement of the two differences.
 
 A stylus, ball thread or seat that gives way by ``c`` times the sine of the lean
-(`lightpen.estimation.bundle.effects`) moves the tip of a fit along the pen, and its
+moves the tip of a fit along the pen, and its
 cone along the cone's axis. What is left of the cone's move is a move of cone or camera.
 """
 
@@ -17,7 +17,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import UsageError
-from lightpen.estimation.bundle.effects import cone_moves
 from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.joint import JointFit
@@ -105,8 +104,8 @@ def _difference(
     fits = [fit_held(each, instrument.rig, instrument.pen) for each in (usual, firm)]
     before, after = (np.r_[fit.tip_pen, fit.cone_cam] for fit in fits)
     # Effect of an unmodelled move of the cone on tip and cone.
-    rotations = fits[1].rotations
-    moves = cone_moves(rotations, axes_of_cone(rotations)).compliance[..., 1]
+    across = axes_of_cone(fits[1].rotations)[:2]
+    moves = fits[1].rotations[:, :, 1] @ across.T @ across
     pulls = np.einsum("nij,nj->i", fits[1].information[..., CONE], moves)
     noise = _scatter(fits[0]) + _scatter(fits[1])
     return after - before, noise, fits[1].covariance @ pulls

@@ -10,9 +10,7 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.adjustment import with_effects
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
-from lightpen.estimation.bundle.effects import mechanics_of
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -22,10 +20,11 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
+from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.contact.joint import TURN_RIDGE
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
+from lightpen.model.effective_tip import effective_tip
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import fit_rigid, rotation_from_vector
@@ -311,7 +310,7 @@ def test_two_cameras_find_the_focal_length_of_one_that_is_off() -> None:
         off = CAMERA.with_intrinsics(CAMERA.intrinsics * ([1.001] * 2 + [1.0] * 7))
         rig = pair(replace(off, covariance=None))
         bundle = adjusted(rig, PEN, swing, pixels)
-        errors.append(bundle.state.tip_pen - swing.tip_pen)
+        errors.append(bundle.tip_pen - swing.tip_pen)
         inside.append(np.abs(errors[-1]) <= 2 * np.sqrt(np.diag(bundle.covariance)[:3]))
 
     assert np.median(np.linalg.norm(errors, axis=1)) <= 0.005
@@ -319,24 +318,36 @@ def test_two_cameras_find_the_focal_length_of_one_that_is_off() -> None:
     assert np.mean(inside) > 0.84
 
 
-def test_the_right_side_of_the_images_does_not_depend_on_priors() -> None:
+def test_the_tip_is_in_the_scale_of_the_led_file_however_the_pen_grows() -> None:
     rng = np.random.default_rng(4)
     swing, rig = swing_poses(20, rng), rig_of(CAMERA)
     pixels = simulate_rig_centers(rig, PEN, swing, 0.03, rng)
     state = BundleState(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
-    axes = axes_of_cone(swing.rotations)
-    views = views_at(state, pixels)
-    mechanics = mechanics_of(views, swing.rotations, axes, PEN.leds, 0.004)
-    held = tuple(each.at_zero for each in mechanics)
     priors, modes = priors_of(rig, PEN, USUAL), seat_modes_of(swing.rotations)
-    bundle = fit_bundle(pixels, state, priors, modes, 1.0, effects=held)
+    plain = fit_bundle(pixels, state, priors, modes, 1.0)
 
-    whole = with_effects(bundle, mechanics)
+    warm = fit_bundle(pixels, state, replace(priors, growth=1e-4), modes, 1.0)
 
-    assert np.abs(whole.values - bundle.values).max() > 1e-3
-    # Next to what holds a sag at 0, the images hardly matter.
-    scale = np.abs(bundle.right).max()
-    np.testing.assert_allclose(whole.right, bundle.right, atol=1e-6 * scale)
+    assert warm.scale == pytest.approx(1e-4, rel=1e-3)
+    # The cone has the scale of the pen.
+    np.testing.assert_allclose(warm.tip_pen, plain.tip_pen, atol=2e-6)
+    np.testing.assert_allclose(warm.cone_rig, 1.0001 * plain.cone_rig, atol=1e-4)
+
+
+def test_a_seat_that_follows_the_lean_moves_the_effective_tip() -> None:
+    """The least squares over the swing, with the true poses and places of the ball."""
+    rng = np.random.default_rng(6)
+    swing, rig = swing_poses(80, rng), rig_of(CAMERA)
+    axes = swing.rotations[:, :, 1]
+    moves = 0.02 * (axes - axes.mean(axis=0)) * [1.0, 0.0, 1.0]
+    moved = replace(swing, translations=swing.translations + moves)
+    pixels = simulate_rig_centers(rig, PEN, moved, 0.0, rng)
+    truth = effective_tip(swing.rotations, moved.translations)[:3]
+
+    found = adjusted(rig, PEN, swing, pixels)
+
+    assert abs(truth[1] - swing.tip_pen[1]) > 0.015
+    np.testing.assert_allclose(found.tip_pen, truth, atol=5e-4)
 
 
 def test_a_drift_is_the_largest_distance_between_two_places_of_the_cone() -> None:

@@ -166,11 +166,10 @@ def test_a_right_diameter_is_not_contradicted_by_discs_that_look_larger() -> Non
 BLURRED = 6.6  # px
 
 
-def by_led_centres(result: Calibration) -> FloatArray:
-    """Return what LED centres add to the variance of the tip, (3,), mm^2."""
-    (share,) = (s for s in result.budget.shares if s.name is ContributionName.CENTERS)
-    assert share.assumed
-    return share.standard_uncertainty**2
+def by_leds(result: Calibration) -> FloatArray:
+    """Return what the LEDs add to the variance of the tip, (3,), mm^2."""
+    found = (s for s in result.budget.shares if s.name is ContributionName.LEDS)
+    return sum((s.standard_uncertainty**2 for s in found), np.zeros(3))
 
 
 @pytest.mark.parametrize("pen", [PEN, fanned_pen()], ids=["flat", "fanned"])
@@ -191,7 +190,7 @@ def test_leds_that_seem_to_stand_behind_their_discs_move_the_tip_as_counted(
     )
 
     np.testing.assert_allclose(
-        np.sqrt(np.maximum(by_led_centres(counted) - by_led_centres(sharp), 0.0)),
+        np.sqrt(np.maximum(by_leds(counted) - by_leds(sharp), 0.0)),
         np.abs(moved.joint.tip_pen - sharp.joint.tip_pen),
         atol=1e-4,
     )

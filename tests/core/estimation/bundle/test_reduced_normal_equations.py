@@ -5,15 +5,15 @@ import pytest
 from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.bundle.effects import mechanics_of
-from lightpen.estimation.bundle.linearised import BundleState, eliminate, views_at
+from lightpen.estimation.bundle.image_fields import image_fields
+from lightpen.estimation.bundle.linearised import BundleState, eliminate
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.reduced_normal_equations import (
     ImageRows,
     rows_of,
     summed_products,
 )
-from lightpen.estimation.bundle.seat_modes import axes_of_cone, seat_modes_of
+from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.model.assumptions import USUAL
 from lightpen.model.rig import from_first
@@ -85,7 +85,7 @@ def test_noise_that_lasts_is_whitened_as_by_its_whole_covariance(
 def test_rows_of_images_add_up_to_the_system_of_the_unknowns(
     jitter: FloatArray | None,
 ) -> None:
-    """Of two cameras and two cones, with a drift along a lamp, and all mechanics."""
+    """Of two cameras and two cones, with a drift along a lamp, and all fields."""
     rng = np.random.default_rng(5)
     row, pen = row_of_cameras(2, 1000.0), paper_pen()
     rig = from_first(row)
@@ -98,14 +98,11 @@ def test_rows_of_images_add_up_to_the_system_of_the_unknowns(
     pixels = simulate_rig_centers(rig, pen, swing, 0.05, rng)
     used = np.isfinite(pixels[..., 0]) & (rng.random(pixels.shape[:-1]) < 0.9)
     pixels[~used] = np.nan
-    mechanics = mechanics_of(
-        *(views_at(state, pixels), state.rotations, axes_of_cone(state.rotations)),
-        *(pen.leds, 0.004),
-    )
+    fields = image_fields(pixels, used, rig.cameras, state.rotations)
     unknowns = Unknowns.of(
         *(state, priors_of(rig, pen, USUAL)),
         seat_modes_of(state.rotations, rng.standard_normal((9, 1))),
-        mechanics,
+        fields,
         rng.uniform(0.5, 2.0, used.shape),
     )
     views = unknowns.views_at(state, pixels)

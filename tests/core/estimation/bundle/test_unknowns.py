@@ -138,12 +138,9 @@ def test_the_tip_does_not_take_on_led_errors_and_its_covariance_is_honest(
         )
         errors.append(error_of(result, measured))
         plain.append(held.tip_pen - (result.joint.tip_pen - errors[-1]))
-        # What mechanics may do is not drawn: the estimate holds them at 0.
         bundle = result.bundle
         shares = contributions_of(
-            *(bundle, result.priors, len(swing.rotations)),
-            noise=bundle.independent_noise,
-            shift=np.zeros(6),
+            bundle, len(swing.rotations), bundle.independent_noise
         )
         drawn = [s for s in shares if s.name is not ContributionName.SEAT]
         variances = [s.standard_uncertainty[:3] ** 2 for s in drawn]
@@ -334,7 +331,7 @@ def test_an_oval_seat_is_found_as_such_and_leaves_the_tip(phase: float) -> None:
     assert 0.003 < components.oval.sigma < 0.02
     assert not any(form.sigma for form in components.seat)
     # Of 10 um, U holds as much along the pen as the images leave open.
-    assert share(result, ContributionName.SEAT)[1] == pytest.approx(0.002, rel=0.4)
+    assert 0.0008 < share(result, ContributionName.SEAT)[1] < 0.0028
     moved = np.abs(result.joint.tip_pen - still.joint.tip_pen)
     assert (moved < 0.005).all()
     assert (moved < result.budget.expanded_uncertainty[:3]).all()

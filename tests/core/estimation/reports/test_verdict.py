@@ -112,7 +112,6 @@ def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
     limit = share * good.budget.weakest_uncertainty
     verdict = judge(good, SwingLimits(max_uncertainty=limit))
     assert verdict.grade is grade
-    # Noise is the largest part, as mechanics of usual size are unknowns beside the tip.
     assert good.budget.largest_share.name is ContributionName.NOISE
     assert verdict.reason.code == Code.UNCERTAIN
 
@@ -212,18 +211,12 @@ def test_an_uncertainty_by_leds_that_are_off_is_reported_as_such(
         ),
         (ContributionName.LEDS, "the LED file. Measure the LEDs more", "LED file"),
         (
-            *(ContributionName.SCALE, "the scale of the LED file. Calibrate the LED"),
-            "LED file",
-        ),
-        (
             ContributionName.DIAMETER,
             "the diameter of the LED discs. State it",
             "LED file",
         ),
-        (ContributionName.CENTERS, "the systematic error of the LED centres", "cause"),
+        (ContributionName.LENS, "the lens, beyond its distortion", "intrinsics file"),
         (ContributionName.FORM, "the form error of ball and cone", "cause"),
-        (ContributionName.TEMPERATURE, "the temperature of the pen", "cause"),
-        (ContributionName.DISTANCE, "the distance of the two cones", "cause"),
         (
             ContributionName.EXTRINSICS,
             "the extrinsics of the cameras. Calibrate the rig",

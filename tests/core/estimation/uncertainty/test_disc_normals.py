@@ -22,13 +22,19 @@ CAMERA, PEN = paper_camera(), replace(paper_pen(), led_sigma=0.002)
 TURN = np.array([0.03, -0.02])  # rad
 
 
-def calibrated(turn: FloatArray, sigma: float | None = None) -> Calibration:
-    """Return the calibration by a pen file whose normals are turned."""
+def calibrated(
+    turn: FloatArray, sigma: float | None = None, tilt: float = 0.0
+) -> Calibration:
+    """Return the calibration by a pen file whose normals are turned.
+
+    The camera turns by ``tilt``, px, times the sine of the lean.
+    """
     rng = np.random.default_rng(3)
     swing = swing_poses(120, rng, pen=PEN, camera=CAMERA)
     pixels = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, 0.005, rng
     )
+    pixels[..., 1] += tilt * swing.rotations[:, 2, 1, None]
     centers = Centers(np.arange(len(pixels)), pixels, Path("centers.csv"))
     of_normals = None if sigma is None else sigma**2 * np.eye(3)
     pen = replace(
@@ -58,21 +64,12 @@ def test_the_effect_of_a_turn_is_the_change_of_the_tip_by_it() -> None:
     assert (np.linalg.eigvalsh(effect.information) > 0).all()
 
 
-def test_the_effect_of_a_turn_is_found_beside_that_of_a_stylus_that_gives_way() -> None:
-    rng = np.random.default_rng(3)
-    swing = swing_poses(120, rng, pen=PEN, camera=CAMERA)
-    sideways = swing.rotations[:, :, 1] * [1.0, 0.0, 1.0]  # of the pen's axis
-    translations = swing.translations + 0.03 * sideways
-    pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.005, rng)
-    centers = Centers(np.arange(len(pixels)), pixels, Path("centers.csv"))
-    pen = replace(PEN, normal_covariance=0.3**2 * np.eye(3))
+def test_the_effect_of_a_turn_is_found_beside_a_camera_that_turns() -> None:
+    straight, turned = (calibrated(turn, tilt=0.3) for turn in (np.zeros(2), TURN))
 
-    bundle = calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen)).bundle
-
-    assert bundle.unknowns.effects
-    effect = effect_of_normals(bundle)
-    assert effect.gain.shape == (bundle.unknowns.number, 2)
-    alone = effect_of_normals(calibrated(np.zeros(2)).bundle)
-    across = alone.gain[[0, 2]]  # the other effect is along the pen
-    largest = np.abs(across).max()
-    np.testing.assert_allclose(effect.gain[[0, 2]], across, atol=0.1 * largest)
+    assert straight.bundle.unknowns.fields
+    effect = effect_of_normals(straight.bundle)
+    assert effect.gain.shape == (straight.bundle.unknowns.number, 2)
+    change = turned.bundle.state.tip_pen - straight.bundle.state.tip_pen
+    largest = np.abs(change).max()
+    np.testing.assert_allclose(effect.gain[:3] @ TURN, change, atol=0.1 * largest)

@@ -58,24 +58,24 @@ def test_noise_that_counts_more_than_once_does_so_in_the_instrument(
 
     added = tip_variance(adjustment, more) - tip_variance(adjustment, budget)
 
-    # Beside mechanics, which are none of the instrument, noise makes the tip less sure.
-    noises = adjustment.unshrunk.independent_noise, adjustment.whole.independent_noise
-    own, beside_mechanics = (np.trace(each[:3, :3]) for each in noises)
-    expected = 3 * np.trace(noise.covariance[:3, :3]) * own / beside_mechanics
-    assert added == pytest.approx(expected)
+    assert added == pytest.approx(3 * np.trace(noise.covariance[:3, :3]))
 
 
-def test_what_holding_back_changed_is_part_of_the_instrument(
+def test_what_a_file_may_be_off_beyond_its_prior_is_part_of_the_instrument(
     solved: tuple[Adjustment, Budget],
 ) -> None:
     adjustment, budget = solved
-    state = adjustment.bundle.state
-    moved = replace(state, tip_pen=state.tip_pen + np.array([0.01, 0, -0.02]))
-    held = replace(adjustment, bundle=replace(adjustment.bundle, state=moved))
+    bundle, priors = adjustment.bundle, adjustment.bundle.unknowns.priors
+    at, first = bundle.layout.cameras[0], priors.cameras[0]
+    doubted = replace(first, beyond=3 * first.covariance)
+    cameras = (doubted, *priors.cameras[1:])
+    unknowns = replace(bundle.unknowns, priors=replace(priors, cameras=cameras))
+    wider = replace(adjustment, bundle=replace(bundle, unknowns=unknowns))
 
-    added = tip_variance(held, budget) - tip_variance(adjustment, budget)
+    added = tip_variance(wider, budget) - tip_variance(adjustment, budget)
 
-    assert added == pytest.approx(0.01**2 + 0.02**2)
+    gain = bundle.gain[:3, at] @ bundle.prior_information[at, at]
+    assert added == pytest.approx(3 * np.trace(gain @ first.covariance @ gain.T))
 
 
 TIP = np.diag([1e-6, 4e-6, 9e-6])  # mm^2
@@ -91,19 +91,15 @@ def test_an_instrument_of_files_is_as_uncertain_as_they_state() -> None:
     kinds = [at.tip, *at.cameras, at.extrinsics, at.diameter, at.leds]
     ends = np.cumsum(sizes).tolist()
     assert kinds == [slice(e - n, e) for e, n in zip(ends, sizes, strict=True)]
-    arms = LOOSE.leds - LOOSE.leds.mean(axis=0)
     leds = found.covariance[at.leds, at.leds]
-    # Shifts and turns of all LEDs are none of their errors, but their scale is one.
+    # Shifts and turns of all LEDs are none of their errors; the scale is about the tip.
+    by_scale = (LOOSE.leds - PAPER_TIP).ravel()
+    alone = leds - 3e-5**2 * np.outer(by_scale, by_scale)
+    arms = LOOSE.leds - LOOSE.leds.mean(axis=0)
     for axis in np.eye(3):
-        shift, turn = np.tile(axis, n_leds), np.cross(axis, arms).ravel()
-        np.testing.assert_allclose(leds @ np.column_stack([shift, turn]), 0, atol=1e-15)
-    size = np.linalg.norm(arms)
-    along = arms.ravel() / size
-    expected = 0.002**2 + (3e-5 * size) ** 2
-    assert along @ leds @ along == pytest.approx(expected)
-    assert np.trace(leds) == pytest.approx(
-        (3 * n_leds - 6) * 0.002**2 + (3e-5 * size) ** 2
-    )
+        moves = np.tile(axis, n_leds), np.cross(axis, arms).ravel()
+        np.testing.assert_allclose(alone @ np.column_stack(moves), 0, atol=1e-15)
+    assert np.trace(alone) == pytest.approx((3 * n_leds - 6) * 0.002**2)
     parts = [TIP, *(each.covariance for each in rig.cameras), rig.covariance]
     parts += [np.array([[0.03**2]]), leds]
     for place, part in zip(kinds, parts, strict=True):

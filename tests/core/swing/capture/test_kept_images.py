@@ -87,7 +87,7 @@ def test_the_uncertainty_during_the_swing_is_that_of_the_verdict(
         *(swing.rotations, swing.translations),
     )
     assert together.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.01)
-    # What the effects of the station may be was found with the images until then.
+    # What fields of the images may be was found with the images until then.
     assert kept.uncertainty == pytest.approx(budget.weakest_uncertainty, rel=0.07)
     assert 0 < kept.predicted.floor < kept.uncertainty
 
@@ -114,7 +114,7 @@ def test_kept_one_by_one_or_all_at_once_gives_the_same_tip() -> None:
     assert kept.joint is not None
     assert together.joint is not None
     np.testing.assert_allclose(kept.joint.tip_pen, together.joint.tip_pen, atol=1e-6)
-    # The effects of the station are searched for anew as the images grow by a quarter.
+    # Fields of the images are searched for anew as these grow by a tenth.
     np.testing.assert_allclose(kept.uncertainty, together.uncertainty, rtol=0.01)
     np.testing.assert_allclose(kept.misfits, together.misfits, rtol=1e-3)
 

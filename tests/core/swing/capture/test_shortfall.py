@@ -42,9 +42,6 @@ CAMERA, PEN = paper_camera(), paper_pen()
 EXACT_PEN = replace(PEN, scale_sigma=1e-9, diameter_sigma=1e-6, expansion=0.0)
 
 
-RIGID = replace(USUAL, compliance=1e-6)
-
-
 def state_of(
     setup: SwingSetup, swing: Swing, assumed: Assumptions = USUAL, noise: int = 1
 ) -> SwingState:
@@ -110,7 +107,7 @@ def test_no_more_images_are_announced_than_the_limit_allows() -> None:
 
 def test_no_images_are_asked_for_where_the_files_leave_too_much_open() -> None:
     swing = swing_poses(60, np.random.default_rng(0))
-    vague = replace(PEN, scale_sigma=1e-3)
+    vague = replace(PEN, led_sigma=0.03)
     setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
     state = state_of(setup, swing)
 
@@ -120,7 +117,7 @@ def test_no_images_are_asked_for_where_the_files_leave_too_much_open() -> None:
 
 def test_what_no_image_can_mend_is_reported_with_its_file() -> None:
     swing = swing_poses(60, np.random.default_rng(0))
-    vague = replace(PEN, scale_sigma=1e-3)
+    vague = replace(PEN, led_sigma=0.03)
     setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
     state = state_of(setup, swing)
     floor = 1000 * state.kept.predicted.floor
@@ -137,10 +134,10 @@ def test_what_no_image_can_mend_is_reported_with_its_file() -> None:
 
 def test_what_other_postures_still_lower_is_not_said_to_be_out_of_reach() -> None:
     """The floor of few postures is above that of all: it would be said too high."""
-    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.004))
-    early = state_of(setup, to_the_right(15), RIGID)
-    whole = state_of(setup, swing_poses(60, np.random.default_rng(0)), RIGID)
-    assert early.kept.predicted.floor > 0.004 > whole.kept.predicted.floor
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.003))
+    early = state_of(setup, to_the_right(15), USUAL)
+    whole = state_of(setup, swing_poses(60, np.random.default_rng(0)), USUAL)
+    assert early.kept.predicted.floor > 0.003 > whole.kept.predicted.floor
 
     assert out_of_reach(setup.limits, early, measure_shortfall(setup, early)) is None
 

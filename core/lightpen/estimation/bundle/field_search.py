@@ -1,0 +1,62 @@
+"""Search for fields of the images that improve a fit without them.
+
+All are unknowns of one linear step about the fit, with all variance components
+estimated anew, as others may have absorbed a field. One that the images support is to
+be fitted. The others are held at 0, and what they may be all the same moves tip and
+cone by its own covariance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.bundle import Bundle, with_fields
+from lightpen.estimation.bundle.image_fields import (
+    FieldComponent,
+    ImageField,
+    image_fields,
+)
+from lightpen.model.information import inverse
+
+
+@dataclass(frozen=True, eq=False)
+class SearchedField:
+    """A field beside a fit without it."""
+
+    field: ImageField
+    component: FieldComponent
+    # (6, k), error of the effective (tip, cone) per unknown of the field if it is 0.
+    by_unknowns: FloatArray
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of (tip, cone) by the possible size of the field, (6, 6)."""
+        G = self.by_unknowns
+        return np.asarray(G @ self.component.expected @ G.T)
+
+
+def search_fields(bundle: Bundle, pixels: FloatArray) -> tuple[SearchedField, ...]:
+    """Search a fit for fields of the images beside those that it has.
+
+    ``pixels`` (N, C, L, 2) are the LED centres, px.
+    """
+    state, known = bundle.state, bundle.unknowns.fields
+    fitted = {(each.name, each.camera) for each in known}
+    every = image_fields(pixels, bundle.used, state.rig.cameras, state.rotations)
+    fields = [each for each in every if (each.name, each.camera) not in fitted]
+    if not fields:
+        return ()
+    unknowns, solved = with_fields(bundle, (*known, *fields), pixels)
+    places = unknowns.layout.fields[len(known) :]
+    new = np.concatenate([np.arange(at.start, at.stop) for at in places])
+    rest = np.delete(np.arange(unknowns.number), new)
+    gain = bundle.effective @ inverse(
+        (solved.information + solved.measured + solved.prior)[np.ix_(rest, rest)]
+    )
+    return tuple(
+        SearchedField(field, found, gain @ solved.information[rest, at])
+        for field, found, at in zip(
+            fields, solved.components.fields[len(known) :], places, strict=True
+        )
+    )

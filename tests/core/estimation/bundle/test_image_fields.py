@@ -1,0 +1,197 @@
+"""Fields of the images are found and corrected; a good station has none."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.simulated_centers import simulate_rig_centers
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.adjustment import adjust
+from lightpen.estimation.bundle.field_findings import FoundField, found_fields
+from lightpen.estimation.bundle.image_fields import FieldName, ImageField, size_of
+from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import priors_of
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.formats.observation_files import Centers
+from lightpen.model.assumptions import USUAL
+from lightpen.model.camera import Camera
+from lightpen.model.lens_field import LensField
+from lightpen.model.rig import from_first
+from lightpen.simulator.samples import row_of_cameras
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    seen_from,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+N_IMAGES, SIGMA = 120, 0.03
+LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3}  # px
+
+
+def swing(seed: int = 0) -> tuple[Swing, np.random.Generator]:
+    rng = np.random.default_rng([260, seed])
+    return swing_poses(N_IMAGES, rng), rng
+
+
+def calibrated(
+    shifts: FloatArray | float = 0.0, seed: int = 0, camera: Camera = CAMERA
+) -> tuple[Calibration, FloatArray]:
+    """Return a calibration whose images shift, and its error, mm."""
+    true, rng = swing(seed)
+    pixels = simulate_centers(
+        CAMERA, PEN, true.rotations, true.translations, SIGMA, rng
+    )
+    centers = Centers(np.arange(N_IMAGES), pixels + shifts, Path("simulated"))
+    found = calibrate(camera, PEN, observe_centers(centers, camera, PEN))
+    return found, found.joint.tip_pen - true.tip_pen
+
+
+def only(calibration: Calibration, name: FieldName) -> FoundField:
+    return next(each for each in calibration.fields if each.name is name)
+
+
+def lens(pixels: FloatArray, amplitude: float) -> FloatArray:
+    """Return two waves over the image that Brown's distortion cannot follow."""
+    u, v = pixels[..., 0] / 260.0, pixels[..., 1] / 330.0
+    waves = np.stack([np.sin(u + 0.7 * v), np.cos(v - u)], axis=-1)
+    return np.asarray(amplitude * np.sqrt(2) * waves)
+
+
+def test_a_good_station_shows_no_field_and_keeps_its_tip() -> None:
+    found, error = calibrated()
+    assert not [each for each in found.fields if each.is_certain]
+    assert (np.abs(error) < found.budget.expanded_uncertainty[:3]).all()
+
+
+def test_a_lens_field_is_found_and_corrected() -> None:
+    true, _ = swing()
+    exact = simulate_centers(
+        CAMERA, PEN, true.rotations, true.translations, 0.0, np.random.default_rng(0)
+    )
+    found, error = calibrated(lens(exact, 0.08))
+    field = only(found, FieldName.LENS)
+    assert field.is_certain
+    assert 0.05 < field.size < 0.11  # px, rms over u and v
+    shifts = found.bundle.lens_shifts(0)
+    assert shifts is not None
+    used = found.bundle.used[:, 0]
+    fitted, true_field = shifts[used], lens(exact, 0.08)[used]
+    # A constant and a linear part are a turn of the camera and its focal length.
+    columns = np.column_stack([np.ones(len(fitted)), exact[used]])
+    off = fitted - true_field
+    left = off - columns @ np.linalg.lstsq(columns, off, rcond=None)[0]
+    assert np.sqrt(np.mean(left**2)) < 0.4 * np.sqrt(np.mean(true_field**2))
+    # What is left of it in the images is hardly more than the noise.
+    assert found.joint.sigma < 1.15 * SIGMA
+    assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
+    assert not found.contradictions
+
+
+@pytest.mark.slow
+def test_a_measured_lens_field_of_the_camera_file_is_corrected() -> None:
+    true, _ = swing()
+    exact = simulate_centers(
+        CAMERA, PEN, true.rotations, true.translations, 0.0, np.random.default_rng(0)
+    )
+    prior = LensField.of(CAMERA.width, CAMERA.height, 0.05, 300.0)
+    nodes = lens(prior.nodes, 0.08)
+    field = replace(prior, values=nodes, covariance=1e-4 * prior.covariance)
+    known, error = calibrated(field.at(exact), camera=replace(CAMERA, lens_field=field))
+    plain, plain_error = calibrated()
+    np.testing.assert_allclose(error, plain_error, atol=1e-3)
+    assert known.joint.sigma < 1.1 * plain.joint.sigma
+
+
+def test_a_camera_that_turns_with_the_lean_is_found() -> None:
+    true, _ = swing()
+    away = true.rotations[:, 2, 1] - true.rotations[:, 2, 1].mean()
+    shifts = np.zeros((N_IMAGES, 1, 2))
+    shifts[:, 0, 1] = 0.3 * away
+    found, error = calibrated(shifts)
+    tilt = only(found, FieldName.TILT)
+    assert tilt.is_certain
+    # RMS over u and v; a part looks like another tip, and so the tip is less certain.
+    assert tilt.size == pytest.approx(0.3 * away.std() / np.sqrt(2), rel=0.5)
+    assert (np.abs(error) < 1.2 * found.budget.expanded_uncertainty[:3]).all()
+
+
+@pytest.mark.parametrize("name", FieldName)
+@pytest.mark.parametrize("times", [0.1, 2.0, 5.0, 1e6])
+def test_the_size_of_one_unknown_is_that_of_its_likelihood(
+    name: FieldName, times: float
+) -> None:
+    """It is seen ``times`` its uncertainty off, which is a hundredth of the largest."""
+    field = ImageField(name, 0, np.zeros((1, 1)), (4 * np.eye(1),))
+    noise = 0.01 * LARGEST[name]
+    found = size_of(field, np.eye(1) / noise**2, np.array([times / noise]))
+
+    sizes = LARGEST[name] * 1000.0 ** (np.arange(60) / 59 - 1)
+    both = noise**2 + 4 * sizes**2
+    seen = times * noise
+    costs = np.log(both / noise**2) + seen**2 / both - seen**2 / noise**2
+    best = int(np.argmin(costs))
+    assert found.sigma == pytest.approx(sizes[best])
+    assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
+    assert found.covariance[0, 0] == pytest.approx(4 * sizes[best] ** 2)
+    assert found.is_supported == (-costs[best] > 6.6349)
+    likely = 0.3 / 60 * np.exp(-0.5 * (costs - costs.min()))
+    likely /= likely.sum() + 0.7 * np.exp(0.5 * costs.min())
+    assert found.expected[0, 0] == pytest.approx(np.sum(likely * 4 * sizes**2))
+
+
+def test_what_a_file_states_of_its_lens_is_taken_as_it_is() -> None:
+    field = ImageField(FieldName.LENS, 0, np.zeros((1, 2)), (np.eye(2),), is_exact=True)
+    found = size_of(field, np.eye(2), np.array([9.0, 9.0]))
+    assert found.is_supported
+    np.testing.assert_array_equal(found.covariance, np.eye(2))
+    np.testing.assert_array_equal(found.expected, np.eye(2))
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [(FieldName.LENS, "warning.lens-field"), (FieldName.TILT, "warning.camera-tilt")],
+)
+def test_each_field_has_a_message_that_names_its_camera_if_it_has_one(
+    name: FieldName, code: str
+) -> None:
+    field = FoundField(name, "", 0.02, 50.0)
+    finding = field.message
+
+    assert (finding.code, finding.values) == (code, {"size": 0.02})
+    of_camera = replace(field, camera="right").message
+    assert of_camera.code == "rig.of-camera"
+    assert of_camera.values == {"camera": "right", "fault": finding}
+
+
+@pytest.mark.parametrize(("gain", "is_certain"), [(10.83, True), (10.82, False)])
+def test_a_field_is_certain_that_chance_makes_less_than_once_in_a_thousand(
+    gain: float, is_certain: bool
+) -> None:
+    assert FoundField(FieldName.LENS, "", 0.02, gain).is_certain == is_certain
+
+
+def test_a_tilt_is_found_of_the_camera_that_tilts() -> None:
+    rng = np.random.default_rng(3)
+    row, pen = row_of_cameras(2, 1000.0), replace(paper_pen(), led_sigma=0.002)
+    rig = from_first(row)
+    true = seen_from(swing_poses(40, rng), row.rotations[0], row.translations[0])
+    pixels = simulate_rig_centers(rig, pen, true, 0.03, rng)
+    pixels[:, 1, :, 0] += 0.8 * true.rotations[:, 2, 1, None]
+    state = BundleState(rig, pen, true.tip_pen, true.cone_cam, true.rotations)
+    bundle = adjust(state, pixels, priors_of(rig, pen, USUAL)).bundle
+
+    found = found_fields(bundle)
+
+    gains = [each.gain for each in found]
+    assert gains == sorted(gains, reverse=True)
+    tilt = found[0]
+    assert (tilt.name, tilt.camera) == (FieldName.TILT, "right")
+    spread = 0.8 * true.rotations[:, 2, 1].std() / np.sqrt(2)
+    assert tilt.size == pytest.approx(spread, rel=0.4)
