@@ -166,6 +166,8 @@ _ORIGINS: dict[Origin | None, str] = {
 }
 _GRADES: dict[Grade, str] = {
     Grade.PASS: QT_TRANSLATE_NOOP("phrases", "PASS"),
+    Grade.SCALE: QT_TRANSLATE_NOOP("phrases", "SCALE OK"),
+    Grade.STEADY: QT_TRANSLATE_NOOP("phrases", "STEADY"),
     Grade.CHECK: QT_TRANSLATE_NOOP("phrases", "CHECK"),
     Grade.REPEAT: QT_TRANSLATE_NOOP("phrases", "REPEAT"),
 }

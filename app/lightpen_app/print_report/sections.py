@@ -42,6 +42,8 @@ translate = QCoreApplication.translate
 NUMBER_LENGTH = 12  # digits of the SHA-256 that name a record
 GRADE_COLORS = {
     Grade.PASS: LIGHT.good,
+    Grade.SCALE: LIGHT.accent,
+    Grade.STEADY: LIGHT.accent,
     Grade.CHECK: LIGHT.warn,
     Grade.REPEAT: LIGHT.bad,
 }

@@ -256,7 +256,7 @@ def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
         "--exit-by-verdict",
         action="store_true",
         help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
-        "if it is CHECK (not proven)",
+        "if it is CHECK (not proven), 5 if it passes but does not verify the tip",
     )
 
 

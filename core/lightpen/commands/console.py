@@ -21,7 +21,13 @@ from lightpen.formats.observation_files import Centers, read_centers
 from lightpen.messages import Message, printable
 from lightpen.model.pen import Pen
 
-DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK = 0, 1, 2, 3, 4
+DONE, NO_TIP, BAD_INPUT, TO_REPEAT, TO_CHECK, NOT_THE_TIP = 0, 1, 2, 3, 4, 5
+STATUSES = {
+    Grade.REPEAT: TO_REPEAT,
+    Grade.CHECK: TO_CHECK,
+    Grade.SCALE: NOT_THE_TIP,
+    Grade.STEADY: NOT_THE_TIP,
+}
 LINE_INTERVAL = 15.0  # s, of lines of progress
 BAR_WIDTH = 72  # characters
 
@@ -65,11 +71,9 @@ def printing(command: Callable[[argparse.Namespace], int | None]) -> Command:
 
 def verdict_status(options: argparse.Namespace, grade: Grade | None) -> int:
     """Return the exit status of a verdict, if it is requested."""
-    if not options.exit_by_verdict:
+    if grade is None or not options.exit_by_verdict:
         return DONE
-    if grade is Grade.REPEAT:
-        return TO_REPEAT
-    return TO_CHECK if grade is Grade.CHECK else DONE
+    return STATUSES.get(grade, DONE)
 
 
 def require_other_file(record: Path | None, *inputs: Path | None) -> None:

@@ -5582,6 +5582,10 @@ mm</translation>
         <translation>按空格键继续。</translation>
     </message>
     <message>
+        <source>Nothing moved</source>
+        <translation>没有移动</translation>
+    </message>
+    <message>
         <source>Hold still</source>
         <translation>握住不动</translation>
     </message>
@@ -11350,6 +11354,14 @@ mm</translation>
     <message>
         <source>PASS</source>
         <translation>合格</translation>
+    </message>
+    <message>
+        <source>SCALE OK</source>
+        <translation>比例合格</translation>
+    </message>
+    <message>
+        <source>STEADY</source>
+        <translation>稳定</translation>
     </message>
     <message>
         <source>CHECK</source>

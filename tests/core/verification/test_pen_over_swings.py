@@ -113,7 +113,7 @@ def test_a_growth_within_its_uncertainty_is_not_called_one(
 
     assert found.growth is not None
     assert found.growth.uncertainty == pytest.approx(2 * sigma, rel=0.05)
-    assert found.assessment.grade is Grade.PASS
+    assert found.assessment.grade is Grade.STEADY
 
 
 def test_a_swing_that_contradicts_its_files_tells_no_growth(swing: Swing) -> None:
@@ -136,7 +136,7 @@ def test_a_sound_pen_is_left_alone(swing: Swing) -> None:
 
     found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
 
-    assert found.assessment.grade is Grade.PASS
+    assert found.assessment.grade is Grade.STEADY
 
 
 def test_one_swing_and_swings_of_two_pens_are_refused(swing: Swing) -> None:

@@ -74,7 +74,7 @@ class MeasurePresenter(VerifyPresenter):
 
     @override
     def _verdict(self, found: VerificationAssessment) -> str:
-        if found.grade is Grade.PASS:
+        if found.is_accepted:
             return self.tr("Part measured")
         if found.grade is Grade.CHECK:
             return self.tr("Not proven")

@@ -16,7 +16,7 @@ from lightpen.verification.session.session_state import (
     is_at_rest,
 )
 from lightpen.verification.session.status import ReadingState, VerificationStatus
-from lightpen.verification.tasks.assessment import USE_TIP, VerificationAssessment
+from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import Instruction, grade_text
@@ -83,7 +83,7 @@ class VerifyPresenter(QObject):
             tone=Tone.WARN if is_doubted else Tone.QUIET,
             action=self._action(),
             is_complete=status.is_done,
-            is_doubtful=found is not None and found.grade is not Grade.PASS,
+            is_doubtful=found is not None and not found.is_accepted,
         )
 
     def operator_value(self) -> OperatorValue:
@@ -220,8 +220,10 @@ class VerifyPresenter(QObject):
             return self.tr("Not verified")
         if found.grade is Grade.CHECK:
             return self.tr("Check needed")
-        if found.next_step == USE_TIP:
+        if found.grade is Grade.PASS:
             return self.tr("Tip verified")
+        if found.grade is Grade.STEADY:
+            return self.tr("Nothing moved")
         return self.tr("Scale and form verified")
 
     def _short(self, setup: SessionSetup, state: SessionState) -> str:

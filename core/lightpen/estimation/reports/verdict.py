@@ -39,9 +39,11 @@ TINY = 1e-12  # mm
 
 
 class Grade(StrEnum):
-    """Grade of a calibration."""
+    """Grade of a calibration or verification; of these two verify no tip."""
 
     PASS = "pass"
+    SCALE = "scale ok"  # a certified size is within its limit
+    STEADY = "steady"  # what should stand still does
     CHECK = "check"
     REPEAT = "repeat"
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -202,4 +203,6 @@ def _assessment(
                 kelvin=growth.relative / ALUMINIUM,
             )
             return check(grown, MEASURE_LENGTH)
-    return accepted(message("pen-health.good", n_swings=len(swings)), KEEP_FILE)
+    return accepted(
+        message("pen-health.good", n_swings=len(swings)), KEEP_FILE, Grade.STEADY
+    )

@@ -20,6 +20,7 @@ from lightpen.errors import UsageError
 from lightpen.estimation.bundle.seat_modes import axes_of_cone
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.joint import JointFit
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -145,4 +146,4 @@ def _assessment(change: FloatArray, covariance: FloatArray) -> VerificationAsses
     if uncertainty > RESOLVED:
         return check(message("press-test.coarse", uncertainty=uncertainty), MORE_IMAGES)
     reason = message("press-test.steady", change=float(along), uncertainty=uncertainty)
-    return accepted(reason, KEEP)
+    return accepted(reason, KEEP, Grade.STEADY)

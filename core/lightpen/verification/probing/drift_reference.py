@@ -19,6 +19,7 @@ from lightpen.detection.fixed_lamps import lamps_among, masked_lights, other_lig
 from lightpen.detection.observations import Observations
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -219,5 +220,6 @@ def _judged(
     return accepted(
         message(
             "witness.still", moved=moved, uncertainty=uncertainty, limit=limits.drift
-        )
+        ),
+        grade=Grade.STEADY,
     )

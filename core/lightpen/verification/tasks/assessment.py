@@ -21,7 +21,7 @@ MORE_POINTS = message("verification.more-points")
 BY_CHANCE = 0.01  # probability that no error looks significant: beyond 1.3 U
 RELEVANT = 0.25  # of a limit: a smaller difference does not matter, however certain
 
-WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
+WORST = (Grade.STEADY, Grade.SCALE, Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
 
 
 @dataclass(frozen=True)
@@ -39,21 +39,19 @@ class VerificationAssessment:
     @property
     def is_accepted(self) -> bool:
         """Whether nothing was found against the tip."""
-        return self.grade is Grade.PASS
+        return self.grade not in {Grade.CHECK, Grade.REPEAT}
 
 
 def worst(found: Iterable[VerificationAssessment]) -> VerificationAssessment:
     """Return the worst assessment; of passing ones, one that verifies the tip."""
-
-    def badness(each: VerificationAssessment) -> tuple[int, bool]:
-        return WORST.index(each.grade), each.is_accepted and each.next_step == USE_TIP
-
-    return max(found, key=badness)
+    return max(found, key=lambda each: WORST.index(each.grade))
 
 
-def accepted(reason: Message, next_step: Message = USE_TIP) -> VerificationAssessment:
-    """Return an assessment that passes."""
-    return VerificationAssessment(Grade.PASS, reason, next_step)
+def accepted(
+    reason: Message, next_step: Message = USE_TIP, grade: Grade = Grade.PASS
+) -> VerificationAssessment:
+    """Return an assessment that passes, by default of the tip."""
+    return VerificationAssessment(grade, reason, next_step)
 
 
 def check(reason: Message, next_step: Message) -> VerificationAssessment:

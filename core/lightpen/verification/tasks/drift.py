@@ -142,7 +142,7 @@ def _assessment(
     if limits.decision(distance, uncertainty, limit) is not Decision.ACCEPTED:
         return check(moved, TOUCH_LONGER)
     good = message("drift.good", distance=move, uncertainty=uncertainty, limit=limit)
-    return accepted(good, USE_TOUCHES)
+    return accepted(good, USE_TOUCHES, Grade.STEADY)
 
 
 def _screen(

@@ -14,6 +14,7 @@ from msgspec import structs
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.part import MeasuredPart, measure_part
 from lightpen.measuring.plan import Plan, Side
@@ -210,9 +211,10 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
         n_features = len(part.features)
         reason = message("part.measured", part=name, n_features=n_features)
         return accepted(reason, message("part.done"))
-    return accepted(
-        message("part.good", part=name, n_judged=n_judged), message("part.done")
-    )
+    good = message("part.good", part=name, n_judged=n_judged)
+    is_artefact = any(e.planned.certified is not None for e in part.results)
+    grade = Grade.SCALE if is_artefact else Grade.PASS
+    return accepted(good, message("part.done"), grade)
 
 
 def _listed(names: Sequence[Message]) -> tuple[Message, ...]:

@@ -202,6 +202,7 @@ def with_power(
     return accepted(
         message("tip.with-power", reason=reason, power=not_the_tip(found, limits)),
         BETTER_POSTURES,
+        Grade.SCALE,
     )
 
 

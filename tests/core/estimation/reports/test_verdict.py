@@ -144,9 +144,9 @@ def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
 
 def test_what_must_be_repeated_cannot_be_accepted() -> None:
     good = message(Code.GOOD, uncertainty=0.004)
-    assert [Verdict(grade, good).can_be_accepted for grade in Grade] == [
-        *(True, True, False)
-    ]
+    assert {each for each in Grade if not Verdict(each, good).can_be_accepted} == {
+        Grade.REPEAT
+    }
 
 
 def test_leds_that_do_not_fit_are_checked() -> None:

@@ -97,7 +97,7 @@ def test_an_led_has_moved_from_two_hundredths_on(
     found = examined(swing(1, elsewhere), swing(2, elsewhere + one_led(by)))
 
     assert found.moved == moved
-    assert found.assessment.grade is (Grade.REPEAT if moved else Grade.PASS)
+    assert found.assessment.grade is (Grade.REPEAT if moved else Grade.STEADY)
     with pytest.raises(CalibrationError) if moved else nullcontext() as refused:
         _require_unchanged([swing(1), swing(2, one_led(by))], PEN)
     if refused is not None:
@@ -157,7 +157,7 @@ def test_a_pen_has_grown_by_more_than_chance_and_more_than_matters(
     assert found.growth is not None
     assert found.growth.relative == pytest.approx(largest)
     assert found.growth.uncertainty == pytest.approx(2 * np.sqrt(2) * repeatability)
-    assert found.assessment.grade is (Grade.CHECK if by > 1 else Grade.PASS)
+    assert found.assessment.grade is (Grade.CHECK if by > 1 else Grade.STEADY)
     said = found.assessment.reason.values
     if by > 1:
         assert said["growth"] == pytest.approx(1e6 * largest)

@@ -48,7 +48,7 @@ def test_accepted_swings_with_the_led_file_tell_of_the_pen(
     assert reported == [1 / 3, 2 / 3, 1.0]
     assert (len(found.swings), found.n_left_out, found.n_missing) == (2, 1, 2)
     assert found.health is not None
-    assert found.health.assessment.grade is Grade.PASS
+    assert found.health.assessment.grade is Grade.STEADY
     assert found.poolable == found.swings
     assert replace(found, camera_sha256="of another").poolable == ()
 

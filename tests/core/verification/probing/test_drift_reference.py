@@ -40,7 +40,7 @@ def test_lamps_that_stay_show_that_the_camera_stands_still() -> None:
     found = drift_of_lamps(lamps(), SCALE, LIMITS)
 
     assert found is not None
-    assert found.assessment.grade is Grade.PASS
+    assert found.assessment.grade is Grade.STEADY
     assert found.moved < 2 * found.uncertainty
 
 
@@ -138,7 +138,9 @@ def test_moves_and_noise_are_those_of_blocks_of_eight_images_or_more(
     assert entries["grade"] == found.assessment.grade.value
 
 
-@pytest.mark.parametrize(("by", "grade"), [(1.001, Grade.PASS), (0.999, Grade.REPEAT)])
+@pytest.mark.parametrize(
+    ("by", "grade"), [(1.001, Grade.STEADY), (0.999, Grade.REPEAT)]
+)
 def test_lamps_are_judged_by_the_limit_of_a_drift_alone(
     by: float, grade: Grade
 ) -> None:
@@ -155,7 +157,7 @@ def test_lamps_are_judged_by_the_limit_of_a_drift_alone(
     if grade is Grade.REPEAT:
         assert said["shift"] == pytest.approx(usual.moved / SCALE)
     other = check(message("drift.too-few"), VERIFY_AGAIN)
-    judged = other if grade is Grade.PASS else found.assessment
+    judged = other if grade is Grade.STEADY else found.assessment
     assert judged_with(other, found) is judged
     assert judged_with(other, None) is other
 

@@ -7,7 +7,6 @@ from lightpen.messages import message
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
-    BETTER_POSTURES,
     VERIFY_AGAIN,
     VerificationAssessment,
     accepted,
@@ -63,7 +62,7 @@ def test_an_error_that_may_be_chance_blames_nothing_but_its_uncertainty() -> Non
 
 
 def test_of_tasks_that_pass_one_that_verifies_the_tip_counts() -> None:
-    scale, tip = accepted(REASON, BETTER_POSTURES), accepted(REASON)
+    scale, tip = accepted(REASON, REASON, Grade.SCALE), accepted(REASON)
     doubt = check(REASON, VERIFY_AGAIN)
 
     assert worst([scale, tip]) is tip

@@ -62,7 +62,7 @@ def test_a_ring_is_measured_within_its_uncertainty(
 
     within = [abs(each.errors[0]) <= each.uncertainty for each in errors]
     assert sum(within) >= 10
-    assert all(each.assessment.grade is Grade.PASS for each in errors)
+    assert all(each.assessment.is_accepted for each in errors)
 
 
 def test_less_than_three_quarters_of_a_ring_are_refused(

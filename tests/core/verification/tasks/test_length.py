@@ -30,7 +30,7 @@ def test_a_length_is_measured_within_its_uncertainty(
 
     found = measure_length([run], Conditions(instrument, LIMITS), OPTIONS)
 
-    assert found.assessment.grade is Grade.PASS
+    assert found.assessment.grade is Grade.SCALE
     assert abs(found.errors[0]) < found.uncertainties[0]
     assert [len(end) for end in found.runs[0].ends] == [2, 2]
     assert found.runs[0].along_view < 0.1
@@ -226,4 +226,4 @@ def test_each_of_seven_places_has_its_length_and_permissible_error(
     # The verdict is by the place with the largest error for its limit.
     shares = np.abs(found.errors) / [run.limit for run in found.runs]
     assert found.worst is found.runs[int(np.argmax(shares))]
-    assert found.assessment.grade is Grade.PASS
+    assert found.assessment.grade is Grade.SCALE
