@@ -15,11 +15,13 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
+from lightpen.measuring.artefacts import Artefact, ArtefactKind
 from lightpen.verification.probing.image_locations import touch_place
 from lightpen.verification.probing.probing import ProbingRules
 from lightpen.verification.probing.sources import touch_run
-from lightpen.verification.tasks.circle import CircleOptions, measure_circle
+from lightpen.verification.tasks.artefact import measure_artefacts
 from lightpen.verification.tasks.fixed_point import measure_fixed_point
+from lightpen.verification.tasks.part import sizes_of
 from lightpen.verification.tasks.task import Conditions
 
 UM = 1000.0  # in a millimetre
@@ -78,15 +80,13 @@ def _of_sets(data: Path) -> list[Row]:
         )
         for i in range(1, N_RUNS + 1)
     ]
-    circle = measure_circle(
-        [(run.name, run.touches) for run in runs],
-        conditions,
-        CircleOptions(radius=RADIUS),
-    )
+    ring = Artefact(ArtefactKind.RING, RADIUS)
+    named = [(run.name, run.touches) for run in runs]
+    circle = measure_artefacts("ring", N_RUNS * [ring], named, conditions)
+    errors = np.array([each.deviation for each in sizes_of(circle.part)])
     deviation = UM * point.calibrated.deviation
     assert point.nominal is not None
-    assert circle.deviation is not None
-    error, scatter = UM * circle.errors.mean(), UM * circle.deviation
+    error, scatter = UM * errors.mean(), UM * errors.std(ddof=1)
     return [
         Row(
             FIGURES[0],

@@ -11,6 +11,7 @@ from lightpen.detection.pen_detection import detect_pen
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
+from lightpen.measuring.artefacts import Artefact, ArtefactKind, artefact_plan
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
@@ -18,9 +19,9 @@ from lightpen.simulator.toucher import ProbingOperator
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import advance_session
 from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
-from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 
 N_IMAGES = 60  # of the swing that the tip is by
 SIGMA = 0.03  # px
@@ -46,13 +47,10 @@ class Verified:
 def verified(seed: int = 1) -> Verified:
     """Verify a tip by fixed point, ring and length; nothing but the hand is moved."""
     scene = Scene(seed=seed)
-    choices = VerificationChoices(
-        (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
-        (
-            CircleOptions(SIMULATED_RADIUS, 0.001),
-            LengthOptions(SIMULATED_LENGTH, 0.001),
-        ),
-    )
+    ring = Artefact(ArtefactKind.RING, 31.75, 0.001)
+    bar = Artefact(ArtefactKind.LENGTH, 150.0, 0.001)
+    plan = artefact_plan("Ring and bar", [ring, bar])
+    choices = VerificationChoices((FIXED_POINT.kind, PART.kind), (PartOptions(plan),))
     instrument = _instrument(scene, np.random.default_rng(seed))
     setup = SessionSetup(instrument, choices, cone_cam=scene.cone_cam)
     clock = SkippingClock()

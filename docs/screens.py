@@ -69,9 +69,7 @@ from lightpen.swing.resuming import read_resumable
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import advance_session
 from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.task import HandGoal
@@ -100,18 +98,11 @@ N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 N_RECEIVED = 1240  # images, by the camera
-CHOICES = VerificationChoices(
-    (FIXED_POINT.kind, CIRCLE.kind, LENGTH.kind),
-    (
-        FixedPointOptions(n_touches=10),
-        CircleOptions(SIMULATED_RADIUS, 0.001),
-        LengthOptions(SIMULATED_LENGTH, 0.001),
-    ),
-)
+CHOICES = VerificationChoices((FIXED_POINT.kind,), (FixedPointOptions(n_touches=6),))
 PART_CHOICES = VerificationChoices(
     options=(PartOptions(plate_plan().limited_to({"top", "hole 1", "dome"})),)
 )
-N_ON_RING = 7  # touches when the verification is drawn
+N_TOUCHED = 4  # points of a verification that is under way
 N_HELD = 10  # images through which the pen is held still
 N_EARLIER = 24  # calibrations in the history
 REFRESH_MS = 200  # of the plots
@@ -519,24 +510,20 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
 
 
 def _touched(
-    setup: SessionSetup, scene: Scene, n_on_ring: int = N_ON_RING, n_ends: int = 0
+    setup: SessionSetup, scene: Scene, n_touches: int = N_TOUCHED
 ) -> SessionState:
-    """Return a verification in the middle of its ring, or after more points."""
-    n_touches = setup.choices.options_of(FIXED_POINT).n_touches
+    """Return a verification after some points in the cone."""
+    n = setup.choices.options_of(FIXED_POINT).n_touches
     goals = [
-        HandGoal(np.zeros(3), 0.2 + 0.2 * (i % 2), 2 * np.pi * i / n_touches)
+        HandGoal(np.zeros(3), 0.2 + 0.2 * (i % 2), 2 * np.pi * i / n)
         for i in range(n_touches)
     ]
-    ring = setup.choices.options_of(CIRCLE)
-    goals += [CIRCLE.hand(ring, 0, i) for i in range(n_on_ring)]
-    length = setup.choices.options_of(LENGTH)
-    goals += [LENGTH.hand(length, 0, i) for i in range(n_ends)]
     return _probed(setup, scene, goals)
 
 
 def _verified(setup: SessionSetup, scene: Scene) -> SessionState:
-    """Return a verification with the results of all its tasks."""
-    return _touched(setup, scene, n_on_ring=11, n_ends=2)
+    """Return a verification with its result."""
+    return _touched(setup, scene, setup.choices.options_of(FIXED_POINT).n_touches)
 
 
 def _measuring(setup: SessionSetup, scene: Scene) -> SessionState:

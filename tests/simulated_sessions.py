@@ -22,6 +22,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.json_records import record_bytes
 from lightpen.formats.observation_files import Centers
+from lightpen.measuring.artefacts import Artefact, ArtefactKind
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -36,25 +37,13 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.tasks.circle import (
-    SIMULATED_AXES,
-    SIMULATED_CENTER,
-    CircleOptions,
-    measure_circle,
-)
-from lightpen.verification.tasks.circle import SIMULATED_RADIUS as RADIUS
+from lightpen.verification.tasks.artefact import measure_artefacts
 from lightpen.verification.tasks.drift import measure_drift
 from lightpen.verification.tasks.fixed_point import (
     FIXED_POINT,
     USUAL_TOUCHES,
     FixedPointOptions,
     measure_fixed_point,
-)
-from lightpen.verification.tasks.length import (
-    SIMULATED_ENDS,
-    SIMULATED_LENGTH,
-    LengthOptions,
-    measure_length,
 )
 from lightpen.verification.tasks.probed_point import (
     ProbedPoint,
@@ -67,6 +56,11 @@ from lightpen.verification.tasks.task import Conditions, Found
 LED_SIGMA = SEAT_SIGMA = 0.002  # mm
 SIGMA = 0.03  # px
 N_IMAGES, N_FRAMES = 60, 5
+RING = Artefact(ArtefactKind.RING, 31.751)
+LENGTH = Artefact(ArtefactKind.LENGTH, 150.0)
+ENDS = np.array([[-75.0, -20.0, 0.0], [75.0, -20.0, 0.0]])  # from the cone, mm
+TABLE = np.array([0.0, -40.0, 0.0])  # likewise
+TABLE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.9, -(0.19**0.5)]])
 UNSTEADY = np.radians(3.0)  # of a hand that holds the pen as asked
 
 
@@ -229,36 +223,30 @@ def ring_session(
     *,
     covered: float = 2 * np.pi,
     n_frames: int = N_FRAMES,
-    is_turned: bool = False,
 ) -> Found:
-    """Verify by a ring with the pen upright, or in another posture at each point."""
+    """Verify by a ring with the pen upright."""
     runs = []
     for i in range(n_runs):
         closed = covered >= 2 * np.pi
         angles = np.linspace(0, covered, n, endpoint=not closed)
         angles += rng.uniform(0, 2 * np.pi)
-        places = _on_table(RADIUS * np.column_stack([np.cos(angles), np.sin(angles)]))
+        places = _on_table(
+            RING.certified * np.column_stack([np.cos(angles), np.sin(angles)])
+        )
         postures = held(np.zeros(n), np.zeros(n), rng)
-        if is_turned:
-            swing = swing_poses(n, rng, pen=station.pen, camera=station.camera)
-            postures = swing.postures
         points = station.probe(places, postures, rng, n_frames=n_frames)
         runs.append((str(i), points))
-    return measure_circle(
-        runs, Conditions(station.instrument), CircleOptions(radius=RADIUS)
-    )
+    return measure_artefacts("", n_runs * [RING], runs, Conditions(station.instrument))
 
 
 def length_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
     """Verify by a length at seven places, the pen upright."""
     runs = []
     for i in range(7):
-        places = PAPER_CONE + SIMULATED_ENDS + [0.0, 15.0 * i, 0.0]
+        places = PAPER_CONE + ENDS + [0.0, 15.0 * i, 0.0]
         points = station.probe(places, held(np.zeros(2), np.zeros(2), rng), rng)
         runs.append((str(i), points))
-    return measure_length(
-        runs, Conditions(station.instrument), LengthOptions(length=SIMULATED_LENGTH)
-    )
+    return measure_artefacts("", 7 * [LENGTH], runs, Conditions(station.instrument))
 
 
 def drift_session(
@@ -277,7 +265,7 @@ def drift_session(
 
 def _on_table(flat: FloatArray) -> FloatArray:
     """Return places (N, 2) of a table before the camera in its frame, (N, 3), mm."""
-    return np.asarray(PAPER_CONE + SIMULATED_CENTER + flat @ SIMULATED_AXES)
+    return np.asarray(PAPER_CONE + TABLE + flat @ TABLE_AXES)
 
 
 Session: TypeAlias = Callable[[SimulatedStation, np.random.Generator], Found]
@@ -285,7 +273,6 @@ Session: TypeAlias = Callable[[SimulatedStation, np.random.Generator], Found]
 SESSIONS: dict[str, Session] = {
     "fixed point": fixed_point_session,
     "ring, upright": ring_session,
-    "ring, turned": partial(ring_session, n_runs=1, is_turned=True),
     "ring, 280 degrees, one image a point": partial(
         ring_session, n_runs=1, n=30, covered=np.radians(280), n_frames=1
     ),

@@ -73,13 +73,15 @@ def test_the_circle_of_the_paper_has_its_radius(
     )
 
     assert outcome.returncode == 0, outcome.stderr
-    for title in ("Radius error", "Relative error", "Roundness"):
-        line = next(x for x in outcome.stdout.splitlines() if x.startswith(title))
-        assert len(line[28:].split()) == N_RUNS + 1  # and the average
+    for title in ("Measured", "Error", "Relative error"):
+        lines = [x for x in outcome.stdout.splitlines() if x.startswith(title)]
+        assert sum(len(x[28:].split()) for x in lines) == N_RUNS + 2  # average and std
     record = read(tmp_path / "circle.json")
-    assert abs(record["mean_error_mm"]) <= 0.0015
-    assert record["std_mm"] <= 0.001
-    assert abs(record["mean_error_mm"]) <= record["expanded_uncertainty_mm"]
+    radii = [e for e in record["characteristics"] if e["quantity"] == "radius"]
+    errors = np.array([each["deviation"] for each in radii])
+    assert abs(errors.mean()) <= 0.0015
+    assert errors.std(ddof=1) <= 0.001
+    assert all(abs(e["deviation"]) <= e["expanded_uncertainty"] for e in radii)
 
 
 @pytest.mark.slow
@@ -178,18 +180,19 @@ def test_lengths_at_seven_places_are_one_command_with_their_permissible_errors(
 
     outcome = lightpen(
         *(*verify, *warm, "--length", *map(str, lengths)),
-        *("--json", tmp_path / "length.json"),
+        *("--exit-by-verdict", "--json", tmp_path / "length.json"),
     )
     of_two = lightpen(*verify, "--length", "60", "90")
 
-    assert "PASS" in outcome.stdout, outcome.stdout + outcome.stderr
-    assert "Places: 7" in outcome.stdout
-    runs = read(tmp_path / "length.json")["runs"]
-    for run, length in zip(runs, lengths, strict=True):
+    assert "SCALE OK" in outcome.stdout, outcome.stdout + outcome.stderr
+    assert outcome.returncode == 5
+    record = read(tmp_path / "length.json")
+    assert record["scale"]["factor"] == pytest.approx(1.0, abs=1e-3)
+    for found, length in zip(record["characteristics"], lengths, strict=True):
         warmer = length * (1 + 4 * 11.5e-6)
-        assert run["certified_length_mm"] == pytest.approx(warmer)
-        assert run["limit_mm"] == pytest.approx(0.03 + 1e-4 * warmer)
-        assert abs(run["error_mm"]) < run["expanded_uncertainty_mm"]
+        assert found["nominal"] == pytest.approx(warmer)
+        assert found["upper_limit"] == pytest.approx(warmer + 0.03 + 1e-4 * warmer)
+        assert abs(found["deviation"]) < found["expanded_uncertainty"]
     assert of_two.returncode == 2
     assert "2 values for 7 runs" in of_two.stderr
 
@@ -258,25 +261,15 @@ def test_a_tip_of_another_pen_is_refused(
     assert "lp05_leds.csv. Give that LED file" in outcome.stderr
 
 
-def test_part_of_a_ring_and_what_is_no_ring_are_refused(
-    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+def test_what_is_no_ring_is_refused(
+    shared_data: Path, lightpen: Run, files: list[str | Path]
 ) -> None:
-    part = tmp_path / "part"
-    part.mkdir()
-    for i in range(1, 13):
-        name = f"frame_{i:04d}.png"
-        shutil.copy(shared_data / "circle" / "run_01" / name, part / name)
-    circle = ("verify", "circle")
+    cone = shared_data / "fixed-point"
 
-    open_ring = lightpen(*circle, part, "--radius", "31.751", *files)
-    cone = lightpen(
-        *(*circle, shared_data / "fixed-point", "--radius", "31.751", *files)
-    )
+    outcome = lightpen("verify", "circle", cone, "--radius", "31.751", *files)
 
-    assert open_ring.returncode == 1
-    assert "at least 270 are needed" in open_ring.stderr
-    assert cone.returncode == 1
-    assert "which determines no circle" in cone.stderr
+    assert outcome.returncode == 1
+    assert "do not determine a circle" in outcome.stderr
 
 
 def test_a_pen_lifted_in_the_middle_is_named(
@@ -306,32 +299,21 @@ def test_one_end_touched_twice_is_refused(
     assert "one end was probed again" in outcome.stderr
 
 
-def test_points_are_reported_with_the_ball_compensated_along_the_axis(
+def test_points_are_measured_without_a_plan(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
 ) -> None:
-    """No image shows where the tip came from, as each is a touch of its own."""
-    touched = ("verify", "touches", shared_data / "fixed-point", *files)
+    file = tmp_path / "points.json"
 
-    centre = lightpen(*touched, "--json", tmp_path / "centre.json")
-    surface = lightpen(
-        *(*touched, "--ball-diameter", "4"), *("--json", tmp_path / "surface.json")
+    outcome = lightpen(
+        *("measure", "points", shared_data / "fixed-point", *files, "--json", file)
     )
 
-    assert centre.returncode == 0, centre.stderr
-    assert "Probed points in the camera frame / mm" in surface.stdout
-    one, other = (
-        np.array([each["point_cam_mm"] for each in read(tmp_path / name)["touches"]])
-        for name in ("centre.json", "surface.json")
-    )
-    np.testing.assert_allclose(np.linalg.norm(other - one, axis=1), 2.0, atol=1e-9)
-    centres, surfaces = (
-        read(tmp_path / name)["touches"] for name in ("centre.json", "surface.json")
-    )
-    # U of the ball is 0.001 mm unless stated; it is common to all points.
-    more = np.array(surfaces[0]["covariance"]) - np.array(centres[0]["covariance"])
-    assert np.trace(more) == pytest.approx((0.001 / 4) ** 2, rel=1e-3)
-    assert surfaces[0]["noise_covariance"] == centres[0]["noise_covariance"]
-    assert read(tmp_path / "centre.json")["verdict"] is None
+    assert outcome.returncode == 0, outcome.stderr
+    assert "Probed points in the camera frame / mm" in outcome.stdout
+    record = read(file)
+    assert (record["verification"], record["verdict"]) == ("points", None)
+    assert len(record["touches"]) == 10
+    assert np.linalg.eigvalsh(record["touches"][0]["covariance"])[0] > 0
 
 
 def test_files_that_are_missing_or_would_be_lost_are_named(

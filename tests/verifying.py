@@ -15,6 +15,8 @@ from tests.accepted_tip import Hold, Holder
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.measuring.artefacts import Artefact, ArtefactKind, artefact_plan
+from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
 from lightpen.model.rig import rig_of
 from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
@@ -29,22 +31,20 @@ from lightpen.verification.session.status import (
     SessionEventKind,
     VerificationStatus,
 )
-from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 TIMEOUT = 60.0  # s until a test gives up
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
-PAPER = FIXED_POINT, CIRCLE, LENGTH  # its three tables
+RING = Artefact(ArtefactKind.RING, 31.751, 0.001)
+LENGTH = Artefact(ArtefactKind.LENGTH, 150.0, 0.001)
+ARTEFACTS = artefact_plan("Ring and bar", [RING, LENGTH], {FeatureKind.CIRCLE: 10})
 CHOICES = VerificationChoices(
-    tuple(task.kind for task in PAPER),
-    (
-        FixedPointOptions(n_touches=4),
-        CircleOptions(SIMULATED_RADIUS, 0.001),
-        LengthOptions(SIMULATED_LENGTH, 0.001),
-    ),
+    (FIXED_POINT.kind, PART.kind),
+    (FixedPointOptions(n_touches=4), PartOptions(ARTEFACTS)),
     n_frames=3,
 )
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)

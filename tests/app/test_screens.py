@@ -177,7 +177,7 @@ def test_no_words_of_a_step_are_clipped(seen: Seen, key: Key) -> None:
 
 
 @pytest.mark.parametrize("language", languages())
-def test_nothing_is_scrolled_amid_a_ring_nor_at_its_result(
+def test_nothing_is_scrolled_amid_a_tip_check_nor_at_its_result(
     seen: Seen, language: str
 ) -> None:
     (probing,) = seen.rooms["verify", language, 1280]

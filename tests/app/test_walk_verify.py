@@ -20,7 +20,6 @@ from lightpen.record.swings.names import Names
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.drift import DRIFT, VISIT_POINTS
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH
 from lightpen.verification.tasks.registry import TASKS
 from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_app.work.settings import Settings
@@ -79,20 +78,6 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert walker.title() == "Verify"
     walker.until_says("Probe the cone")
     assert walker.says("SIMULATED")
-    assert walker.tells("Length")
-    for _ in range(2):
-        walker.press(Qt.Key.Key_Down)
-    walker.click("Include: Probe both ends")
-    walker.until_says("NOT READY")
-    assert walker.tells("The length is not specified. Enter the certified one.")
-    walker.click_into("Certified length", f"{SIMULATED_LENGTH:g}")
-    walker.press(Qt.Key.Key_Tab)
-    walker.until_tells("The uncertainty of the certified value is not specified.")
-    assert walker.says("NOT READY")
-    walker.click_into("U (k = 2) of certificate", "0.001")
-    walker.press(Qt.Key.Key_Tab)
-    # The pen that came by itself may have touched the cone meanwhile.
-    walker.until(lambda: not walker.says("NOT READY"))
     walker.click("Let the simulated operator probe")
     n_inputs = walker.n_inputs
     walker.until_says("Tip verified")
@@ -100,10 +85,8 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert walker.n_inputs == n_inputs
     assert walker.says("PASS")
     assert walker.says("Fixed point: PASS")
-    assert walker.says("Length: PASS")
     assert [each["verification"] for each in records(walker)] == [
         FIXED_POINT.kind,
-        LENGTH.kind,
         CONCLUSION,
     ]
     assert {each["origin"] for each in records(walker)} == {"simulated"}

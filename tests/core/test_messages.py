@@ -256,9 +256,9 @@ def test_what_to_type_answers_a_message_of_the_catalogue() -> None:
 
 
 def test_a_number_that_rounds_to_zero_has_no_sign() -> None:
-    values = {"error": -0.00001, "uncertainty": 0.001, "limit": 0.01}
+    def worded(error: float) -> str:
+        values = {"error": error, "uncertainty": 0.001, "limit": 0.01}
+        return str(message("artefact.good", name="Ring", **values))
 
-    assert "Radius error 0.0000 mm" in str(message("circle.good", **values))
-    assert "Radius error -0.0001 mm" in str(
-        message("circle.good", **{**values, "error": -0.0001})
-    )
+    assert "Ring: error 0.0000 mm" in worded(-0.00001)
+    assert "Ring: error -0.0001 mm" in worded(-0.0001)

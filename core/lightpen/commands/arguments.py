@@ -11,7 +11,7 @@ from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_window
 from lightpen.formats.pen_content import UNITS
 from lightpen.messages import message
-from lightpen.model.assumptions import COLDEST, WARMEST
+from lightpen.model.assumptions import BALL_UNCERTAINTY, COLDEST, WARMEST
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import LIMITS
 
@@ -257,6 +257,20 @@ def add_exit_by_verdict(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="exit status 3 if the verdict is REPEAT (of a part: out of tolerance), 4 "
         "if it is CHECK (not proven), 5 if it passes but does not verify the tip",
+    )
+
+
+def add_ball(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Add the options of the ball."""
+    parser.add_argument(
+        "--ball-diameter", type=not_negative, metavar="MM", help=meaning
+    )
+    parser.add_argument(
+        "--ball-uncertainty",
+        type=not_negative,
+        default=BALL_UNCERTAINTY,
+        metavar="MM",
+        help=f"U (k = 2) of the ball diameter ({BALL_UNCERTAINTY:g})",
     )
 
 

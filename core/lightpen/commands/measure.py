@@ -1,16 +1,18 @@
-"""``lightpen measure``: measure a part by a plan."""
+"""``lightpen measure``: measure a part by a plan, or points alone."""
 
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import add_json, add_verdict, not_negative
+from lightpen.commands.arguments import add_ball, add_json, add_verdict
 from lightpen.commands.console import (
+    DONE,
     printing,
     require_other_file,
     shown,
     verdict_status,
+    write_record,
 )
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.touched import add_touch_inputs, measure_runs
@@ -20,17 +22,25 @@ from lightpen.formats.files import write_whole
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.plan import Plan
 from lightpen.measuring.plan_checks import read_plan
+from lightpen.model.limits import rule_in_words
 from lightpen.verification.probing.drift_reference import judged_with
-from lightpen.verification.reports.summaries import found_text
+from lightpen.verification.reports.summaries import found_text, touches_text
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.task import BALL_OPTION
+from lightpen.verification.tasks.probed_point import point_entries
+
+POINTS = "points"
 
 
 def add_measure(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen measure``."""
     parser.set_defaults(run=_measure)
-    parser.add_argument("plan", type=Path, metavar="PLAN.yaml", help="measuring plan")
+    parser.add_argument(
+        "plan",
+        type=Path,
+        metavar="PLAN.yaml",
+        help=f"measuring plan; or the word {POINTS}, for points with U alone",
+    )
     parser.add_argument(
         "touches",
         nargs="+",
@@ -38,21 +48,11 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         help="FEATURE=IMAGES for each feature of the plan (image folder, pattern, "
         "video, record, or LED centres as CSV), or a folder with a folder or CSV file "
         "for each feature; FEATURE@2 for those probed after the part or the camera "
-        "was moved",
+        f"was moved; of {POINTS}: IMAGES",
     )
     add_touch_inputs(parser, "calibration to measure with")
-    parser.add_argument(
-        "--ball-diameter",
-        type=not_negative,
-        metavar="MM",
-        help="default: that of the calibrated tip, if known; 0: no compensation",
-    )
-    parser.add_argument(
-        BALL_OPTION.argument,
-        type=not_negative,
-        default=PartOptions().ball_uncertainty,
-        metavar="MM",
-        help=BALL_OPTION.help,
+    add_ball(
+        parser, "default: that of the calibrated tip, if known; 0: no compensation"
     )
     parser.add_argument(
         "--drift",
@@ -75,6 +75,26 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
 
 @printing
 def _measure(given: argparse.Namespace) -> int:
+    return _measure_points(given) if str(given.plan) == POINTS else _by_plan(given)
+
+
+def _measure_points(given: argparse.Namespace) -> int:
+    """Measure points, the centres of the ball."""
+    given.plan = None
+    centers = [Path(at) for at in given.touches if _is_csv(at)]
+    images = [(at,) for at in given.touches if not _is_csv(at)]
+    measured = measure_runs(given, images, centers)
+    touches = [touch for run in measured.runs for touch in run.touches]
+    print(shown(touches_text(touches, measured.instrument, measured.rejected)))
+    measured.print_lamp_drift()
+    if given.json is not None:
+        entries = {"touches": point_entries(touches, measured.instrument)}
+        rule = rule_in_words(measured.conditions.limits)
+        write_record(given.json, measured.record(given, POINTS, entries, None, rule))
+    return DONE
+
+
+def _by_plan(given: argparse.Namespace) -> int:
     require_other_file(given.json, given.plan)
     exports = {path: _export_of(path) for path in given.export}
     plan = read_plan(given.plan)

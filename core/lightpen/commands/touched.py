@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpen.commands.arguments import add_bits, add_cameras_and_pen
-from lightpen.commands.console import lacking, progress, require_other_file
+from lightpen.commands.console import lacking, progress, require_other_file, shown
 from lightpen.commands.entering import limits_in_force
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
@@ -83,6 +83,25 @@ def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:
     )
 
 
+def add_runs(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the images of runs, or their LED centres; see `given_runs`."""
+    parser.add_argument(
+        "runs",
+        nargs="*",
+        metavar="RUN",
+        help=f"image folder, file name pattern, video or record: {what}",
+    )
+    parser.add_argument(
+        "--centers",
+        nargs="+",
+        type=Path,
+        default=(),
+        metavar="FILE.csv",
+        help="LED centres in place of images, a file for each RUN (frame, led, x_px, "
+        "y_px)",
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredRuns:
     """The points of all runs, and the instrument."""
@@ -122,6 +141,12 @@ class MeasuredRuns:
         own = {each.sha256 for each in self.calibration.calibration.inputs.observations}
         return sum(each.sha256 in own for each in self.hashed_files)
 
+    def print_lamp_drift(self, judged: VerificationAssessment | None = None) -> None:
+        """Print the drift of fixed lamps, unless it is the verdict."""
+        drift = None if self.lamp_drift is None else self.lamp_drift.assessment
+        if drift is not None and drift is not judged:
+            print(shown(str(drift.reason)))
+
     def record(
         self,
         options: argparse.Namespace,
@@ -160,6 +185,15 @@ class MeasuredRuns:
             "images": [file_entry(file) for file in self.hashed_files],
             **({} if drift is None else {"drift": file_entry(hashed(drift))}),
         }
+
+
+def given_runs(options: argparse.Namespace, *, is_pooled: bool = False) -> MeasuredRuns:
+    """Measure the given runs; if pooled, all images are those of one."""
+    runs = options.runs
+    places = [tuple(runs)] if is_pooled else [(run,) for run in runs]
+    if bool(options.centers) == any(places):
+        raise UsageError("cli.runs-or-centers")
+    return measure_runs(options, places, options.centers)
 
 
 def measure_runs(

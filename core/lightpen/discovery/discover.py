@@ -60,10 +60,11 @@ from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.intrinsics.distortion import Choice
+from lightpen.measuring.artefacts import Artefact, ArtefactKind
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import fit_rigid
-from lightpen.verification.tasks.length import LengthOptions, measure_length
+from lightpen.verification.tasks.artefact import measure_artefacts
 from lightpen.verification.tasks.task import Conditions
 
 NOT_SETTLED = (
@@ -233,19 +234,21 @@ def with_touched_length(request: Request, relative: Discovery) -> Request:
     assert touched is not None
     instrument = relative.calibration.instrument
     runs = [("--touched", touched.touches(instrument))]
-    (run,) = measure_length(runs, Conditions(instrument), LengthOptions()).runs
+    unknown = [Artefact(ArtefactKind.LENGTH, 0.0)]
+    (found,) = measure_artefacts("", unknown, runs, Conditions(instrument)).part.results
+    measured = found.value.value
     known, certified = relative.lengths[0], touched.separation
-    length = known.length * certified.distance / run.measured
-    own = run.uncertainty / COVERAGE_FACTOR / run.measured
+    length = known.length * certified.distance / measured
+    own = found.value.uncertainty / COVERAGE_FACTOR / measured
     sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
     for each in known_lengths(request.lengths, relative.pen.leds):
-        implied = run.measured * each.length / each.between(relative.pen.leds)
+        implied = measured * each.length / each.between(relative.pen.leds)
         relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
         by_chance = np.hypot(implied * relative_sigma, certified.sigma)
         if abs(implied - certified.distance) > CONTRADICTING * by_chance:
             raise contradicting_distance(certified.distance, implied, each)
-    measured = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
-    return replace(request, lengths=(*request.lengths, measured))
+    by_touches = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
+    return replace(request, lengths=(*request.lengths, by_touches))
 
 
 def _with_second(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields, replace
 from math import isfinite
 
 COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
+BALL_UNCERTAINTY = 0.001  # mm, U (k = 2) of the diameter of a ball with a certificate
 
 
 @dataclass(frozen=True)

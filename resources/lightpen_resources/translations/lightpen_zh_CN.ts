@@ -3715,10 +3715,6 @@ needed</source>
         <translation>自动触测所有任务。</translation>
     </message>
     <message>
-        <source>Simulated: ring radius {0} mm, bar length {1} mm.</source>
-        <translation>模拟标准件：圆环半径 {0} mm，标准棒长度 {1} mm。</translation>
-    </message>
-    <message>
         <source>Lift</source>
         <translation>抬起</translation>
     </message>
@@ -4295,17 +4291,6 @@ needed</source>
     <message>
         <source>Open...</source>
         <translation>打开...</translation>
-    </message>
-</context>
-<context>
-    <name>RingView</name>
-    <message>
-        <source>of {0}°</source>
-        <translation>共需 {0}°</translation>
-    </message>
-    <message>
-        <source>Ring: {0} of {1} degrees, points: {2}</source>
-        <translation>环规：{0} / {1} 度，点数：{2}</translation>
     </message>
 </context>
 <context>
@@ -5245,14 +5230,11 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>TaskForm</name>
+    <name>TaskPanel</name>
     <message>
         <source>Include: {0}</source>
         <translation>包括：{0}</translation>
     </message>
-</context>
-<context>
-    <name>TaskPanel</name>
     <message>
         <source>Recorded images...</source>
         <translation>录制的图像...</translation>
@@ -5781,18 +5763,6 @@ mm</translation>
         <translation>请采集更多图像。</translation>
     </message>
     <message>
-        <source>Certified</source>
-        <translation>证书值</translation>
-    </message>
-    <message>
-        <source>Certified length</source>
-        <translation>证书长度</translation>
-    </message>
-    <message>
-        <source>Certified radius</source>
-        <translation>证书半径</translation>
-    </message>
-    <message>
         <source>Change the pen tilt</source>
         <translation>改变光笔倾斜</translation>
     </message>
@@ -5821,14 +5791,6 @@ mm</translation>
         <translation>连接超时</translation>
     </message>
     <message>
-        <source>Contact</source>
-        <translation>触测部位</translation>
-    </message>
-    <message>
-        <source>Covered / °</source>
-        <translation>覆盖 / °</translation>
-    </message>
-    <message>
         <source>Current tip: average</source>
         <translation>当前测头：平均值</translation>
     </message>
@@ -5839,10 +5801,6 @@ mm</translation>
     <message>
         <source>Deviation</source>
         <translation>偏差</translation>
-    </message>
-    <message>
-        <source>Deviation from the ring / mm</source>
-        <translation>与圆环的偏差 / mm</translation>
     </message>
     <message>
         <source>Diameter of the discs: {flaw}</source>
@@ -5879,10 +5837,6 @@ mm</translation>
     <message>
         <source>Error</source>
         <translation>误差</translation>
-    </message>
-    <message>
-        <source>Error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm): U is too large for the decision rule to prove that the limit is kept.</source>
-        <translation>误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：U 过大，按判定规则无法证明符合限值。</translation>
     </message>
     <message>
         <source>Expected std. deviation</source>
@@ -6015,14 +5969,6 @@ mm</translation>
     <message>
         <source>LEDs {first} and {second} are {distance:.2f} mm apart, too close for discs of {diameter:g} mm. Check their coordinates and the diameter.</source>
         <translation>LED {first} 和 {second} 相距 {distance:.2f} mm，对 {diameter:g} mm 的发光面来说太近。请检查坐标和直径。</translation>
-    </message>
-    <message>
-        <source>Length</source>
-        <translation>长度</translation>
-    </message>
-    <message>
-        <source>Length error {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
-        <translation>长度误差最大 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
         <source>Length: error</source>
@@ -6197,14 +6143,6 @@ mm</translation>
         <translation>不允许的操作</translation>
     </message>
     <message>
-        <source>Out of plane</source>
-        <translation>离面</translation>
-    </message>
-    <message>
-        <source>Out-of-plane deviation</source>
-        <translation>离面偏差</translation>
-    </message>
-    <message>
         <source>P</source>
         <translation>P</translation>
     </message>
@@ -6221,20 +6159,8 @@ mm</translation>
         <translation>权限不够</translation>
     </message>
     <message>
-        <source>Places</source>
-        <translation>位置数</translation>
-    </message>
-    <message>
-        <source>Points</source>
-        <translation>测点数</translation>
-    </message>
-    <message>
         <source>Points excluded because they lie elsewhere: {n_left_out} of {n_touches}, the first {first}. The pen was lifted or slipped.</source>
         <translation>{n_touches} 个测点中有 {n_left_out} 个位于别处而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
-    </message>
-    <message>
-        <source>Points excluded because they lie off the ring: {n_left_out}, the first {first}. The pen was lifted or slipped.</source>
-        <translation>{n_left_out} 个测点偏离圆环而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
         <source>Points of {name} ({kind}), camera frame / mm</source>
@@ -6257,20 +6183,8 @@ mm</translation>
         <translation>把测头压入锥孔，轻轻摆动光笔。</translation>
     </message>
     <message>
-        <source>Probe a ring</source>
-        <translation>触测圆环</translation>
-    </message>
-    <message>
-        <source>Probe both ends</source>
-        <translation>触测长度两端</translation>
-    </message>
-    <message>
         <source>Probe more points, or use a precise probing, for a smaller U.</source>
         <translation>触测更多点，或采用更精密的触测，以减小 U。</translation>
-    </message>
-    <message>
-        <source>Probe one end</source>
-        <translation>触测一端</translation>
     </message>
     <message>
         <source>Probe the cone</source>
@@ -6291,14 +6205,6 @@ mm</translation>
     <message>
         <source>Probe the feature</source>
         <translation>触测要素</translation>
-    </message>
-    <message>
-        <source>Probe the other end</source>
-        <translation>触测另一端</translation>
-    </message>
-    <message>
-        <source>Probe the ring</source>
-        <translation>触测圆环</translation>
     </message>
     <message>
         <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
@@ -6329,32 +6235,12 @@ mm</translation>
         <translation>ROS (YAML)</translation>
     </message>
     <message>
-        <source>Radial</source>
-        <translation>径向</translation>
-    </message>
-    <message>
         <source>RadialDistortion in {name} has {counted} where 2 or 3 are needed. Correct it, or export the file again.</source>
         <translation>{name} 中的 RadialDistortion 有 {counted}，需要 2 或 3 个。请改正，或重新导出文件。</translation>
     </message>
     <message>
-        <source>Radius</source>
-        <translation>半径</translation>
-    </message>
-    <message>
-        <source>Radius / mm; certified {certified:.4f} mm</source>
-        <translation>半径 / mm；证书值 {certified:.4f} mm</translation>
-    </message>
-    <message>
         <source>Radius error</source>
         <translation>半径误差</translation>
-    </message>
-    <message>
-        <source>Radius error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
-        <translation>半径误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Radius error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The tip, the LED file or the intrinsics file may be wrong, or the ball is not compensated.</source>
-        <translation>半径误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件或内参文件可能有误，或测球未补偿。</translation>
     </message>
     <message>
         <source>Range</source>
@@ -6383,18 +6269,6 @@ mm</translation>
     <message>
         <source>Required - current tip</source>
         <translation>所需测头 - 当前测头</translation>
-    </message>
-    <message>
-        <source>Ring</source>
-        <translation>圆环</translation>
-    </message>
-    <message>
-        <source>Roundness</source>
-        <translation>圆度</translation>
-    </message>
-    <message>
-        <source>Runs</source>
-        <translation>轮数</translation>
     </message>
     <message>
         <source>Simulated pen</source>
@@ -6447,10 +6321,6 @@ mm</translation>
     <message>
         <source>The archive is closed: the program ends.</source>
         <translation>档案库已关闭：程序正在结束。</translation>
-    </message>
-    <message>
-        <source>The ball diameter is not specified; a ring or a length probed on its surfaces needs it. Enter it with the tip.</source>
-        <translation>未指定测球直径；触测圆环或长度的表面时需要它。请在测头处输入。</translation>
     </message>
     <message>
         <source>The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
@@ -6625,10 +6495,6 @@ mm</translation>
         <translation>平均值的 U (k = 2)</translation>
     </message>
     <message>
-        <source>U (k = 2) of certificate</source>
-        <translation>证书的 U (k = 2)</translation>
-    </message>
-    <message>
         <source>U (k = 2) of difference</source>
         <translation>差值的 U (k = 2)</translation>
     </message>
@@ -6709,24 +6575,8 @@ mm</translation>
         <translation>{n_views} 个视图（{names}）中 fx {fx:.1f}、cx {cx:.1f}、cy {cy:.1f} px</translation>
     </message>
     <message>
-        <source>in a groove</source>
-        <translation>槽中</translation>
-    </message>
-    <message>
-        <source>in cones</source>
-        <translation>在锥孔内</translation>
-    </message>
-    <message>
-        <source>in its bore</source>
-        <translation>孔内</translation>
-    </message>
-    <message>
         <source>inches</source>
         <translation>英寸</translation>
-    </message>
-    <message>
-        <source>inner faces</source>
-        <translation>内侧面</translation>
     </message>
     <message>
         <source>metres</source>
@@ -6739,18 +6589,6 @@ mm</translation>
     <message>
         <source>no image</source>
         <translation>无图像</translation>
-    </message>
-    <message>
-        <source>not specified</source>
-        <translation>未指定</translation>
-    </message>
-    <message>
-        <source>on its outside</source>
-        <translation>外圆</translation>
-    </message>
-    <message>
-        <source>outer faces</source>
-        <translation>外侧面</translation>
     </message>
     <message>
         <source>plan</source>
@@ -6855,10 +6693,6 @@ mm</translation>
     <message>
         <source>{count}, run {run} of {n_runs}</source>
         <translation>{count}，第 {run} / {n_runs} 轮</translation>
-    </message>
-    <message>
-        <source>{covered:.0f} of {needed:.0f}°</source>
-        <translation>{covered:.0f}° / {needed:.0f}°</translation>
     </message>
     <message>
         <source>{entry} in {name} is {number:g}; a whole number of 0 or more is needed. Correct it.</source>
@@ -7083,6 +6917,18 @@ mm</translation>
     <message>
         <source>{name} unpacks to more than 50 MB. Save the sheet with the LEDs as CSV.</source>
         <translation>{name} 解压后超过 50 MB。请将含 LED 的工作表另存为 CSV。</translation>
+    </message>
+    <message>
+        <source>{name}: U (k = 2) is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm. Probe more points, and lay a length across the view.</source>
+        <translation>{name}：U（k = 2）为 {uncertainty:.4f} mm，超过限值 {limit:.4f} mm。请触测更多点，并使长度横向于视线。</translation>
+    </message>
+    <message>
+        <source>{name}: error {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified value and the ball diameter. Otherwise the scale of the LED file or the intrinsics file is wrong, or the pen is warmer than at its measurement.</source>
+        <translation>{name}：误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查证书值和测球直径。否则 LED 文件的比例或内参文件有误，或光笔比测量它时更热。</translation>
+    </message>
+    <message>
+        <source>{name}: error {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm). This verifies the scale, not the tip.</source>
+        <translation>{name}：最大误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这验证比例，不验证测头。</translation>
     </message>
     <message>
         <source>{other} was calibrated with another LED file than {first}. Give calibrations of one pen with one LED file.</source>
@@ -7405,12 +7251,32 @@ mm</translation>
         <translation>光笔的方向 ({x:.2f}, {y:.2f}, {z:.2f})</translation>
     </message>
     <message>
+        <source>Certified size / mm</source>
+        <translation>证书尺寸 / mm</translation>
+    </message>
+    <message>
         <source>The camera, zoom or focus changed at {name}: {before}; {after}. Lock zoom and focus, and take all views again.</source>
         <translation>相机、变焦或对焦在 {name} 处改变：{before}；{after}。请锁定变焦和对焦，并重新拍摄所有视图。</translation>
     </message>
     <message>
         <source>The images are from two cameras, or were taken with two settings of zoom or focus: {one}; {other}. Use images of one camera with one setting.</source>
         <translation>图像来自两台相机，或以两种变焦或对焦设置拍摄：{one}；{other}。请使用同一相机、同一设置的图像。</translation>
+    </message>
+    <message>
+        <source>The points of {run} are at more than two positions: point {number} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>
+        <translation>{run} 的测点位于两个以上的位置：测点 {number} 距其所在端的其他测点 {distance:.2f} mm。光笔是否在那里被抬起？请只触测两端。</translation>
+    </message>
+    <message>
+        <source>plate (flatness)</source>
+        <translation>平板（平面度）</translation>
+    </message>
+    <message>
+        <source>ring (radius)</source>
+        <translation>圆环（半径）</translation>
+    </message>
+    <message>
+        <source>sphere (diameter)</source>
+        <translation>球（直径）</translation>
     </message>
     <message>
         <source>the disk is full. Free some space, or write to another disk.</source>
@@ -7913,10 +7779,6 @@ mm</translation>
         <translation>链 {chain} 的第 {number} 个条目被更改。</translation>
     </message>
     <message>
-        <source>Expansion</source>
-        <translation>热膨胀</translation>
-    </message>
-    <message>
         <source>Feature {name}: {said}</source>
         <translation>要素 {name}：{said}</translation>
     </message>
@@ -8043,18 +7905,6 @@ mm</translation>
     <message>
         <source>LEDs {first} and {second} are swapped. LEDs 1 to 4 must be in order along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Swap their coordinates.</source>
         <translation>LED {first} 和 {second} 互换了：各自在对方的位置上。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请交换它们的坐标。</translation>
-    </message>
-    <message>
-        <source>Largest error: {share:.0f} % of its limit at {run}. Places: {n_places} (ISO 10360-12: {needed}).</source>
-        <translation>最大误差：{run} 处为其限值的 {share:.0f} %。位置数：{n_places}（ISO 10360-12：{needed}）。</translation>
-    </message>
-    <message>
-        <source>Length / mm</source>
-        <translation>长度 / mm</translation>
-    </message>
-    <message>
-        <source>Length error at {run} {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Check the certified length of this bar. Otherwise the scale of the LED file or the intrinsics file is wrong, or the pen is warmer than at its measurement.</source>
-        <translation>{run} 处长度误差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。请检查该长度杆的证书长度。否则 LED 文件或内参文件的比例有误，或光笔温度高于其测量时的温度。</translation>
     </message>
     <message>
         <source>Length: additional error per metre</source>
@@ -8293,14 +8143,6 @@ mm</translation>
         <translation>压力试验没有结果：{why}</translation>
     </message>
     <message>
-        <source>Probe one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
-        <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
-    </message>
-    <message>
-        <source>Probe the ring all round and hold still on each point. Points: {n_touches}.</source>
-        <translation>沿环规整圈触测，在每个点上保持静止。点数：{n_touches}。</translation>
-    </message>
-    <message>
         <source>Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or capturing takes longer.</source>
         <translation>处理速度不足：{n_offered} 幅图像中有 {n_missed} 幅未处理。请关闭其他程序，否则采集时间更长。</translation>
     </message>
@@ -8331,10 +8173,6 @@ mm</translation>
     <message>
         <source>Risk of a wrong decision</source>
         <translation>误判风险</translation>
-    </message>
-    <message>
-        <source>Scale factor of the pen from this length: {factor:.6f}, U (k = 2) {uncertainty:.1f} ppm; before {before:.1f} ppm.</source>
-        <translation>由该长度得到的光笔比例系数：{factor:.6f}，U (k = 2) {uncertainty:.1f} ppm；此前为 {before:.1f} ppm。</translation>
     </message>
     <message>
         <source>Self-check of the LEDs {value:.2f}, limit {limit:.2f}: errors follow the posture, so LEDs, pen or lens deviate from the model and U may be too small. Check for bent LEDs, a loose pen and a window before the lens, then verify the tip.</source>
@@ -8375,10 +8213,6 @@ mm</translation>
     <message>
         <source>Taken over from another station: {kind} {id}, {by}. It replaces the earlier change by {before}.</source>
         <translation>已从其他工位接收：{kind} {id}，{by}。它取代 {before} 较早的更改。</translation>
-    </message>
-    <message>
-        <source>Temperature</source>
-        <translation>温度</translation>
     </message>
     <message>
         <source>The GenTL producer {file} does not load: {why}. Choose the 64-bit producer of this camera for this system.</source>
@@ -8789,10 +8623,6 @@ mm</translation>
         <translation>链 {chain} 的最后一条记录与链头所指的不同：有记录被添加或删除。</translation>
     </message>
     <message>
-        <source>The length is not specified. Enter the certified one.</source>
-        <translation>未指定长度。请输入证书值。</translation>
-    </message>
-    <message>
         <source>The lengths of the board {text} are not valid: they must be above 0 mm, and markers or circles smaller than their squares. Measure them again.</source>
         <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
     </message>
@@ -8897,22 +8727,6 @@ mm</translation>
         <translation>没有相机会把平整标定板 {board} 看成这些点的样子：格子与所指定的不符，或图像不是同一相机拍摄。请重新数并测量格子。</translation>
     </message>
     <message>
-        <source>The points lie in one place or on a line, which determines no circle. Probe the ring all round.</source>
-        <translation>各测点位于同一处或一条直线上，不能确定圆。请沿环一周触测。</translation>
-    </message>
-    <message>
-        <source>The points of {run} cover {covered:.0f} degrees of the ring, at least {needed:.0f} are needed to determine its radius. Probe the ring also between {first} and {second}.</source>
-        <translation>{run} 的测点覆盖环的 {covered:.0f}°，确定半径至少需要 {needed:.0f}°。请在 {first} 与 {second} 之间也触测。</translation>
-    </message>
-    <message>
-        <source>The points of {run} deviate by up to {form:.4f} mm from a circle in a plane (limit {limit:.4f} mm): the tip slipped, the ring is dirty, or the tip is wrong.</source>
-        <translation>{run} 的测点最多偏离平面圆 {form:.4f} mm（限值 {limit:.4f} mm）：测头滑动，环不清洁，或测头有误。</translation>
-    </message>
-    <message>
-        <source>The points of {run} lie on no circle: {n_off} of {n_touches} are outliers, and the others deviate by up to {off:.2f} mm. Probe one ring, in one plane.</source>
-        <translation>{run} 的测点不在一个圆上：{n_touches} 个点中有 {n_off} 个离群，其余最多偏离 {off:.2f} mm。请在一个平面内触测同一个环。</translation>
-    </message>
-    <message>
         <source>The pose of camera {camera} in the rig file differs from the images by {angle:.1f}° and {distance:.0f} mm.</source>
         <translation>相机组文件中相机 {camera} 的位姿与图像相差 {angle:.1f}° 和 {distance:.0f} mm。</translation>
     </message>
@@ -8931,10 +8745,6 @@ mm</translation>
     <message>
         <source>The projection is uncertain by {px:.1f} px over the image: the views do not determine the lens there. Add views with the board in each corner of the image.</source>
         <translation>图像上投影的不确定度为 {px:.1f} px：视图在该处不能确定镜头。请增加标定板位于图像各角的视图。</translation>
-    </message>
-    <message>
-        <source>The radius of the ring is not specified. Enter the certified one.</source>
-        <translation>未指定圆环的半径。请输入证书值。</translation>
     </message>
     <message>
         <source>The record of {entry} is missing or was modified. Import the entries from their station again.</source>
@@ -9149,16 +8959,8 @@ mm</translation>
         <translation>平移似乎以米为单位：若按毫米计，其长度只有 {typical:.3f} mm（中位数）。需要毫米：请将 tx、ty、tz 乘以 1000。</translation>
     </message>
     <message>
-        <source>The two points are {distance:.2f} mm apart; the certified length is {certified} mm. Probe its other end.</source>
-        <translation>两点相距 {distance:.2f} mm，证书长度为 {certified} mm。请触测其另一端。</translation>
-    </message>
-    <message>
         <source>The two recordings have different numbers of images. Choose two simultaneous recordings.</source>
         <translation>两台相机的录像图像数量不同。请选择同时录制的两组录像。</translation>
-    </message>
-    <message>
-        <source>The uncertainty of the certified value is not specified. Enter U (k = 2) of its certificate.</source>
-        <translation>未指定证书值的不确定度。请输入其证书中的 U (k = 2)。</translation>
     </message>
     <message>
         <source>The verification in {file} was modified or damaged after it was written. Restore the file from a copy.</source>
@@ -9253,10 +9055,6 @@ mm</translation>
         <translation>没有 LED {number}；找到 {n_leds} 个 LED，从测头向上、从左到右编号。请给出其中两个之间的长度。</translation>
     </message>
     <message>
-        <source>This end was probed before. Probe the other one.</source>
-        <translation>这一端已触测过。请触测另一端。</translation>
-    </message>
-    <message>
         <source>This posture was recorded before. Keep the tip in the cone and change the pen tilt.</source>
         <translation>该姿态已记录过。请保持测头在锥孔中并改变光笔的倾斜。</translation>
     </message>
@@ -9307,14 +9105,6 @@ mm</translation>
     <message>
         <source>Turn the LEDs towards the camera. No data is lost.</source>
         <translation>请将 LED 朝向相机。没有数据丢失。</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip. Probe each end more often, and lay the length across the view.</source>
-        <translation>{run} 处长度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。请对每端多次触测，并使长度方向横对视线。</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the radius is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not verify the tip.</source>
-        <translation>半径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip along its weakest direction is compared with the limit of {limit:.4f} mm by simple acceptance (ILAC-G8:09/2019, 4.2.1; JCGM 106:2012, 8.2): U itself is the quantity judged, so the guard band is zero. U up to the limit is PASS, above it CHECK, above {far:.4f} mm, {times:g} times the limit, REPEAT.</source>
@@ -9829,10 +9619,6 @@ mm</translation>
         <translation>{path} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请用该版本打开此记录。</translation>
     </message>
     <message>
-        <source>{run} has {n_touches} usable points; a circle needs at least {needed}, 20 are usual. Probe the ring all round.</source>
-        <translation>{run} 有 {n_touches} 个可用的测点；圆至少需要 {needed} 个，通常为 20 个。请沿环一周触测。</translation>
-    </message>
-    <message>
         <source>{run} has {n_touches} usable points; a length needs both its ends. Probe each end at least once.</source>
         <translation>{run} 有 {n_touches} 个可用的测点；长度需要两端。请对每一端至少触测一次。</translation>
     </message>
@@ -9871,10 +9657,6 @@ mm</translation>
     <message>
         <source>The archive contains entries of chain {chain}, but not the chain itself.</source>
         <translation>存档含有链 {chain} 的条目，但没有该链本身。</translation>
-    </message>
-    <message>
-        <source>The cone is complete: this point does not count. Continue with the next artefact.</source>
-        <translation>锥孔已完成：此点不计入。请继续下一个标准器。</translation>
     </message>
     <message>
         <source>The database {name} is empty. Its administrator must set it up as described in docs/archive.md.</source>
@@ -9939,14 +9721,6 @@ mm</translation>
     <message>
         <source>The points are {rms:.2f} px from those of a flat board {board}: its squares differ from the description, it is bent, or the images are not from one camera with one focus. Count and measure its squares again.</source>
         <translation>各点与平面标定板 {board} 的点相差 {rms:.2f} px：方格与描述不符、标定板弯曲，或图像并非来自同一相机同一对焦。请重新数并测量方格。</translation>
-    </message>
-    <message>
-        <source>The points lie on a circle of radius {measured:.3f} mm; certified are {certified} mm. Check that it is this ring, and that the radius is entered, not the diameter.</source>
-        <translation>各点位于半径 {measured:.3f} mm 的圆上；证书值为 {certified} mm。请检查是否为此环规，且填写的是半径而不是直径。</translation>
-    </message>
-    <message>
-        <source>The points of {run} are at more than two positions: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>
-        <translation>{run} 的点位于两个以上的位置：{touch} 与其所在端的其他点相距 {distance:.2f} mm。光笔是否在该处被抬起？请只触测两端。</translation>
     </message>
     <message>
         <source>The seal {file} is missing: entries removed from the end of the archive cannot be detected.</source>

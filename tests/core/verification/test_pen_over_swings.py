@@ -33,7 +33,7 @@ from lightpen.simulator.swings import (
 )
 from lightpen.verification.history.led_file import _is_better, improve_pen
 from lightpen.verification.history.pen_health import examine_pen
-from lightpen.verification.tasks.length import Scale
+from lightpen.verification.tasks.pen_scale import Scale
 
 N_IMAGES, SIGMA = 40, 0.02
 PEN_FILE = replace(paper_pen(), led_sigma=0.01)

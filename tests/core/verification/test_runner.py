@@ -7,7 +7,6 @@ from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any
 
 import cv2
 import numpy as np
@@ -47,11 +46,9 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen.verification.storage.checkpoint import find_interrupted
 from lightpen.verification.storage.point_images import CONCLUDED
-from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS, CircleOptions
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.length import LENGTH
-from lightpen.verification.tasks.task import Surface
+from lightpen.verification.tasks.part import PART
 
 EVE = Signature("Eve", "correct horse")
 
@@ -60,21 +57,22 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
 
     assert at_it.status.is_done
-    assert at_it.ear.events.count(SessionEventKind.FINISHED) == 2
+    assert at_it.ear.events.count(SessionEventKind.FINISHED) == 1
     assert at_it.ear.events[-1] is SessionEventKind.DONE
     assert at_it.ear.faults == []
-    point, circle, length = at_it.records
+    point, part = at_it.records
     assert [each["verification"] for each in at_it.records] == list(CHOICES.kinds)
     assert {each["session"] for each in at_it.records} == {NOON.isoformat()}
     grades = [each["verdict"]["grade"] for each in at_it.records]
-    assert grades == ["pass", "scale ok", "scale ok"]
+    assert grades == ["pass", "scale ok"]
     for record in at_it.records:
         assert (record["operator"], record["origin"]) == ("Ann", "simulated")
         assert record["inputs"]["tip"]["file"] == "000001.json"
     assert point["verdict"]["limits_mm"] == {"across": 0.01, "along": 0.03, "tip": 0.04}
-    assert "not the tip" in length["verdict"]["text"]
-    assert abs(circle["mean_error_mm"]) < 0.01
-    assert abs(length["runs"][0]["error_mm"]) < 0.02
+    assert "not the tip" in part["verdict"]["text"]
+    ring, _, length = part["characteristics"]
+    assert abs(ring["deviation"]) < 0.01
+    assert abs(length["deviation"]) < 0.02
 
 
 @pytest.mark.slow
@@ -94,11 +92,12 @@ def test_two_cameras_verify_a_tip_together(
 
     assert verifier.ear.faults == []
     assert verifier.ear.events[-1] is SessionEventKind.DONE
-    point, circle, length = verifier.records
+    point, part = verifier.records
+    ring, _, length = part["characteristics"]
     depths = [each["noise_covariance"][2][2] for each in point["touches"]]
     assert max(depths) ** 0.5 < 0.008  # 0.02 by one camera alone
-    assert abs(circle["mean_error_mm"]) < 0.005
-    assert abs(length["runs"][0]["error_mm"]) < 0.02
+    assert abs(ring["deviation"]) < 0.005
+    assert abs(length["deviation"]) < 0.02
     assert point["inputs"]["rig"]["file"] == "rig.json"
     names = [each["file"] for each in point["inputs"]["cameras"]]
     assert names == ["camera.yaml", "camera-2.yaml"]
@@ -107,10 +106,10 @@ def test_two_cameras_verify_a_tip_together(
 @pytest.mark.slow
 def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
-    point, _, length, _ = at_it.status.files
+    point, part, _ = at_it.status.files
 
     assert read_fixed_point(point).points.shape == (4, 3)
-    assert read_scale(length).factor == pytest.approx(1.0, abs=1e-3)
+    assert read_scale(part).factor == pytest.approx(1.0, abs=1e-3)
 
 
 def test_what_is_found_is_kept_before_the_next_task_begins(at_it: Verifier) -> None:
@@ -199,14 +198,7 @@ def test_a_tip_of_another_pen_is_refused(verifier: Verifier) -> None:
     ("choices", "code"),
     [
         (VerificationChoices(()), "verification.no-task"),
-        (VerificationChoices((CIRCLE.kind,)), "verification.no-radius"),
-        (VerificationChoices((LENGTH.kind,)), "verification.no-length"),
-        (
-            VerificationChoices(
-                (CIRCLE.kind,), (CircleOptions(30.0, 0.001, Surface.BORE),)
-            ),
-            "verification.no-ball",
-        ),
+        (VerificationChoices((PART.kind,)), "part.no-plan"),
     ],
 )
 def test_what_is_not_known_is_asked_for(
@@ -218,29 +210,6 @@ def test_what_is_not_known_is_asked_for(
     verifier.come(choices)
 
     assert verifier.refusal() == code
-
-
-def test_a_corrected_certified_value_counts_for_the_points_that_were_probed(
-    at_it: Verifier,
-) -> None:
-    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10])
-    before = found_by(at_it.status.state, CIRCLE)
-    assert at_it.status.task is LENGTH
-    radius = SIMULATED_RADIUS + 0.5
-    other = CHOICES.with_options(CircleOptions(radius, 0.001))
-    at_it.runner.ask(lambda workflow: workflow.choose(at_it.preparation, other))
-    at_it.ear.wait_until(lambda: len(at_it.records) == 3)
-
-    found = found_by(at_it.status.state, CIRCLE)
-    assert found.runs[0].radius == before.runs[0].radius
-    assert found.assessment.grade is Grade.REPEAT
-    assert at_it.status.task is LENGTH
-    first, second = (
-        each for each in at_it.records if each["verification"] == CIRCLE.kind
-    )
-    assert first["runs"][0]["touches"] == second["runs"][0]["touches"]
-    certified = [each["certified_radius_mm"] for each in (first, second)]
-    assert certified == [SIMULATED_RADIUS, radius]
 
 
 def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(at_it: Verifier) -> None:
@@ -398,22 +367,18 @@ def test_a_verification_can_be_repeated_from_the_images_of_its_touches(
     at_it: Verifier,
 ) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
-    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED] * 3
-    for run, record in zip(at_it.runs, at_it.records, strict=True):
-        (touches,) = record["inputs"]["touches"]
-        assert touches["folder"] == run.name
-        assert touches["journal_sha256"] == sha256(run / JOURNAL)
-        assert [each["images"] for each in touches_of(record)] == [
-            [f"{image.number:06d}.png" for image in group]
-            for group in by_touch(open_record(run))
+    runs = {run.name: run for run in at_it.runs}
+    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED] * 4
+    for record in at_it.records:
+        own = []
+        for touches in record["inputs"]["touches"]:
+            run = runs.pop(touches["folder"])
+            assert touches["journal_sha256"] == sha256(run / JOURNAL)
+            own += by_touch(open_record(run))
+        assert [each["images"] for each in record["touches"]] == [
+            [f"{image.number:06d}.png" for image in group] for group in own
         ]
-
-
-def touches_of(record: dict[str, Any]) -> list[dict[str, Any]]:
-    runs = record.get("runs", [record])
-    if "ends" in runs[0]:
-        return [touch for run in runs for end in run["ends"] for touch in end]
-    return [touch for run in runs for touch in run["touches"]]
+    assert not runs
 
 
 def by_touch(record: Record) -> list[list[RecordedImage]]:
@@ -606,7 +571,7 @@ def test_a_tip_that_keeps_the_limits_is_accepted_with_all_its_records(
     assert conclusion["outcome"] == "accepted"
     assert conclusion["verdict"]["grade"] == "pass"
     assert conclusion["session"] == NOON.isoformat()
-    files = sorted(at_it.kept.glob("*.json"))[:3]
+    files = sorted(at_it.kept.glob("*.json"))[:2]
     assert conclusion["records"] == [
         {"file": file.name, "sha256": sha256(file)} for file in files
     ]

@@ -14,7 +14,6 @@ from typing_extensions import override
 from lightpen.messages import Message
 from lightpen.model.posture import Posture, posture_of
 from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.circle import CIRCLE, MIN_ANGLE, ring_fit
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import ResultTable
@@ -27,7 +26,6 @@ from lightpen_app.look.layouts import (
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.part_view import PartView, part_value
-from lightpen_app.steps.verify.ring_view import RingValue, RingView
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
@@ -67,28 +65,13 @@ def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> Di
     )
 
 
-def ring_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> RingValue:
-    """Return the touches of a ring, once done those of the last run."""
-    found = state.found_by(CIRCLE)
-    if found is None:
-        fit = ring_fit(state.progress(setup, task).points)
-    else:
-        fit = found.runs[-1].fit
-    if fit is None:
-        return RingValue()
-    return RingValue(tuple(fit.angles.tolist()), fit.covered, MIN_ANGLE)
-
-
 def _dial() -> PostureDial:
     dial = PostureDial()
     dial.setMinimumSize(DIAL_SIZE, DIAL_SIZE)
     return dial
 
 
-PICTURES = {
-    CIRCLE.kind: TaskPicture(RingView, ring_value),
-    PART.kind: TaskPicture(PartView, part_value),
-}
+PICTURES = {PART.kind: TaskPicture(PartView, part_value)}
 POSTURES = TaskPicture(_dial, posture_value)
 
 

@@ -21,7 +21,8 @@ from lightpen.verification.history.pen_over_time import (
     read_pen_over_time,
 )
 from lightpen.verification.reports.records import BY_SIMPLE_ACCEPTANCE
-from lightpen.verification.tasks.length import LENGTH, Scale
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.pen_scale import Scale, scale_of
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import MICROMETRES, number_text
@@ -52,7 +53,7 @@ class PenPanel(Translated, QWidget):
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
         self._selection, self._run = workbench.selection, workbench.run
-        self._verification = workbench.verification
+        self._measuring = workbench.measuring
         self._folder, self._clock = workbench.folder, workbench.around.now
         self._shown: PenOverTime | None = None
         self._new: NewLedFile | None = None
@@ -187,10 +188,13 @@ class PenPanel(Translated, QWidget):
         self._cancel.setFocus()
 
     def _scale(self) -> Scale | None:
-        """Return the scale by a certified length, where one was touched just now."""
-        state = self._verification.status.state
-        found = None if state is None else state.found_by(LENGTH)
-        return None if found is None else found.scale
+        """Return the scale by a certified length, where one was measured just now."""
+        state, setup = self._measuring.status.state, self._measuring.status.setup
+        found = None if state is None else state.found_by(PART)
+        if found is None or setup is None:
+            return None
+        points = [point for _, point in found.points]
+        return scale_of(found.part, points, setup.instrument)
 
     def _on_progressed(self, fraction: float) -> None:
         self._progress.setValue(round(PROGRESS_STEPS * fraction))

@@ -74,7 +74,7 @@ class ProbingPage(ResponsiveLayout, Page):
         for panel in self._panels.values():
             self._pages.add(panel)
         self._image = ImageView()
-        self._simulator = ProbingSimulatorControls(self._live, presenter.tasks)
+        self._simulator = ProbingSimulatorControls(self._live)
         self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
 
         # Layout

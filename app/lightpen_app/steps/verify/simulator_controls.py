@@ -1,16 +1,11 @@
 """Buttons for the simulated operator who probes."""
 
-from collections.abc import Collection
-
 from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
 from lightpen.simulator.hand import Operator
-from lightpen.verification.tasks.circle import CIRCLE, SIMULATED_RADIUS
-from lightpen.verification.tasks.length import SIMULATED_LENGTH
-from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.work.live_view import LiveView
@@ -19,20 +14,18 @@ from lightpen_app.work.live_view import LiveView
 class ProbingSimulatorControls(SimulatorControls):
     """Lets the simulated operator touch, or lift the pen; hidden with a real pen."""
 
-    def __init__(self, live: LiveView, tasks: Collection[AnyTask]) -> None:
+    def __init__(self, live: LiveView) -> None:
         super().__init__(live)
-        self._has_ring = CIRCLE in tasks
         self.setProperty("area", "panel")
 
         # Widgets
         self._touch = PushButton(checkable=True)
         self._touch.setProperty("inviting", True)
-        self._sizes = text_label(TextSize.SMALL, Tone.QUIET)
         self._lift = QToolButton()
 
         # Layout
         margins = (GRID, GRID // 2, GRID, GRID // 2)
-        cells = (self._touch, (self._sizes, 1), self._lift)
+        cells = self._touch, 1, self._lift
         horizontal_layout(self, *cells, spacing=2 * GRID, margins=margins)
 
         # Connections
@@ -57,9 +50,6 @@ class ProbingSimulatorControls(SimulatorControls):
         set_words(
             self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
         )
-        sizes = self.tr("Simulated: ring radius {0} mm, bar length {1} mm.")
-        words = sizes.format(f"{SIMULATED_RADIUS:g}", f"{SIMULATED_LENGTH:g}")
-        self._sizes.setText(words if self._has_ring else "")
 
     @override
     def _follow_connection(self) -> None:

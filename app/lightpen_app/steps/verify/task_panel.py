@@ -1,21 +1,20 @@
 """One task of a verification: its options, its results, and recorded images."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.status import VerificationStatus
-from lightpen.verification.tasks.registry import AnyTask
+from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import vertical_layout
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.verify.findings import TaskFinding
 from lightpen_app.steps.verify.images_row import ImagesRow
-from lightpen_app.steps.verify.task_form import TaskForm
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -29,22 +28,25 @@ class TaskPanel(Translated, QWidget):
     def __init__(self, task: AnyTask, runner: VerificationRunner) -> None:
         super().__init__()
         self._task, self._runner = task, runner
+        self._choices = VerificationChoices()
 
         # Widgets
         self._finding = TaskFinding(task)
         self._anew = PushButton()
         self._recorded = PushButton()
         self._recorded.setCheckable(True)
-        self._form = TaskForm(task, self._recorded, self._anew)
+        self._is_chosen = QCheckBox()
+        self._is_chosen.setVisible(task in TASKS)  # a part is not a selectable task
         self._verdict = SignLabel()
         self._images = ImagesRow()
 
         # Layout
-        rows = self._form, self._images, self._verdict, (self._finding, 1)
-        vertical_layout(self, *rows, spacing=GRID // 2)
+        layout = vertical_layout(self, spacing=GRID // 2)
+        horizontal_layout(layout, self._is_chosen, 1, self._recorded, self._anew)
+        fill(layout, self._images, self._verdict, (self._finding, 1))
 
         # Connections
-        self._form.value_changed.connect(self._on_form_changed)
+        self._is_chosen.clicked.connect(self._on_chosen)
         self._recorded.toggled.connect(self._images.setVisible)
         self._anew.clicked.connect(self._on_anew_clicked)
         self._images.read_requested.connect(self._on_read_requested)
@@ -55,7 +57,8 @@ class TaskPanel(Translated, QWidget):
 
     def set_choices(self, choices: VerificationChoices) -> None:
         """Show other choices."""
-        self._form.set_value(choices)
+        self._choices = choices
+        self._is_chosen.setChecked(self._task.kind in choices.kinds)
 
     def set_status(self, status: VerificationStatus, reading: float | None) -> None:
         """Show a verification, and the progress of reading images."""
@@ -79,6 +82,8 @@ class TaskPanel(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
+        purpose = worded(self._task.purpose)
+        self._is_chosen.setText(self.tr("Include: {0}").format(purpose))
         self._recorded.setText(self.tr("Recorded images..."))
         set_tooltip(self._recorded, self.tr("Do this task with recorded images."))
         self._anew.setText(self.tr("Probe again"))
@@ -87,8 +92,9 @@ class TaskPanel(Translated, QWidget):
             self.tr("Repeat this task; the result so far is kept in the archive."),
         )
 
-    def _on_form_changed(self) -> None:
-        self.value_changed.emit(self._form.value())
+    def _on_chosen(self, is_chosen: bool) -> None:
+        chosen = self._choices.with_task(self._task, is_chosen=is_chosen)
+        self.value_changed.emit(chosen)
 
     def _on_anew_clicked(self) -> None:
         self._runner.ask(lambda workflow: workflow.touch_anew(self._task))

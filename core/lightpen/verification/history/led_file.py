@@ -35,7 +35,7 @@ from lightpen.model.rig import Rig, rig_of
 from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
 from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
 from lightpen.verification.history.pen_health import MOVED, examine_pen, require_one_pen
-from lightpen.verification.tasks.length import Scale
+from lightpen.verification.tasks.pen_scale import Scale
 
 FoundT = TypeVar("FoundT", FoundPen, FoundCamera)
 

@@ -21,7 +21,7 @@ from lightpen.record.swings.names import Names, folder_name
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.history.led_file import MIN_POOLED, ImprovedPen, improve_pen
 from lightpen.verification.history.pen_health import MIN_SWINGS, PenHealth, examine_pen
-from lightpen.verification.tasks.length import Scale
+from lightpen.verification.tasks.pen_scale import Scale
 
 LED_FILES = "led files"  # a folder of the data folder
 MOST = 20  # swings, the newest

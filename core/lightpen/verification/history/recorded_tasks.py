@@ -18,7 +18,7 @@ from lightpen.formats.own_json import (
 )
 from lightpen.messages import Message, message
 from lightpen.verification.tasks.fixed_point import MIN_TOUCHES
-from lightpen.verification.tasks.length import Scale
+from lightpen.verification.tasks.pen_scale import Scale
 from lightpen.verification.tasks.repeatability import RepeatedPoint
 
 FIXED_POINT = message("file.fixed-point")

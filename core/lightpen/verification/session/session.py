@@ -226,15 +226,12 @@ def with_other_choices(
 ) -> tuple[SessionSetup, SessionState]:
     """Return a verification that continues with other choices.
 
-    Where the values of an artefact changed, its points are measured again by them; all
-    else stays. Where another task is to be probed now, the points at hand are
-    forgotten, and the state has another `touching`.
+    Where another task is to be probed now, the points at hand are forgotten, and the
+    state has another `touching`.
     """
     at_hand = state.task(setup)
     choices = choices.with_moves(setup.choices.options_of(PART).moves)
     setup = replace(setup, choices=choices)
-    if choices.missing(setup.ball_diameter) is None:
-        state = _measured_by(choices, state)
     now = state.task(setup)
     if now is not at_hand:
         state = without_touches(state)
@@ -244,33 +241,6 @@ def with_other_choices(
     if not state.awaits_drift(setup):
         state = replace(state, pending=())
     return setup, state
-
-
-def _measured_by(choices: VerificationChoices, state: SessionState) -> SessionState:
-    """Return the session with tasks measured again whose artefact has other values."""
-    for kind, done in state.measured.items():
-        setup = done.setup
-        if setup is None or kind not in state.found:
-            continue
-        one, other = setup.choices.options_of(done.task), choices.options_of(done.task)
-        if done.task.is_same_artefact(one, other):
-            continue
-        again = replace(done, setup=replace(setup, choices=choices))
-        try:
-            found = measure_with_drift(setup, again)
-        except CalibrationError:  # the points can be none of this artefact
-            state = touched_anew(state, done.task)
-            continue
-        state = replace(
-            state,
-            found={**state.found, kind: found},
-            measured={**state.measured, kind: again},
-            pending=tuple(
-                again if each.task is done.task and each.setup is not None else each
-                for each in state.pending
-            ),
-        )
-    return state
 
 
 def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> ProbingRules:

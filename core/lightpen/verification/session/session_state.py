@@ -13,7 +13,6 @@ from lightpen.verification.probing.probing import ProbingPhase, ProbingState, at
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.assessment import VerificationAssessment, worst
 from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift
-from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.probed_point import NO_DRIFT
 from lightpen.verification.tasks.registry import ALL_TASKS, AnyTask
 from lightpen.verification.tasks.task import (
@@ -125,17 +124,8 @@ class SessionState:
         if task is DRIFT:
             n_runs = max(n_visits(setup.choices), len(runs) + is_at_hand)
         return TaskProgress(
-            points=self.touches if is_at_hand else (),
-            runs=runs,
-            n_runs=n_runs,
-            cones=self._cones(),
+            points=self.touches if is_at_hand else (), runs=runs, n_runs=n_runs
         )
-
-    def _cones(self) -> tuple[FloatArray, ...]:
-        """Return the cones probed so far; a point in one may be a repetition."""
-        found = self.found_by(FIXED_POINT)
-        cones = [visit[0].point_cam for visit in self.visits[:1]]
-        return tuple(cones if found is None else [*cones, found.calibrated.mean])
 
     @property
     def is_begun(self) -> bool:

@@ -1,7 +1,7 @@
 """Assessment of a verification: grade, main reason and next step."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import Message, message
@@ -81,29 +81,6 @@ def graded(
         return Grade.REPEAT
     is_significant = _is_significant(value, uncertainty, limit, n_values)
     return Grade.CHECK if is_significant or decision is Decision.OPEN else Grade.PASS
-
-
-def judged_error(
-    error: float,
-    uncertainty: float,
-    limit: float,
-    limits: VerificationLimits,
-    blamed: VerificationAssessment,
-    n_values: int = 1,
-) -> VerificationAssessment | None:
-    """Return the assessment of an error with its U (k = 2), mm; None if it passes.
-
-    A significant error takes reason and next step, but not the grade, from ``blamed``.
-    """
-    grade = graded(error, uncertainty, limit, limits, n_values)
-    if grade is Grade.PASS:
-        return None
-    if grade is Grade.REPEAT or _is_significant(error, uncertainty, limit, n_values):
-        return replace(blamed, grade=grade)
-    unproven = message(
-        "verification.unproven", error=error, uncertainty=uncertainty, limit=limit
-    )
-    return check(unproven, MORE_POINTS)
 
 
 def _is_significant(

@@ -48,7 +48,6 @@ from lightpen.verification.tasks.task import (
     TaskOptions,
     TaskProgress,
     VerificationTask,
-    count_option,
     keep_all,
 )
 from lightpen.verification.tasks.tip_evidence import (
@@ -57,7 +56,6 @@ from lightpen.verification.tasks.tip_evidence import (
     not_the_tip,
     points_evidence,
     tip_entries,
-    with_power,
 )
 
 USUAL_TOUCHES = 15
@@ -244,7 +242,9 @@ def _assessment(
         )
     if not found.tip.verifies_tip(limits):
         return check(not_the_tip(found.tip, limits), MORE_POINTS)
-    return with_power(_steady(found.calibrated), found.tip, limits)
+    power = message("tip.verified", detectable=found.tip.detectable)
+    reason = _steady(found.calibrated)
+    return accepted(message("tip.with-power", reason=reason, power=power))
 
 
 def without_others(
@@ -371,9 +371,6 @@ FIXED_POINT = VerificationTask(
     known=message("session.same-posture"),
     limits=("across", "along", "tip"),
     options=FixedPointOptions,
-    fields=(
-        count_option("n_touches", message("option.points"), MIN_TOUCHES, MAX_TOUCHES),
-    ),
     measure=measure_fixed_point,
     entries=_entries,
     tables=_tables,

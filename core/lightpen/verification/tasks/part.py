@@ -16,7 +16,8 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.measuring.part import MeasuredPart, measure_part
+from lightpen.measuring.artefacts import QUANTITIES
+from lightpen.measuring.part import CharacteristicResult, MeasuredPart, measure_part
 from lightpen.measuring.plan import Plan, Side
 from lightpen.measuring.plan_checks import missing_normal
 from lightpen.measuring.report import (
@@ -31,6 +32,8 @@ from lightpen.model.decision_rules import Decision
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.tasks.assessment import (
+    BETTER_POSTURES,
+    CHECK_FILES,
     VerificationAssessment,
     accepted,
     check,
@@ -46,6 +49,7 @@ from lightpen.verification.tasks.part_course import (
     planned_at,
     touches_of_part,
 )
+from lightpen.verification.tasks.pen_scale import scale_of
 from lightpen.verification.tasks.probed_point import ProbedPoint, point_entries
 from lightpen.verification.tasks.task import (
     ANY,
@@ -178,14 +182,26 @@ def _owned(runs: Runs, options: PartOptions) -> list[tuple[str, ProbedPoint]]:
     return found
 
 
+def sizes_of(part: MeasuredPart) -> list[CharacteristicResult]:
+    """Return the certified sizes of artefacts."""
+    return [
+        each
+        for each in part.results
+        if each.planned.certified is not None and each.planned.quantity in QUANTITIES
+    ]
+
+
 def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAssessment:
     def named(decision: Decision) -> list[Message]:
         results = part.results
         return [each.planned.words for each in results if each.decision is decision]
 
+    judged = [each for each in part.results if each.decision is not None]
+    certified = [each for each in judged if each.planned.certified is not None]
     out, unclear = named(Decision.REJECTED), named(Decision.OPEN)
-    n_judged = len(out) + len(unclear) + len(named(Decision.ACCEPTED))
-    name = part.plan.words
+    n_judged, name = len(judged), part.plan.words
+    if out and len(certified) == n_judged:
+        return _judged_size(certified)
     if out:
         reason = message(
             "part.out", n_out=len(out), names=_listed(out), part=name, n_judged=n_judged
@@ -211,10 +227,33 @@ def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAss
         n_features = len(part.features)
         reason = message("part.measured", part=name, n_features=n_features)
         return accepted(reason, message("part.done"))
+    if certified:
+        return _judged_size(certified)
     good = message("part.good", part=name, n_judged=n_judged)
-    is_artefact = any(e.planned.certified is not None for e in part.results)
-    grade = Grade.SCALE if is_artefact else Grade.PASS
-    return accepted(good, message("part.done"), grade)
+    return accepted(good, message("part.done"))
+
+
+def _judged_size(results: Sequence[CharacteristicResult]) -> VerificationAssessment:
+    """Judge certified values by the one with the largest error for its limit."""
+    worst = max(results, key=lambda each: abs(each.deviation or 0.0) / each.margin)
+    words, error = worst.planned.words, worst.deviation or 0.0
+    u, limit = worst.value.uncertainty, worst.margin
+    if worst.decision is Decision.REJECTED:
+        off = message(
+            "artefact.off", name=words, error=error, uncertainty=u, limit=limit
+        )
+        return refused(off, CHECK_FILES)
+    least = max(results, key=lambda each: each.value.uncertainty / each.margin)
+    if least.value.uncertainty > least.margin:
+        reason = message(
+            "artefact.uncertain",
+            name=least.planned.words,
+            uncertainty=least.value.uncertainty,
+            limit=least.margin,
+        )
+        return check(reason, message("part.more-points"))
+    good = message("artefact.good", name=words, error=error, uncertainty=u, limit=limit)
+    return accepted(good, BETTER_POSTURES, Grade.SCALE)
 
 
 def _listed(names: Sequence[Message]) -> tuple[Message, ...]:
@@ -229,8 +268,16 @@ def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
         entries["characteristics"], found.budgets(instrument), strict=True
     ):
         each["budget"] = budget
+    scale = scale_of(found.part, points, instrument)
     return {
         **entries,
+        "scale": None
+        if scale is None
+        else {
+            "factor": scale.factor,
+            "expanded_uncertainty": scale.uncertainty,
+            "expanded_uncertainty_before": scale.uncertainty_before,
+        },
         "missing": list(found.missing),
         "touches": [
             {

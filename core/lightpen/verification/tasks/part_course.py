@@ -23,10 +23,10 @@ from lightpen.measuring.part import kind_of
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import CENTRED, FeatureKind
 from lightpen.measuring.touches import PartTouches, at_position
+from lightpen.model.assumptions import BALL_UNCERTAINTY
 from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
 from lightpen.verification.tasks.task import (
-    BALL_UNCERTAINTY,
     Conditions,
     HandGoal,
     Points,

@@ -4,16 +4,14 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from lightpen.verification.tasks.circle import CIRCLE
 from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
-from lightpen.verification.tasks.length import LENGTH
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.task import TaskOptions, VerificationTask
 
 AnyTask: TypeAlias = VerificationTask[Any, Any]
 
-TASKS: tuple[AnyTask, ...] = (FIXED_POINT, CIRCLE, LENGTH, DRIFT)
+TASKS: tuple[AnyTask, ...] = (FIXED_POINT, DRIFT)
 ALL_TASKS: tuple[AnyTask, ...] = (*TASKS, PART)  # with the task of the step Measure
 
 _BY_KIND = {task.kind: task for task in ALL_TASKS}

@@ -8,7 +8,6 @@ the window to itself. Nothing else switches on the kind of a task.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from msgspec import Struct
@@ -21,96 +20,14 @@ from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import NO_DRIFT, ProbedPoint
 
 ANY = 1e6  # mm or rad: no other place, no other posture makes a point a new one
-LONGEST, LARGEST_U = 10_000.0, 1.0  # mm, that a station may enter
-BALL_UNCERTAINTY = 0.001  # mm, U (k = 2) of a ball with a certificate
-MOST_RUNS = 20
+
 
 Points: TypeAlias = tuple[ProbedPoint, ...]
 Runs: TypeAlias = Sequence[tuple[str, Sequence[ProbedPoint]]]
 
 
-class Surface(StrEnum):
-    """Probed surface of a ring, or of the ends of a length."""
-
-    GROOVE = "groove"  # in which the centre of the ball runs, or cones
-    BORE = "bore"  # or inner faces
-    BOSS = "boss"  # or outer faces
-
-
-def ball_offset(surface: Surface, ball_diameter: float | None) -> float:
-    """Return the offset of the surface from the tip centre, outwards, mm.
-
-    That is to be added to the radius of a circle of tip centres, and to each end of a
-    length.
-    """
-    sign = {Surface.GROOVE: 0.0, Surface.BORE: 1.0, Surface.BOSS: -1.0}[surface]
-    return sign * (ball_diameter or 0.0) / 2
-
-
 class TaskOptions(Struct, frozen=True, tag_field="task"):
     """Base of the options of a task; the defaults are the usual values."""
-
-
-@dataclass(frozen=True)
-class NumberOption:
-    """A number among the options of a task."""
-
-    name: str  # attribute of the options
-    label: Message | None  # None: not shown in the window
-    least: float = 0.0
-    most: float = LONGEST
-    unit: str = "mm"
-    decimals: int = 4
-    unknown: Message | None = None  # for 0: a number that must be entered
-    is_optional: bool = False  # the command line takes 0 if not stated
-    argument: str = ""  # of the command line; empty for none
-    help: str = ""
-    of_each_run: str = ""  # numbers of all runs; empty if they share one
-    is_of_artefact: bool = True  # whether a task must be done again when it changes
-
-
-@dataclass(frozen=True)
-class SurfaceOption:
-    """Option for the probed surface of an artefact."""
-
-    name: str
-    label: Message
-    labels: tuple[Message, ...]  # in the order of `Surface`
-    argument: str
-    words: dict[str, Surface]  # the default first; need the ball diameter
-    ball_help: str  # help text of the ball diameter
-    is_of_artefact: bool = True
-
-
-Option: TypeAlias = NumberOption | SurfaceOption
-
-
-def count_option(name: str, label: Message, least: int, most: int) -> NumberOption:
-    """Return an option that counts points or runs."""
-    return NumberOption(
-        name, label, least, most, unit="", decimals=0, is_of_artefact=False
-    )
-
-
-def certificate_option(name: str) -> NumberOption:
-    """Return the option for the expanded uncertainty of a certified value."""
-    return NumberOption(
-        name,
-        message("option.certificate-uncertainty"),
-        most=LARGEST_U,
-        unknown=message("option.unknown"),
-        is_optional=True,
-        argument="--certified-uncertainty",
-        help="U (k = 2) of the certified value",
-    )
-
-
-BALL_OPTION = NumberOption(
-    "ball_uncertainty",
-    None,
-    argument="--ball-uncertainty",
-    help=f"U (k = 2) of the ball diameter ({BALL_UNCERTAINTY:g})",
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +86,11 @@ class ResultTable:
 
 @dataclass(frozen=True, eq=False)
 class TaskProgress:
-    """Points of the current run of a task, completed runs, cones probed before, mm."""
+    """Points of the current run of a task, and completed runs."""
 
     points: Points = ()
     runs: tuple[Points, ...] = ()
     n_runs: int = 1
-    cones: tuple[FloatArray, ...] = ()
 
     @property
     def run(self) -> int:
@@ -237,7 +153,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     newness: Callable[[OptionsT], tuple[float, float]]
     n_points: Callable[[OptionsT], int]  # of a run
     options: type[OptionsT]
-    fields: tuple[Option, ...] = ()
     other_run: Message | None = None  # what to do for the first point of another
     n_runs: Callable[[OptionsT], int] = lambda _: 1
     figures_so_far: Callable[
@@ -299,11 +214,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         if progress.points and (is_next or self.other_run):
             return self.another
         return self.other_run if progress.runs and self.other_run else self.first
-
-    def is_same_artefact(self, one: OptionsT, other: OptionsT) -> bool:
-        """Return whether a result remains valid with other options."""
-        names = [each.name for each in self.fields if each.is_of_artefact]
-        return all(getattr(one, name) == getattr(other, name) for name in names)
 
 
 def points_table(points: Sequence[ProbedPoint]) -> ResultTable:

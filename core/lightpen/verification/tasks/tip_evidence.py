@@ -26,7 +26,6 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.decision_rules import Decision
@@ -34,11 +33,9 @@ from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.quantiles import chi_square_quantile
 from lightpen.verification.tasks.assessment import (
-    BETTER_POSTURES,
     CALIBRATE_AGAIN,
     RELEVANT,
     VerificationAssessment,
-    accepted,
     check,
     refused,
 )
@@ -178,32 +175,6 @@ def judged_tip(
         limit=limits.tip,
     )
     return check(differs, CALIBRATE_AGAIN)
-
-
-def worse_finding(
-    against: VerificationAssessment | None, off: VerificationAssessment | None
-) -> VerificationAssessment | None:
-    """Return the finding that counts: against the tip, or of an error of size.
-
-    That the tip is refused comes first, then the error, then that the tip is checked.
-    """
-    if against is not None and against.grade is Grade.REPEAT:
-        return against
-    return against if off is None else off
-
-
-def with_power(
-    reason: Message, found: TipEvidence, limits: VerificationLimits
-) -> VerificationAssessment:
-    """Return a passed assessment that states the detectable tip error."""
-    if found.verifies_tip(limits):
-        power = message("tip.verified", detectable=found.detectable)
-        return accepted(message("tip.with-power", reason=reason, power=power))
-    return accepted(
-        message("tip.with-power", reason=reason, power=not_the_tip(found, limits)),
-        BETTER_POSTURES,
-        Grade.SCALE,
-    )
 
 
 def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from tests.accepted_tip import Hold, Holder, leant, round_a_ring
-from tests.verifying import BAR, CHOICES, PAPER, found_by
+from tests.verifying import BAR, CHOICES, LENGTH, found_by
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
-from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.measuring.artefacts import artefact_plan
 from lightpen.model.rig import rig_of
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
@@ -33,14 +33,13 @@ from lightpen.verification.session.session_state import (
     RunsOfTask,
     SessionSetup,
     SessionState,
-    fraction_done,
     instruction,
     with_drift,
 )
-from lightpen.verification.tasks.circle import CIRCLE
 from lightpen.verification.tasks.drift import DRIFT, measure_drift
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.length import LENGTH, SIMULATED_LENGTH, LengthOptions
+from lightpen.verification.tasks.part import PART, sizes_of
+from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen.verification.tasks.task import TaskOptions
 
@@ -86,22 +85,14 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
             finished.append(transition.finished)
     camera.close()
 
-    assert finished == list(PAPER)
+    assert finished == [FIXED_POINT, PART]
     assert first is not None
     assert (clock.now_ns() - first) * 1e-9 < LONGEST
-    assert FIXED_POINT.kind in state.found
-    assert CIRCLE.kind in state.found
-    assert LENGTH.kind in state.found
     # A quarter of the pixels: the noise is four times that of the whole camera.
-    assert abs(found_by(state, CIRCLE).errors[0]) < 0.05
-    assert abs(found_by(state, LENGTH).errors[0]) < 0.05
+    for size in sizes_of(found_by(state, PART).part):
+        assert size.deviation == pytest.approx(0.0, abs=0.05)
     assert state.assessment is not None
-    assert asked >= {
-        "session.touch-cone",
-        "session.touch-ring",
-        "session.touch-ends",
-        "session.done",
-    }
+    assert asked >= {"session.touch-cone", "part.instruction", "session.done"}
 
 
 # What a hand can do wrong, seen without an image
@@ -146,12 +137,9 @@ def session(instrument: Instrument) -> Session:
 def test_each_task_begins_when_the_one_before_is_done(session: Session) -> None:
     session.touch(*leant(4))
     assert FIXED_POINT.kind in session.state.found
-    assert session.state.task(session.setup) is CIRCLE
-    session.touch(leant(8)[1])
-    assert session.says() == "session.still-in-cone"
+    assert session.state.task(session.setup) is PART
     session.touch(*round_a_ring(11, 31.751)[:10])
-    assert CIRCLE.kind in session.state.found
-    assert session.state.task(session.setup) is LENGTH
+    assert len(session.state.runs) == 1
     assert not session.state.touches
     session.touch(*BAR)
 
@@ -187,41 +175,6 @@ def test_a_posture_that_was_taken_before_does_not_count(session: Session) -> Non
 
     assert len(session.state.touches) == 2
     assert session.says() == "session.same-posture"
-
-
-def test_one_end_touched_twice_does_not_count(session: Session) -> None:
-    session.choose(LENGTH)
-    session.touch(BAR[0])
-    session.see(session.holder.away())
-    session.touch(BAR[0])
-
-    assert len(session.state.touches) == 1
-    assert session.says() == "session.same-end"
-    session.touch(BAR[1])
-    assert LENGTH.kind in session.state.found
-
-
-def test_two_touches_of_no_such_length_do_not_end_the_task(session: Session) -> None:
-    session.choose(LENGTH)
-    session.touch(BAR[0], Hold((10.0, -20.0, 0.0)))
-    assert session.says() == "session.no-ends"
-    assert len(session.state.touches) == 1
-
-    session.touch(Hold((-140.0, -20.0, 0.0)))
-    assert LENGTH.kind in session.state.found
-
-
-def test_a_length_is_touched_at_each_of_its_places(session: Session) -> None:
-    session.choose(LENGTH, options=LengthOptions(length=SIMULATED_LENGTH, n_places=2))
-    session.touch(*BAR)
-    assert LENGTH.kind not in session.state.found
-    assert fraction_done(session.setup, session.state) == 0.5
-    session.touch(Hold((-75.0, 10.0, 0.0)))
-    assert fraction_done(session.setup, session.state) == 0.75
-    session.touch(Hold((75.0, 10.0, 0.0)))
-
-    assert LENGTH.kind in session.state.found
-    assert len(found_by(session.state, LENGTH).runs) == 2
 
 
 def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_reported_so(
@@ -278,31 +231,6 @@ def test_leds_that_are_not_those_of_the_pen_are_reported_and_not_counted(
     assert not session.state.touches
 
 
-def test_less_than_270_degrees_are_said_and_do_not_end_the_ring(
-    session: Session,
-) -> None:
-    session.choose(CIRCLE)
-    session.touch(*round_a_ring(12, 31.751, 250.0))
-    assert CIRCLE.kind not in session.state.found
-    assert session.says() == "session.touch-ring"
-
-    ended = end_task(session.setup, session.state)
-    assert ended.state.fault is not None
-    assert ended.state.fault.code == "circle.open"
-    assert ended.finished is None
-    assert len(ended.state.touches) == len(session.state.touches)
-
-
-def test_points_that_are_no_circle_are_reported(session: Session) -> None:
-    session.choose(CIRCLE)
-    ring = round_a_ring(12, 31.751)
-    wide = [Hold((1.3 * x, y, z)) for x, y, z in (tuple(hold.place) for hold in ring)]
-    session.touch(*wide)
-
-    assert CIRCLE.kind not in session.state.found
-    assert session.says() == "circle.none"
-
-
 def test_a_task_ended_early_has_what_its_touches_give(session: Session) -> None:
     session.touch(*leant(4)[:3])
     ended = end_task(session.setup, session.state)
@@ -340,12 +268,12 @@ def test_a_task_done_anew_forgets_what_it_found(session: Session) -> None:
 
 
 UPRIGHT = (Hold(tilt=0.0),) * 3
-TWO_AND_A_RING = FIXED_POINT.kind, LENGTH.kind, CIRCLE.kind, DRIFT.kind
+BAR_OPTIONS = PartOptions(artefact_plan("Bar", [LENGTH]))
 
 
 @pytest.fixture
 def witnessed(session: Session) -> Session:
-    session.choose(FIXED_POINT, LENGTH, DRIFT)
+    session.choose(FIXED_POINT, PART, DRIFT, options=BAR_OPTIONS)
     return session
 
 
@@ -364,7 +292,7 @@ def test_a_witness_is_visited_before_between_and_after_the_tasks(
         tasks.append(witnessed.state.task(witnessed.setup))
         witnessed.touch(*holds) if holds else visit(witnessed)
 
-    assert tasks == [*(DRIFT, FIXED_POINT, DRIFT), *(LENGTH, DRIFT)]
+    assert tasks == [*(DRIFT, FIXED_POINT, DRIFT), *(PART, DRIFT)]
     drift = found_by(witnessed.state, DRIFT)
     assert drift is not None
     assert len(drift.names) == 3
@@ -381,7 +309,7 @@ def test_a_camera_that_moved_between_visits_is_reported_and_counts_in_what_was_t
     before = found_by(witnessed.state, FIXED_POINT)
     visit(witnessed)
     witnessed.touch(*BAR)
-    length = found_by(witnessed.state, LENGTH)
+    length = sizes_of(found_by(witnessed.state, PART).part)[0].value
     visit(witnessed, *(Hold(moved, tilt=0.0),) * 3)
     state = witnessed.state
 
@@ -393,14 +321,9 @@ def test_a_camera_that_moved_between_visits_is_reported_and_counts_in_what_was_t
     assert np.allclose(
         found_by(state, FIXED_POINT).uncertainty, before.uncertainty, atol=0.003
     )
-    assert length is not None
-    assert LENGTH.kind in state.found
     share = 2 * 0.06 / np.sqrt(3)  # k = 2, rectangular; but for the noise of a visit
-    assert (
-        found_by(state, LENGTH).uncertainties[0]
-        > 0.95 * share
-        > length.uncertainties[0]
-    )
+    counted = sizes_of(found_by(state, PART).part)[0].value
+    assert counted.uncertainty > 0.95 * share > length.uncertainty
 
 
 def test_a_witness_held_otherwise_or_missed_does_not_count(witnessed: Session) -> None:
@@ -428,7 +351,7 @@ def test_a_task_done_anew_is_witnessed_anew(witnessed: Session) -> None:
     visit(witnessed)
     witnessed.touch(*BAR)
     visit(witnessed)
-    witnessed.state = touched_anew(witnessed.state, LENGTH)
+    witnessed.state = touched_anew(witnessed.state, PART)
     witnessed.touch(*BAR)
     assert witnessed.state.task(witnessed.setup) is DRIFT
     visit(witnessed)
@@ -449,7 +372,7 @@ def test_what_waits_for_a_visit_waits_with_other_choices_until_none_is_needed(
         setup, witnessed.state, choices.with_options(FixedPointOptions(n_touches=5))
     )
     _, done = with_other_choices(
-        setup, witnessed.state, replace(choices, kinds=(FIXED_POINT.kind, LENGTH.kind))
+        setup, witnessed.state, replace(choices, kinds=(FIXED_POINT.kind, PART.kind))
     )
 
     assert waiting.pending == witnessed.state.pending
@@ -459,19 +382,20 @@ def test_what_waits_for_a_visit_waits_with_other_choices_until_none_is_needed(
 def test_a_task_chosen_after_the_last_visit_is_witnessed_and_the_others_stay(
     witnessed: Session,
 ) -> None:
-    for holds in ((), leant(4), (), BAR, ()):
+    witnessed.choose(FIXED_POINT, DRIFT)
+    for holds in ((), leant(4), ()):
         witnessed.touch(*holds) if holds else visit(witnessed)
-    choices = replace(witnessed.setup.choices, kinds=TWO_AND_A_RING)
+    kinds = FIXED_POINT.kind, PART.kind, DRIFT.kind
+    choices = replace(witnessed.setup.choices, kinds=kinds)
 
     setup, state = with_other_choices(witnessed.setup, witnessed.state, choices)
 
-    assert state.found.keys() == {FIXED_POINT.kind, LENGTH.kind}
-    assert state.task(setup) is CIRCLE
+    assert state.found.keys() == {FIXED_POINT.kind}
+    assert state.task(setup) is PART
     assert state.awaits_drift(setup)
-    assert not state.progress(setup, CIRCLE).runs
-    assert state.progress(setup, CIRCLE).n_runs == 1
-    assert len(state.progress(setup, DRIFT).runs) == 3
-    assert state.progress(setup, DRIFT).n_runs == 4
+    assert not state.progress(setup, PART).runs
+    assert len(state.progress(setup, DRIFT).runs) == 2
+    assert state.progress(setup, DRIFT).n_runs == 3
 
 
 def test_a_witness_alone_is_visited_twice(session: Session) -> None:
@@ -495,26 +419,21 @@ def test_the_last_point_taken_back_is_the_only_one_that_goes(session: Session) -
 
 
 def test_runs_of_earlier_are_added_and_end_their_task(session: Session) -> None:
-    session.choose(LENGTH, options=LengthOptions(SIMULATED_LENGTH, n_places=2))
-    session.touch(*BAR)
-    (run,) = session.state.runs
+    session.choose(PART, options=BAR_OPTIONS)
+    session.touch(BAR[0])
+    (first,) = session.state.runs
+    session.touch(BAR[1])
     empty, setup = SessionState(), session.setup
-    one = run_again(setup, empty, run, is_last=False)
-    two = run_again(setup, one, run, is_last=False)
-    early = run_again(setup, empty, run, is_last=True)
+    _, (_, second) = session.state.measured[PART.kind].runs
+    one = run_again(setup, empty, first, is_last=False)
+    two = run_again(setup, one, tuple(second), is_last=False)
+    early = run_again(setup, empty, first, is_last=True)
 
-    assert (one.runs, len(one.found), len(two.found), len(early.found)) == (
-        (run,),
-        0,
-        1,
-        1,
-    )
-    assert len(found_by(two, LENGTH).runs) == 2
-    assert len(found_by(early, LENGTH).runs) == 1
-    assert run_again(setup, two, run, is_last=False).found == two.found
-    with pytest.raises(CalibrationError) as refused:
-        run_again(setup, empty, run[:1], is_last=True)
-    assert refused.value.message.code == "length.too-few"
+    assert (one.runs, len(one.found)) == ((first,), 0)
+    assert len(sizes_of(found_by(two, PART).part)) == 1
+    assert sizes_of(found_by(early, PART).part) == []
+    assert found_by(early, PART).missing == ("length 1 end 2",)
+    assert run_again(setup, two, first, is_last=False).found == two.found
 
 
 def test_each_task_waits_for_the_visit_after_it_alone(witnessed: Session) -> None:
@@ -524,13 +443,13 @@ def test_each_task_waits_for_the_visit_after_it_alone(witnessed: Session) -> Non
     (waiting,) = state.pending
     point = found_by(state, FIXED_POINT)
     again = RunsOfTask(FIXED_POINT, waiting.runs)
-    length = RunsOfTask(LENGTH, waiting.runs)
+    length = RunsOfTask(PART, waiting.runs)
 
     assert with_read(setup, state, again, point).pending == (again,)
     assert with_read(setup, state, length, point).pending == (waiting, length)
     assert touched_anew(state, FIXED_POINT).pending == ()
-    assert touched_anew(state, LENGTH).pending == (waiting,)
-    assert touched_anew(state, LENGTH).visits == state.visits
+    assert touched_anew(state, PART).pending == (waiting,)
+    assert touched_anew(state, PART).visits == state.visits
     assert touched_anew(state, DRIFT).visits == ()
     assert touched_anew(state, DRIFT).found == {FIXED_POINT.kind: point}
     visit(witnessed)

@@ -8,12 +8,9 @@ from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.tasks.assessment import (
     VERIFY_AGAIN,
-    VerificationAssessment,
     accepted,
     check,
     graded,
-    judged_error,
-    refused,
     worst,
 )
 
@@ -38,27 +35,6 @@ def test_a_significant_and_relevant_error_is_never_accepted_in_silence(
     limits = VerificationLimits(rule=rule)
 
     assert graded(value, uncertainty, 0.02, limits) is grade
-
-
-def test_an_error_that_may_be_chance_blames_nothing_but_its_uncertainty() -> None:
-    limits = VerificationLimits(rule=DecisionRule.GUARD_BAND)
-    blamed = refused(REASON, VERIFY_AGAIN)
-
-    def found(error: float, uncertainty: float) -> VerificationAssessment | None:
-        return judged_error(error, uncertainty, 0.02, limits, blamed)
-
-    unproven = found(0.003, 0.022)
-    assert unproven is not None
-    assert unproven.grade is Grade.CHECK
-    assert unproven.reason.code == "verification.unproven"
-    assert found(0.018, 0.01) == check(REASON, VERIFY_AGAIN)
-    # Of two values the larger one is as far off by chance.
-    simple = VerificationLimits()
-    off, same = 0.0135, (0.01, 0.02, simple, blamed)
-    assert judged_error(off, *same) == check(REASON, VERIFY_AGAIN)
-    assert judged_error(off, *same, n_values=2) is None
-    assert found(0.05, 0.01) == blamed
-    assert found(0.003, 0.01) is None
 
 
 def test_of_tasks_that_pass_one_that_verifies_the_tip_counts() -> None:

@@ -3,35 +3,22 @@
 Across, radius, drift: 0.01, 0.02, 0.02 mm; along and length 0.03; tip 0.04; form 0.1.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
-from typing import Any
 
 import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.messages import Message, message
+from lightpen.messages import message
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.verification.tasks import circle, drift, fixed_point, length
-from lightpen.verification.tasks.assessment import (
-    VerificationAssessment,
-    accepted,
-    check,
-    refused,
-)
-from lightpen.verification.tasks.circle_fit import CircleFit
+from lightpen.verification.tasks import drift, fixed_point
+from lightpen.verification.tasks.assessment import VerificationAssessment, accepted
 from lightpen.verification.tasks.probed_point import ProbedPoint
-from lightpen.verification.tasks.tip_evidence import (
-    TipEvidence,
-    judged_tip,
-    with_power,
-    worse_finding,
-)
+from lightpen.verification.tasks.tip_evidence import TipEvidence, judged_tip
 
 LIMITS = VerificationLimits()
 GUARD = VerificationLimits(rule=DecisionRule.GUARD_BAND)
@@ -45,7 +32,6 @@ LIFTED = ProbedPoint(
 )
 
 PASSED = "tip.with-power verification.use-tip pass"
-PASSED_WEAKLY = "tip.with-power verification.better-postures scale"
 ANOTHER_TIP = "tip.another verification.calibrate-again repeat"
 DIFFERS = "tip.differs verification.calibrate-again check"
 WEAK_POWER = "tip.weak-power verification.more-points check"
@@ -59,84 +45,12 @@ def said(found: VerificationAssessment | None) -> str:
     return f"{found.reason.code} {found.next_step.code} {found.grade.name.lower()}"
 
 
-@pytest.mark.parametrize(
-    ("figures", "verdict"),
-    [
-        ({}, PASSED),
-        ({"tip": WEAK}, PASSED_WEAKLY),
-        ({"tip": OTHER, "error": 0.05}, ANOTHER_TIP),
-        ({"tip": DOUBTED}, DIFFERS),
-        # Beyond the limit, or more than chance and a quarter of it.
-        ({"error": 0.0199, "u": 0.0199}, PASSED),
-        ({"error": -0.0201, "u": 0.0199}, "radius-off calibrate-again repeat"),
-        ({"error": 0.0051}, "radius-off calibrate-again check"),
-        ({"error": 0.0049}, PASSED),
-        ({"tip": DOUBTED, "error": 0.0051}, "radius-off calibrate-again check"),
-        # A tenth of the radius is another ring.
-        ({"error": 1.99}, "radius-off calibrate-again repeat"),
-        ({"error": -2.01}, "another verify-again repeat"),
-        ({"roundness": 0.0999, "flatness": 0.0999}, PASSED),
-        ({"roundness": 0.1001}, "form verify-again repeat"),
-        ({"flatness": 0.1001}, "form verify-again repeat"),
-        ({"roundness": 0.199, "by_noise": 0.2}, PASSED),
-        ({"roundness": 0.201, "by_noise": 0.2}, "form verify-again repeat"),
-        ({"left_out": (LIFTED,), "u": 0.0201}, "lifted verify-again check"),
-        ({"u": 0.0201}, "uncertain check-files check"),
-    ],
-)
-def test_a_ring(figures: dict[str, Any], verdict: str) -> None:
-    usual: dict[str, Any] = {
-        "error": 0.0,
-        "u": 0.001,
-        "tip": GOOD,
-        "left_out": (),
-        "by_noise": 0.0,
-    }
-    it = usual | {"roundness": 0.0, "flatness": 0.0} | figures
-    found = circle._assessment([ring(**it)], 20.0, it["u"], it["tip"], LIMITS)
-
-    assert said(found) == whole(verdict, "circle")
-
-
 def whole(verdict: str, task: str) -> str:
     """Return a verdict with the names of its messages."""
     reason, step, grade = verdict.split()
     reason = reason if "." in reason else f"{task}.{reason}"
     step = step if "." in step else f"verification.{step}"
     return f"{reason} {step} {grade}"
-
-
-def ring(
-    name: str = "run",
-    error: float = 0.0,
-    roundness: float = 0.0,
-    flatness: float = 0.0,
-    by_noise: float = 0.0,
-    left_out: tuple[ProbedPoint, ...] = (),
-    **_: object,
-) -> circle.CircleRun:
-    fit = CircleFit(
-        *(np.zeros(3), np.array([0.0, 0.0, -1.0]), 20.0),
-        *(np.array([0.0, roundness]), np.array([0.0, flatness])),
-        *(np.zeros(2), np.zeros((2, 3))),
-    )
-    return circle.CircleRun(name, (), left_out, fit, 20.0 + error, 0.0, by_noise)
-
-
-def test_of_runs_round_a_ring_the_one_farthest_beyond_its_limit_is_named() -> None:
-    runs = [
-        ring("noisy", roundness=0.15, by_noise=0.2),
-        ring("lobed", roundness=0.101),
-        ring("round", roundness=0.01),
-    ]
-
-    found = circle._assessment(runs, 20.0, 0.001, GOOD, LIMITS)
-
-    assert found.reason == message("circle.form", run="lobed", form=0.101, limit=0.1)
-    # The mean of the runs is judged, not a single one.
-    runs = [ring(error=0.04), ring(error=-0.04)]
-    even = circle._assessment(runs, 20.0, 0.001, GOOD, LIMITS)
-    assert said(even) == PASSED
 
 
 @pytest.mark.parametrize(
@@ -187,41 +101,6 @@ def cone(
         *(accepted(REASON), touches, (), scatter, None, np.zeros(3)),
         *(np.full(3, expected), tip, None),
     )
-
-
-@pytest.mark.parametrize(
-    ("places", "tip", "verdict"),
-    [
-        # Error, U and limit of each place.
-        ([(0.0, 0.001, 0.03)], GOOD, PASSED),
-        ([(0.0, 0.001, 0.03)], WEAK, PASSED_WEAKLY),
-        ([(1.0, 0.001, 0.03)], OTHER, ANOTHER_TIP),
-        ([(0.0299, 0.0299, 0.03)], GOOD, PASSED),
-        ([(-0.0301, 0.0299, 0.03)], GOOD, "off check-files repeat"),
-        ([(0.0145, 0.01, 0.03)], GOOD, "off check-files check"),
-        ([(0.0145, 0.01, 0.03)] * 7, GOOD, PASSED),  # one of seven by chance
-        ([(0.0, 0.0301, 0.03)], GOOD, "uncertain verify-again check"),
-        # The place counts that is worst by its limit.
-        ([(0.02, 0.03, 0.1), (0.025, 0.001, 0.03)], GOOD, "off check-files check"),
-        ([(0.0, 0.04, 0.05), (0.0, 0.031, 0.03)], GOOD, "uncertain verify-again check"),
-    ],
-)
-def test_a_length(
-    places: Sequence[tuple[float, float, float]], tip: TipEvidence, verdict: str
-) -> None:
-    runs = [
-        length.LengthRun(str(i), ((), ()), 150.0 + error, 150.0, u, limit, 0.0)
-        for i, (error, u, limit) in enumerate(places, 1)
-    ]
-    scale = length.Scale(1.0, 0.0, 0.0)
-    found = length.Length(
-        accepted(REASON), tuple(runs), np.zeros(len(runs)), scale, tip
-    )
-
-    judged = length._assessment(found, LIMITS)
-
-    assert said(judged) == whole(verdict, "length")
-    assert judged.reason.values.get("run") in {None, str(len(places))}
 
 
 @pytest.mark.parametrize(
@@ -296,31 +175,3 @@ def test_a_tip(
             "uncertainty": pytest.approx(2 * sigma),
             "limit": 0.04,
         }
-
-
-@pytest.mark.parametrize(
-    ("tip", "power"),
-    [
-        (GOOD, message("tip.verified", detectable=0.0399)),
-        (WEAK, message("tip.weak-power", detectable=0.0401, limit=0.04)),
-        (BLIND, message("tip.no-power", limit=0.04)),
-    ],
-)
-def test_a_task_that_passes_says_what_it_would_detect(
-    tip: TipEvidence, power: Message
-) -> None:
-    found = with_power(REASON, tip, LIMITS)
-
-    assert found.reason == message("tip.with-power", reason=REASON, power=power)
-    assert found.grade is (Grade.PASS if tip is GOOD else Grade.SCALE)
-
-
-def test_a_refused_tip_comes_before_a_wrong_size_and_that_before_a_doubt() -> None:
-    tip, doubted = refused(REASON, REASON), check(REASON, REASON)
-    off = refused(message("circle.line"), REASON)
-
-    assert worse_finding(None, None) is None
-    assert worse_finding(tip, off) is tip
-    assert worse_finding(doubted, off) is off
-    assert worse_finding(doubted, None) is doubted
-    assert worse_finding(None, off) is off
