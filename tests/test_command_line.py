@@ -258,7 +258,7 @@ def test_the_verdict_is_printed_last_and_recorded_with_what_it_goes_by(
     verdict = fields["verdict"]
 
     assert (verdict["grade"], verdict["next_step"]) == ("pass", "accept")
-    assert verdict["code"] == "verdict.good"
+    assert verdict["code"] == "verdict.good-unchecked"
     assert list(verdict["values"].values()) == [
         fields["weakest_direction"]["expanded_uncertainty_mm"]
     ]

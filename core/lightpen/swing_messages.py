@@ -39,6 +39,7 @@ class Code(StrEnum):
     HALVES_DIFFER = "verdict.halves-differ"
     MANY_DROPPED = "verdict.many-dropped"
     MANY_EXCLUDED = "verdict.many-excluded"
+    CENTRES_REJECTED = "verdict.centres-rejected"
     LEDS_OFF = "verdict.leds-off"
     LED_DISPLACED = "verdict.led-displaced"
     LEDS_MISFIT = "verdict.leds-misfit"
@@ -54,6 +55,7 @@ class Code(StrEnum):
     LAST_UNKNOWN = "verdict.last-unknown"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
+    GOOD_UNCHECKED = "verdict.good-unchecked"
 
 
 SHOW_PEN = message(Code.SHOW_PEN)

@@ -75,6 +75,8 @@ _SHORTS: dict[Code, str] = {
     Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "No comparison possible"),
     Code.TWO_STAGE_OFF: QT_TRANSLATE_NOOP("phrases", "Two-stage tip uncertain"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
+    Code.GOOD_UNCHECKED: QT_TRANSLATE_NOOP("phrases", "Within limits"),
+    Code.CENTRES_REJECTED: QT_TRANSLATE_NOOP("phrases", "Many LED centres rejected"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Within limits"),
 }
 # What to do at the screen; the core's own sentence stands in the braces.

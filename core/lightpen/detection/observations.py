@@ -9,7 +9,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
-from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
+from lightpen.detection.labelling.causes import diagnose, diagnose_mirror
 from lightpen.detection.labelling.labels import label_images
 from lightpen.detection.pen_detection import (
     PenDetection,

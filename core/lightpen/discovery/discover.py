@@ -70,6 +70,7 @@ from lightpen.verification.tasks.task import Conditions
 NOT_SETTLED = (
     "bundle.not-settled",
     "joint.not-settled",
+    "calibrate.files-disagree",
     "calibrate.leds-do-not-fit",
     "calibrate.leds-do-not-fit-nor-tip",
 )

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.labelling.causes import cause_of_misfit
 from lightpen.detection.observations import Observations, without_copies
 from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
@@ -74,12 +75,15 @@ from lightpen.estimation.uncertainty.second_cone import (
     second_cone,
     second_images,
 )
+from lightpen.messages import Message
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
 from lightpen.model.method import Method
 from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import Rig, of_camera, rig_of
+
+NOT_SETTLED = ("joint.not-settled", "bundle.not-settled")
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +175,13 @@ class Calibration:
         return found_fields(self.bundle)
 
     @cached_property
+    def cause_of_misfit(self) -> Message | None:
+        """The cause that removes a misfit of the LEDs in the first camera, if one."""
+        start, images = self.bundle.unknowns.start, self.cameras[0]
+        pixels = images.observations.pixels[images.used]
+        return cause_of_misfit(start.rig.cameras[0], start.pen, pixels)
+
+    @cached_property
     def self_check(self) -> SelfCheck | None:
         """Cross-validation: prediction of LEDs by the others."""
         bundle = self.bundle
@@ -231,8 +242,16 @@ def calibrate_rig(
     """
     inputs = _before_images(rig, pen, observations, assumptions)
     single = _fit_single_cameras(inputs, observations)
-    start = _find_start(inputs, single)
-    adjusted = _adjust_jointly(inputs, single, start, second)
+    try:
+        start = _find_start(inputs, single)
+        adjusted = _adjust_jointly(inputs, single, start, second)
+    except CalibrationError as error:
+        if error.message.code not in NOT_SETTLED:
+            raise
+        cause = cause_of_misfit(rig.cameras[0], inputs.pen, single.pixels[:, 0])
+        if cause is None:
+            raise
+        raise CalibrationError("calibrate.files-disagree", cause=cause) from error
     return _calibration_of(inputs, single, start, adjusted)
 
 
@@ -360,7 +379,7 @@ def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
         posed[0].pivot.tip_pen,
         posed[0].pivot.pivot_cam,
     )
-    require_fit(joint.sigma)
+    require_fit(joint.sigma, rig.cameras[0], pen, pixels[:, 0])
     return _Start(
         found.rig, found.deviations(rig), found.lags, reasons, moments, pixels, joint
     )

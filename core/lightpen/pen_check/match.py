@@ -16,7 +16,7 @@ from math import sqrt
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
+from lightpen.detection.labelling.causes import diagnose, diagnose_mirror
 from lightpen.detection.labelling.labels import (
     MODERATE,
     Labels,

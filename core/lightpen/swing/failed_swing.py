@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.detection.rig_pose import fit_rig_poses
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import Message, message
@@ -39,6 +40,11 @@ def failed_swing(setup: SwingSetup, kept: AcceptedImages, why: Message) -> Faile
     causes = (
         (why,)
         if fits
-        else (message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA), why)
+        else (
+            message(
+                Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA, cause=UNKNOWN_CAUSE
+            ),
+            why,
+        )
     )
     return FailedSwing(causes, kept.pixels, residuals)

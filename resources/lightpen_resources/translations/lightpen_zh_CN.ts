@@ -5911,10 +5911,6 @@ mm</translation>
         <translation>LED 中心</translation>
     </message>
     <message>
-        <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. First check that the LED file belongs to this pen with its LEDs in order, and the intrinsics file to this camera, lens and focus; then that the tip was pressed into the cone.</source>
-        <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头也似乎在移动。请先检查 LED 文件是否属于此光笔且 LED 顺序正确，内参文件是否属于此相机、镜头和对焦；再检查测头是否压紧在锥孔中。</translation>
-    </message>
-    <message>
         <source>LED {led} is listed already on line {line}.</source>
         <translation>LED {led} 已在第 {line} 行列出。</translation>
     </message>
@@ -5929,6 +5925,10 @@ mm</translation>
     <message>
         <source>LED {led} is noisier than the others: {sigma:.3f} px, usual is {usual:.3f} px; its weight is reduced accordingly. Clean it, and check its brightness and its supply.</source>
         <translation>LED {led} 的噪声高于其他 LED：{sigma:.3f} px，通常为 {usual:.3f} px；已相应降低其权重。请清洁它，并检查亮度和供电。</translation>
+    </message>
+    <message>
+        <source>LED {led} is not where the LED file has it</source>
+        <translation>LED {led} 不在 LED 文件所示的位置</translation>
     </message>
     <message>
         <source>LED {led} is {distance:.2f} mm off the line of LEDs 1 to 4.</source>
@@ -5969,6 +5969,10 @@ mm</translation>
     <message>
         <source>LEDs {first} and {second} are {distance:.2f} mm apart, too close for discs of {diameter:g} mm. Check their coordinates and the diameter.</source>
         <translation>LED {first} 和 {second} 相距 {distance:.2f} mm，对 {diameter:g} mm 的发光面来说太近。请检查坐标和直径。</translation>
+    </message>
+    <message>
+        <source>LEDs {one} and {other} are exchanged in the LED file</source>
+        <translation>LED 文件中 LED {one} 与 {other} 互换</translation>
     </message>
     <message>
         <source>Length: error</source>
@@ -6089,6 +6093,10 @@ mm</translation>
     <message>
         <source>No nominal tip is specified to compare with.</source>
         <translation>未指定可供比较的标称测头。</translation>
+    </message>
+    <message>
+        <source>No single mistake explains it. Check in this order: that the LED file belongs to this pen, the intrinsics file to this camera, lens and focus, and that no LED is blurred or reflected.</source>
+        <translation>没有单一错误能解释。请依次检查：LED 文件是否属于这支光笔，内参文件是否属于这台相机、镜头和对焦，以及 LED 是否模糊或有反光。</translation>
     </message>
     <message>
         <source>No space left on device</source>
@@ -6271,6 +6279,10 @@ mm</translation>
         <translation>所需测头 - 当前测头</translation>
     </message>
     <message>
+        <source>Residuals {sigma:.2f} px; usual is {usual:.2f} px or less. {cause}</source>
+        <translation>残差 {sigma:.2f} px；通常不超过 {usual:.2f} px。{cause}</translation>
+    </message>
+    <message>
         <source>Simulated pen</source>
         <translation>模拟光笔</translation>
     </message>
@@ -6323,6 +6335,10 @@ mm</translation>
         <translation>档案库已关闭：程序正在结束。</translation>
     </message>
     <message>
+        <source>The base of the rig file and the scale of the LED file contradict each other: the pen is {wanted:.6g} ± {wanted_u:.2g} times as large by the rig, 1 ± {stated_u:.2g} by its file (k = 2). Either file may be wrong. Check that both belong together, then measure the pen or calibrate the rig again.</source>
+        <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
+    </message>
+    <message>
         <source>The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
         <translation>相机稳定：视野中固定的灯在光笔处偏移 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
@@ -6359,8 +6375,28 @@ mm</translation>
         <translation>{name} 的文件头要求播放器把画面旋转 {degrees} 度。程序不执行这一旋转：画面按存储的方向使用，内参文件必须是在这一方向上标定的。</translation>
     </message>
     <message>
+        <source>The images agree with the files once one of these is corrected: {causes}.</source>
+        <translation>改正以下任一项后图像与文件相符：{causes}。</translation>
+    </message>
+    <message>
+        <source>The images agree with the files once this is corrected: {causes}.</source>
+        <translation>改正以下一项后图像与文件相符：{causes}。</translation>
+    </message>
+    <message>
         <source>The images are turned by 180 degrees against the intrinsics file: its principal point agrees with them only if they are turned back. Use images as the camera delivers them, or the intrinsics of the camera mounted like this.</source>
         <translation>图像相对于内参文件旋转了 180 度：只有转回来，文件中的主点才与图像相符。请使用相机原样输出的图像，或使用按此安装方式标定的相机内参。</translation>
+    </message>
+    <message>
+        <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen and is in mm, or measure the pen again.</source>
+        <translation>图像与 LED 文件矛盾：{what}由图像为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查文件是否属于这支光笔且以 mm 为单位，或重新测量光笔。</translation>
+    </message>
+    <message>
+        <source>The images contradict the rig file or the scale of the LED file: {what} of camera {camera} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the rig file (k = 2). A wrong base looks like a wrong scale. Check that no camera was moved and that both files belong together, then measure the pen or calibrate the rig again.</source>
+        <translation>图像与相机组文件或 LED 文件的尺度矛盾：相机 {camera} 的{what}由图像为 {wanted:.6g} ± {wanted_u:.2g}{unit}，相机组文件为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。错误的基线与错误的尺度表现相同。请检查相机未被移动且两个文件配套，然后重新测量光笔或标定相机组。</translation>
+    </message>
+    <message>
+        <source>The joint fit did not converge. {cause}</source>
+        <translation>联合拟合未收敛。{cause}</translation>
     </message>
     <message>
         <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
@@ -6401,6 +6437,14 @@ mm</translation>
     <message>
         <source>The result {file} is not the one that was entered in the archive: it was changed since. Restore it from a copy.</source>
         <translation>结果 {file} 与档案中登记的不一致：登记之后被更改过。请从备份恢复。</translation>
+    </message>
+    <message>
+        <source>The scale of the LED file is not checked by this calibration, nor is its disc diameter, which LED centres alone do not show. Verify a known length.</source>
+        <translation>本次标定不检验 LED 文件的尺度，也不检验其发光面直径，仅有 LED 中心无法显示后者。请用已知长度验证。</translation>
+    </message>
+    <message>
+        <source>The scale of the LED file is not checked by this calibration. Verify a known length.</source>
+        <translation>本次标定不检验 LED 文件的尺度。请用已知长度验证。</translation>
     </message>
     <message>
         <source>The seal {file} of the archive was changed or damaged.</source>
@@ -6499,6 +6543,10 @@ mm</translation>
         <translation>差值的 U (k = 2)</translation>
     </message>
     <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm in its weakest direction. {what}</source>
+        <translation>测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm。{what}</translation>
+    </message>
+    <message>
         <source>U (k = 2) of the two-stage tip is {uncertainty:.4f} mm in its weakest direction, limit {limit:.4f} mm: it is {distance:.4f} mm off the joint fit, {bias:.4f} mm by the projection of the discs. Report the joint fit.</source>
         <translation>两步法测头在最弱方向上的 U (k = 2) 为 {uncertainty:.4f} mm，限值为 {limit:.4f} mm：它与联合拟合相差 {distance:.4f} mm，其中 {bias:.4f} mm 来自发光面的投影。请报告联合拟合。</translation>
     </message>
@@ -6587,6 +6635,26 @@ mm</translation>
         <translation>微米</translation>
     </message>
     <message>
+        <source>mostly at the lower left of the pen&apos;s region in the image</source>
+        <translation>多在图像中光笔区域的左下部</translation>
+    </message>
+    <message>
+        <source>mostly at the lower right of the pen&apos;s region in the image</source>
+        <translation>多在图像中光笔区域的右下部</translation>
+    </message>
+    <message>
+        <source>mostly at the upper left of the pen&apos;s region in the image</source>
+        <translation>多在图像中光笔区域的左上部</translation>
+    </message>
+    <message>
+        <source>mostly at the upper right of the pen&apos;s region in the image</source>
+        <translation>多在图像中光笔区域的右上部</translation>
+    </message>
+    <message>
+        <source>mostly of LED {led}</source>
+        <translation>多属 LED {led}</translation>
+    </message>
+    <message>
         <source>no image</source>
         <translation>无图像</translation>
     </message>
@@ -6639,8 +6707,20 @@ mm</translation>
         <translation>向右旋转 90 度显示</translation>
     </message>
     <message>
+        <source>spread over LEDs and image</source>
+        <translation>分布于各 LED 和整个图像</translation>
+    </message>
+    <message>
         <source>straightness</source>
         <translation>直线度</translation>
+    </message>
+    <message>
+        <source>the LED file is a mirror image of the pen (sign of x or of y, or x and y exchanged)</source>
+        <translation>LED 文件为光笔的镜像（x 或 y 的符号，或 x 与 y 互换）</translation>
+    </message>
+    <message>
+        <source>the LED file is a mirror image of the pen (sign of z)</source>
+        <translation>LED 文件为光笔的镜像（z 的符号）</translation>
     </message>
     <message>
         <source>the covariance c11 to c66 has a direction without uncertainty, which is implausible. Correct or remove these columns.</source>
@@ -6651,12 +6731,44 @@ mm</translation>
         <translation>LED 发光面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
     <message>
+        <source>the disc diameter in the LED file ({factor:g} times {diameter:g} mm) or the unit of its coordinates</source>
+        <translation>LED 文件中的发光面直径（{diameter:g} mm 的 {factor:g} 倍）或坐标单位</translation>
+    </message>
+    <message>
         <source>the file has decimal points and decimal commas; the other form is on line {line}. Use one form throughout.</source>
         <translation>文件同时含有小数点和小数逗号；另一种形式在第 {line} 行。请统一使用一种形式。</translation>
     </message>
     <message>
+        <source>the focal length in the intrinsics file (times about {factor:g})</source>
+        <translation>内参文件中的焦距（约 {factor:g} 倍）</translation>
+    </message>
+    <message>
+        <source>the images are binned by 2, the intrinsics file is not</source>
+        <translation>图像按 2 合并像素，而内参文件没有</translation>
+    </message>
+    <message>
+        <source>the images are cropped (principal point off by {x:.0f}, {y:.0f} px)</source>
+        <translation>图像经过裁剪（主点偏移 {x:.0f}、{y:.0f} px）</translation>
+    </message>
+    <message>
+        <source>the images are mirrored left to right</source>
+        <translation>图像左右镜像</translation>
+    </message>
+    <message>
+        <source>the images are mirrored top to bottom</source>
+        <translation>图像上下镜像</translation>
+    </message>
+    <message>
+        <source>the intrinsics file is for images binned by 2</source>
+        <translation>内参文件属于按 2 合并像素的图像</translation>
+    </message>
+    <message>
         <source>the omnidirectional lens model (xi)</source>
         <translation>全向镜头模型 (xi)</translation>
+    </message>
+    <message>
+        <source>the unit of the LED file (its coordinates times {factor:g} are mm)</source>
+        <translation>LED 文件的单位（坐标乘以 {factor:g} 为 mm）</translation>
     </message>
     <message>
         <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the LED file is of this pen, and that LEDs are numbered from 1.</source>
@@ -6677,6 +6789,10 @@ mm</translation>
     <message>
         <source>upwards</source>
         <translation>向上</translation>
+    </message>
+    <message>
+        <source>x and y of the LED centres are exchanged</source>
+        <translation>LED 中心的 x 与 y 互换</translation>
     </message>
     <message>
         <source>x, y, z in mm, separated by tabs</source>
@@ -7859,10 +7975,6 @@ mm</translation>
         <translation>LED 文件</translation>
     </message>
     <message>
-        <source>LED positions and images disagree: {sigma:.1f} px; usual is {usual} px or less. Check that the LED file belongs to this pen with its LEDs in order, and the intrinsics file to this camera.</source>
-        <translation>LED 位置与图像不符：{sigma:.1f} px，通常不超过 {usual} px。请检查 LED 文件是否属于这支光笔且编号顺序正确，内参文件是否属于这台相机。</translation>
-    </message>
-    <message>
         <source>LED {led} is {distance:.2f} mm from its file position. Check that the LED file belongs to this pen.</source>
         <translation>LED {led} 与文件中的位置相差 {distance:.2f} mm。请检查 LED 文件是否属于此光笔。</translation>
     </message>
@@ -8159,10 +8271,6 @@ mm</translation>
         <translation>本图像残差 {noise:.3f} px，其他图像 {usual:.3f} px。请检查 LED 是否被手指遮挡或有反光。</translation>
     </message>
     <message>
-        <source>Residuals {sigma:.2f} px; usual is {usual:.2f} px or less. Check that the LED file belongs to this pen and the intrinsics file to this camera and lens.</source>
-        <translation>残差 {sigma:.2f} px，通常不超过 {usual:.2f} px。请检查 LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头。</translation>
-    </message>
-    <message>
         <source>Retired at another station: {kind} {id}, {by}.</source>
         <translation>已在其他工位停用：{kind} {id}，{by}。</translation>
     </message>
@@ -8229,10 +8337,6 @@ mm</translation>
     <message>
         <source>The LED layout of this pen is symmetric, so the LEDs cannot be identified. Move an LED, or give the LED centres.</source>
         <translation>这支光笔的 LED 布局对称，无法识别各 LED。请移动一个 LED，或直接给出 LED 中心。</translation>
-    </message>
-    <message>
-        <source>The LEDs appear {factor:g} times as large as stated in the LED file ({diameter:g} mm). Check the disc diameter and the unit of the coordinates.</source>
-        <translation>LED 看起来约为 LED 文件所述大小（{diameter:g} mm）的 {factor:g} 倍。请检查发光面直径和坐标单位。</translation>
     </message>
     <message>
         <source>The LEDs are a mirror image of the pen, in another frame. Change the sign of one coordinate, then transform them to the pen frame.</source>
@@ -8577,18 +8681,6 @@ mm</translation>
     <message>
         <source>The images do not determine the tip yet. Tilt the pen to all sides.</source>
         <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
-    </message>
-    <message>
-        <source>The images match LED coordinates {factor:g} times those of the LED file. Check its unit; millimetres are needed.</source>
-        <translation>图像与 LED 文件坐标的 {factor:g} 倍相符。请检查文件的单位：需要毫米。</translation>
-    </message>
-    <message>
-        <source>The images match about {factor:g} times the focal length of the intrinsics file. Choose the file of this camera and lens, or calibrate the camera again.</source>
-        <translation>图像与内参文件焦距的约 {factor:g} 倍相符。请选择这台相机和镜头的文件，或重新标定相机。</translation>
-    </message>
-    <message>
-        <source>The images match the mirror image of the pen. Change the sign of {axis} in the LED file.</source>
-        <translation>图像与光笔的镜像相符。请在 LED 文件中改变 {axis} 的符号。</translation>
     </message>
     <message>
         <source>The images of camera {camera} are paired with images of other instants: its image {own} matches image {others} of the other cameras, and so on. Give simultaneous images the same name; some may be missing at the start.</source>
@@ -8945,6 +9037,14 @@ mm</translation>
     <message>
         <source>The probed points of {name} come from both sides of the surface. Probe the feature again from one side.</source>
         <translation>{name} 的测点来自表面的两侧。请从一侧重新触测该要素。</translation>
+    </message>
+    <message>
+        <source>LED positions and images disagree: {sigma:.1f} px; usual is {usual} px or less. {cause}</source>
+        <translation>LED 位置与图像不符：{sigma:.1f} px；通常不超过 {usual} px。{cause}</translation>
+    </message>
+    <message>
+        <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. {cause} Then check that the tip was pressed into the cone.</source>
+        <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头似乎也在移动。{cause}然后检查测头是否压在锥孔中。</translation>
     </message>
     <message>
         <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
@@ -9543,6 +9643,10 @@ mm</translation>
         <translation>{path} 是 Windows 上的设备名，而不是文件名。请选择其他名称。</translation>
     </message>
     <message>
+        <source>{percent:.0f} % of the LED centres do not fit and are rejected, {where}. Look for reflections, fingers and dirt there, then repeat the swing.</source>
+        <translation>{percent:.0f} % 的 LED 中心不符而被剔除，{where}。请检查该处的反光、手指和污物，然后重新摆动。</translation>
+    </message>
+    <message>
         <source>{place} has {count} numbers; three coordinates are needed, with three more for the normal, the same for all LEDs. Correct it.</source>
         <translation>{place} 有 {count} 个数；需要三个坐标，法向另需三个，所有 LED 须相同。请更正。</translation>
     </message>
@@ -9665,10 +9769,6 @@ mm</translation>
     <message>
         <source>The drift reference moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the cone is not clamped, or the camera had not warmed up. Points measured in between have an error of this size.</source>
         <translation>漂移参考点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或锥孔未夹紧，或相机未预热。其间测量的点有同样大小的误差。</translation>
-    </message>
-    <message>
-        <source>The images contradict the LED file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this pen, or measure the pen again.</source>
-        <translation>图像与 LED 文件矛盾：{what} 由图像得 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit} (k = 2)。请检查该文件是否属于这支光笔，或重新测量光笔。</translation>
     </message>
     <message>
         <source>The images contradict the intrinsics file: {what} {wanted:.6g} ± {wanted_u:.2g}{unit} from the images, {stated:.6g} ± {stated_u:.2g}{unit} in the file (k = 2). Check that the file belongs to this camera, lens and focus, or calibrate the camera again.</source>
@@ -11008,6 +11108,10 @@ mm</translation>
     <message>
         <source>Within limits</source>
         <translation>在限值内</translation>
+    </message>
+    <message>
+        <source>Many LED centres rejected</source>
+        <translation>许多 LED 中心被剔除</translation>
     </message>
     <message>
         <source>Press Space to continue.</source>

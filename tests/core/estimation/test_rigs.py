@@ -31,6 +31,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.formats.pairing import pair_images
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.postures import operator_postures
@@ -71,14 +72,14 @@ def seen(
 SEEN = seen(SWING)
 
 
-def calibrated(pixels: FloatArray, rig: Rig = RIG) -> Calibration:
+def calibrated(pixels: FloatArray, rig: Rig = RIG, pen: Pen = PEN) -> Calibration:
     """Calibrate with pixels (N, C, L, 2); a camera without LEDs took no image."""
     centers = []
     for c in range(rig.n_cameras):
         taken = np.flatnonzero(np.isfinite(pixels[:, c]).any(axis=(1, 2)))
         centers.append(Centers(taken, pixels[taken, c], Path("simulated")))
     pairing = pair_images([list(map(str, each.frames)) for each in centers], rig.names)
-    return calibrate_rig(rig, PEN, observe_rig_centers(centers, pairing, rig, PEN))
+    return calibrate_rig(rig, pen, observe_rig_centers(centers, pairing, rig, pen))
 
 
 def placed(R: FloatArray, t: FloatArray) -> Rig:
@@ -207,6 +208,20 @@ def test_a_rig_file_that_is_contradicted_is_named_with_the_place_wanted() -> Non
     verdict = judge(result, SwingLimits(max_uncertainty=0.1, min_images=10))
     assert verdict.grade is Grade.CHECK
     assert "rig file" in str(verdict.reason)
+
+
+@pytest.mark.parametrize("is_pen", [False, True])
+def test_a_base_that_contradicts_the_scale_names_both_files(is_pen: bool) -> None:
+    longer_base = placed(RIG.rotations[1], 1.003 * RIG.translations[1])
+    pen = replace(PEN, leds=1.003 * PEN.leds) if is_pen else PEN
+    rig = RIG if is_pen else longer_base
+    result = calibrated(SEEN, rig, pen)
+
+    verdict = judge(result, SwingLimits(max_uncertainty=1.0, min_images=10))
+
+    assert verdict.grade is Grade.CHECK
+    assert "rig file" in str(verdict.reason)
+    assert "scale of the LED file" in str(verdict.reason)
 
 
 def test_a_camera_that_was_turned_is_found_by_its_turn() -> None:

@@ -6,6 +6,7 @@ from math import ceil, isfinite
 from PySide6.QtCore import QObject
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade, NextStep, Verdict
 from lightpen.messages import Message, message
@@ -133,7 +134,12 @@ class SwingWords(QObject):
         kept = view.state.kept
         why = out_of_reach(view.setup.limits, view.state, view.short)
         if len(kept) >= LEAST_JUDGED and kept.sigma > USUAL_SIGMA:
-            why = message(Code.LEDS_MISFIT, sigma=kept.sigma, usual=USUAL_SIGMA)
+            why = message(
+                Code.LEDS_MISFIT,
+                sigma=kept.sigma,
+                usual=USUAL_SIGMA,
+                cause=UNKNOWN_CAUSE,
+            )
         elif view.has_unfit_spots and view.state.phase in (Phase.WAIT, Phase.SEEN):
             n_leds = view.setup.pen.n_leds
             why = message("diagnosis.spots-do-not-fit", n_needed=n_leds, n_leds=n_leds)

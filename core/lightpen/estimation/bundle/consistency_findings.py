@@ -26,6 +26,8 @@ ASPECT = message("file.aspect")
 PRINCIPAL_POINT = (message("file.cx"), message("file.cy"))
 DIAMETER = message("file.diameter")
 SCALE = message("file.scale")
+BASE = "file.rig-translation"
+AS_SCALE = 0.1  # of a translation: a change that a wrong scale makes, too
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,23 @@ class Contradiction:
     is_turned: bool = False
 
     @property
+    def is_vague(self) -> bool:
+        """Whether the images hardly determine the number."""
+        size = max(self.stated, self.estimated)
+        return self.estimated_uncertainty > VAGUE * size
+
+    @property
     def message(self) -> Message:
         """The message to the user."""
         unit = f" {self.unit}" if self.unit else ""
         wanted = _known_digits(self.estimated, self.estimated_uncertainty)
+        if self.of_pen and self.of_rig:
+            return message(
+                "warning.scale-contradicted",
+                wanted=wanted,
+                wanted_u=self.estimated_uncertainty,
+                stated_u=self.stated_uncertainty,
+            )
         if self.of_pen:
             return message(
                 "warning.pen-file-contradicted",
@@ -78,6 +93,18 @@ class Contradiction:
         if not self.of_rig:
             return message(
                 "warning.camera-file-of-rig-contradicted",
+                camera=self.camera,
+                what=self.what,
+                wanted=wanted,
+                wanted_u=self.estimated_uncertainty,
+                stated=self.stated,
+                stated_u=self.stated_uncertainty,
+                unit=unit,
+            )
+        change = abs(self.estimated - self.stated)
+        if self.what.code == BASE and change < AS_SCALE * abs(self.stated):
+            return message(
+                "warning.base-contradicted",
                 camera=self.camera,
                 what=self.what,
                 wanted=wanted,
@@ -187,7 +214,7 @@ def find_pen_contradictions(
     ) -> tuple[list[Contradiction], Prior]:
         fit = FileFit.of([statement], stated, bundle, place, excess, mean)
         found = _contradictions(fit, fit.contradicted)
-        if any(each.estimated_uncertainty > VAGUE * each.stated for each in found):
+        if any(each.is_vague for each in found):
             return [], prior
         return found, _without(prior, fit, fit.contradicted)
 
@@ -204,6 +231,8 @@ def find_pen_contradictions(
         priors.scale,
         priors.growth,
     )
+    is_rig = bundle.state.rig.n_cameras > 1
+    size = [replace(each, of_rig=is_rig) for each in size]
     found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
     return found, replace(priors, diameter=diameter, scale=scale)
 

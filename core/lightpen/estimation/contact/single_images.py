@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from lightpen.arrays import BoolArray, IntArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.labelling.causes import UNKNOWN_CAUSE, cause_of_misfit
 from lightpen.detection.observations import Observations
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
 from lightpen.detection.reasons import Reason, counted
@@ -58,7 +59,8 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
         observations.rotations[posed],
         observations.translations[posed],
     )
-    require_fit(poses.sigma)
+    seen = observations.pixels[posed]
+    require_fit(poses.sigma, camera, pen, seen)
     fitting = _fitting(poses)
     reasons[posed[~fitting]] = Reason.MISFIT
     require_images(posed[fitting], reasons, observations.advice)
@@ -72,7 +74,10 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
         if error.message.code != "pivot.tip-moved" or poses.sigma <= USUAL_SIGMA:
             raise
         raise CalibrationError(
-            "calibrate.leds-do-not-fit-nor-tip", sigma=poses.sigma, usual=USUAL_SIGMA
+            "calibrate.leds-do-not-fit-nor-tip",
+            sigma=poses.sigma,
+            usual=USUAL_SIGMA,
+            cause=cause_of_misfit(camera, pen, seen) or UNKNOWN_CAUSE,
         ) from error
     outliers = posed[fitting][~pivot.used]
     distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
@@ -89,14 +94,15 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
     )
 
 
-def require_fit(sigma: float) -> None:
+def require_fit(sigma: float, camera: Camera, pen: Pen, pixels: FloatArray) -> None:
     """Raise `CalibrationError` if LEDs lie farther off the model than any measured, px.
 
-    It names the files that may be of others.
+    It names the cause by the centres ``pixels`` (N, L, 2), px.
     """
     if sigma > MAX_SIGMA:
+        cause = cause_of_misfit(camera, pen, pixels) or UNKNOWN_CAUSE
         raise CalibrationError(
-            "calibrate.leds-do-not-fit", sigma=sigma, usual=USUAL_SIGMA
+            "calibrate.leds-do-not-fit", sigma=sigma, usual=USUAL_SIGMA, cause=cause
         )
 
 

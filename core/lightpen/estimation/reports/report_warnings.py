@@ -15,6 +15,7 @@ from lightpen.messages import Message, message
 from lightpen.model.rig import of_camera
 from lightpen.swing_messages import Code, lateness
 
+SEAT_LEDS = 6  # in the usual image, that show how the tip sits
 NOISY = 2.5  # times the noise of the usual LED
 
 
@@ -138,7 +139,8 @@ def _seat_warnings(calibration: Calibration) -> list[Message]:
     # Ball and cone within the assumed form error move the tip as much.
     by_form = calibration.priors.form_error * float(np.sqrt(N_CONE * sum(MODE_COUNTS)))
     distance = 0.0 if jitter is None else float(np.sqrt(np.trace(jitter)))
-    if distance > by_form:
+    n_leds = np.median(bundle.used.sum(axis=(1, 2)))  # fewer hardly tell it from LEDs
+    if distance > by_form and n_leds >= SEAT_LEDS:
         warnings.append(message("warning.seat-jitter", distance=distance))
     forms = (*found.seat, found.oval)
     if any(form.is_significant for form in forms):

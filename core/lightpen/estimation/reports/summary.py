@@ -12,6 +12,7 @@ from lightpen.estimation.reports.methods import (
     result_of,
     two_stage_difference,
 )
+from lightpen.estimation.reports.rejected_centres import rejected_centres
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import Verdict
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -133,7 +134,10 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
     budget, halves = chosen.budget, calibration.halves
     joint = calibration.joint
     tilt = np.degrees(calibration.coverage.tilts)
+    centres = rejected_centres(calibration)
     lines = [
+        f"LED centres  {centres.n_rejected} of {centres.n_seen} rejected "
+        f"({100 * centres.share:.1f} %), {centres.where}",
         f"Residuals    {joint.rms:.4f} px rms, tip of single images "
         f"{chosen.rms_mm:.4f} mm rms",
         f"Weakest      {_direction(budget.weakest_direction)}, "

@@ -7,11 +7,13 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.led_quality import DISPLACED
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.methods import reported, two_stage_difference
+from lightpen.estimation.reports.rejected_centres import rejected_centres
 from lightpen.estimation.reports.report_warnings import late_cameras
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
@@ -30,6 +32,7 @@ from lightpen.swing_messages import (
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 FAR_MOVED = 3.0  # times the limit of U: corrected motion of cone or camera
+MANY_REJECTED = 0.1  # of the LED centres
 MANY_DROPPED = 0.2  # of the images that show the pen
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
 FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
@@ -119,11 +122,14 @@ _BY_CAUSE = {
     "warning.camera-file-of-rig-contradicted": NextStep.CHECK_CAMERA,
     "warning.images-turned": NextStep.CHECK_CAMERA,
     "warning.rig-file-contradicted": NextStep.CHECK_RIG,
+    "warning.base-contradicted": NextStep.CHECK_FILES,
+    "warning.scale-contradicted": NextStep.CHECK_FILES,
     "warning.pen-file-contradicted": NextStep.CHECK_LEDS,
 }
 
 _NEXT_STEPS = {
     Code.GOOD: NextStep.ACCEPT,
+    Code.GOOD_UNCHECKED: NextStep.ACCEPT,
     Code.UNCERTAIN: NextStep.CAPTURE_MORE,
     Code.TWO_STAGE_OFF: NextStep.REPORT_JOINT,
     Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
@@ -131,6 +137,7 @@ _NEXT_STEPS = {
     Code.HALVES_DIFFER: NextStep.REPEAT,
     Code.MANY_DROPPED: NextStep.REPEAT,
     Code.MANY_EXCLUDED: NextStep.REPEAT,
+    Code.CENTRES_REJECTED: NextStep.SEE_TO_CAUSE,
     Code.LEDS_OFF: NextStep.CHECK_LEDS,
     Code.LED_DISPLACED: NextStep.CHECK_LEDS,
     Code.LEDS_MISFIT: NextStep.CHECK_FILES,
@@ -251,7 +258,16 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         return Verdict(Grade.REPEAT, _why_uncertain(calibration, limits))
     for finding in _findings(calibration, limits):
         return Verdict(Grade.CHECK, finding)
-    return Verdict(Grade.PASS, message(Code.GOOD, uncertainty=uncertainty))
+    return Verdict(Grade.PASS, _good(calibration, uncertainty))
+
+
+def _good(calibration: Calibration, uncertainty: float) -> Message:
+    """Return a verdict without findings, and what the images cannot check."""
+    if len(calibration.cameras) > 1 or calibration.second is not None:
+        return message(Code.GOOD, uncertainty=uncertainty)
+    by_areas = calibration.stated.reading is not None
+    what = message("unchecked.scale") if by_areas else message("unchecked.diameter")
+    return message(Code.GOOD_UNCHECKED, uncertainty=uncertainty, what=what)
 
 
 def _why_uncertain(calibration: Calibration, limits: SwingLimits) -> Message:
@@ -290,17 +306,27 @@ def _findings(calibration: Calibration, limits: SwingLimits) -> Iterator[Message
     yield from late_cameras(calibration)
     if calibration.contradictions:
         worst_one = max(calibration.contradictions, key=lambda each: each.deviations)
-        yield message(Code.FILE_CONTRADICTED, why=worst_one.message)
+        why = calibration.cause_of_misfit or worst_one.message
+        yield message(Code.FILE_CONTRADICTED, why=why)
     if calibration.moved > FAR_MOVED * limit:
         yield message(Code.CAMERA_MOVED, distance=calibration.moved)
     sigma = calibration.bundle.sigma  # without a moving seat, which has its own finding
     if sigma > USUAL_SIGMA:
-        yield message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA)
+        found = calibration.cause_of_misfit or UNKNOWN_CAUSE
+        yield message(Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA, cause=found)
+    if len(calibration.leds.displaced) > 1:
+        cause = calibration.cause_of_misfit
+        if cause is not None and "cause.moved" not in {c.code for c in cause.parts()}:
+            yield message(Code.FILE_CONTRADICTED, why=cause)
     if calibration.leds.displaced:
         lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
         led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
         distance = float(lengths[led - 1])
         yield message(Code.LED_DISPLACED, led=led, distance=distance)
+    centres = rejected_centres(calibration)
+    if centres.share > MANY_REJECTED:
+        percent = 100 * centres.share
+        yield message(Code.CENTRES_REJECTED, percent=percent, where=centres.where)
     reasons = list(calibration.reasons)
     n_images = sum(each.shows_pen and each is not Reason.COPY for each in reasons)
     n_dropped = n_images - int(calibration.used.sum())

@@ -73,7 +73,7 @@ def second_images(camera: Camera, pen: Pen, swing: SecondSwing) -> SecondImages:
         part.pivot.tip_pen,
         part.pivot.pivot_cam,
     )
-    require_fit(joint.sigma)
+    require_fit(joint.sigma, camera, pen, pixels)
     sigmas = steady.observations.sigmas[part.chosen]
     return SecondImages(swing, tuple(part.reasons), pixels, sigmas, joint)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
@@ -97,12 +98,14 @@ def test_most_leds_of_an_image_and_four_must_agree_with_its_pose(
 
 @pytest.mark.parametrize("sigma", [0.99, 1.01])
 def test_leds_that_are_off_by_more_than_a_pixel_are_refused(sigma: float) -> None:
+    nothing_seen = np.full((6, 10, 2), np.nan)
     if sigma < 1:
-        require_fit(sigma)
+        require_fit(sigma, CAMERA, PEN, nothing_seen)
         return
     with pytest.raises(CalibrationError) as info:
-        require_fit(sigma)
-    assert info.value.message.values == {"sigma": 1.01, "usual": 0.1}
+        require_fit(sigma, CAMERA, PEN, nothing_seen)
+    values = {"sigma": 1.01, "usual": 0.1, "cause": UNKNOWN_CAUSE}
+    assert info.value.message.values == values
 
 
 @pytest.mark.parametrize(

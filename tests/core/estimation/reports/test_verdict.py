@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.reports.rejected_centres import rejected_centres
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import (
     Change,
@@ -101,8 +102,53 @@ def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> No
     verdict = judge(good, SwingLimits(max_uncertainty=0.02))
     assert verdict.grade is Grade.PASS
     assert verdict.reason == message(
-        Code.GOOD, uncertainty=good.budget.weakest_uncertainty
+        Code.GOOD_UNCHECKED,
+        uncertainty=good.budget.weakest_uncertainty,
+        what=message("unchecked.diameter"),
     )
+    unchecked = "The scale of the LED file is not checked by this calibration"
+    assert unchecked in str(verdict.reason)
+
+
+def test_many_rejected_centres_are_checked_with_their_led(good: Calibration) -> None:
+    limits = SwingLimits(max_uncertainty=0.02)
+    images = good.cameras[0]
+    assert rejected_centres(good).share < 0.001
+
+    def without(mask: BoolArray) -> Calibration:
+        fewer = replace(images, leds_used=images.leds_used & ~mask)
+        return replace(good, cameras=(fewer,))
+
+    led_4 = np.zeros_like(images.leds_used)
+    led_4[:, 3] = True
+    assert judge(without(led_4), limits).grade is Grade.PASS  # a tenth
+    led_4[::5, 6] = True
+    verdict = judge(without(led_4), limits)
+    assert (verdict.grade, verdict.reason.code) == (Grade.CHECK, Code.CENTRES_REJECTED)
+    assert verdict.reason.values["percent"] == pytest.approx(12.0, abs=0.1)
+    assert verdict.reason.values["where"] == message("rejected.led", led=4)
+
+    pixels = images.observations.pixels
+    middle = (np.nanmin(pixels, axis=(0, 1)) + np.nanmax(pixels, axis=(0, 1))) / 2
+    upper_left = (pixels < middle).all(axis=2)
+    found = rejected_centres(without(upper_left))
+    assert found.where == message("rejected.upper-left")
+
+
+@pytest.mark.slow
+def test_five_dark_leds_say_nothing_about_the_seat() -> None:
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        swing = swing_poses(60, rng)
+        leds = PEN.leds + rng.normal(0, 0.02, PEN.leds.shape)
+        pixels = simulate_centers(
+            *(CAMERA, replace(PEN, leds=leds), swing.rotations, swing.translations),
+            *(0.05, rng),
+        )
+        pixels[:, rng.permutation(10)[:5]] = np.nan
+        centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+        found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+        assert "warning.seat-jitter" not in {each.code for each in warnings_of(found)}
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, Grade.CHECK), (0.3, Grade.REPEAT)])
@@ -194,7 +240,9 @@ def test_an_uncertainty_by_leds_that_are_off_is_reported_as_such(
     assert verdict.grade is Grade.CHECK
     assert verdict.reason == message(Code.LEDS_OFF, sigma=0.1, uncertainty=by_leds)
     assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
-    assert judge(off, SwingLimits(max_uncertainty=0.03)).reason.code == Code.GOOD
+    assert (
+        judge(off, SwingLimits(max_uncertainty=0.03)).reason.code == Code.GOOD_UNCHECKED
+    )
 
     small = with_led_sigma(off, 0.01)
     verdict = judge(small, SwingLimits(max_uncertainty=0.015))
