@@ -95,16 +95,6 @@ def test_the_record_alone_gives_the_same_figures(
     assert before["images"]["dropped"] == {"too few LEDs": 1, "tip slipped": 1}
 
 
-def test_a_record_of_a_record_gives_the_same_again(
-    lightpen: Run, calibrated: tuple[Path, str], tmp_path: Path
-) -> None:
-    first, second = tmp_path / "first.json", tmp_path / "second.json"
-    lightpen("calibrate", "--from-record", calibrated[0], "--json", first)
-    outcome = lightpen("calibrate", "--from-record", first, "--json", second)
-
-    assert outcome.stdout == calibrated[1]
-
-
 def test_images_that_were_taken_out_stay_out(
     lightpen: Run, swung: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -128,13 +118,6 @@ def test_what_a_record_brings_itself_is_refused_beside_it(
     assert "Omit --units" in outcome.stderr
     assert "Give either IMAGES" in both.stderr
     assert (outcome.returncode, both.returncode) == (2, 2)
-
-
-def test_an_empty_name_stands_for_no_images(lightpen: Run) -> None:
-    outcome = lightpen("calibrate", "")
-
-    assert "Give either IMAGES" in outcome.stderr
-    assert outcome.returncode == 2
 
 
 def test_a_record_is_not_written_over_itself(

@@ -199,17 +199,6 @@ def test_missing_images_are_reported_and_the_others_used(
     assert "Camera right has no image at 1 of 12 instants, such as " in (outcome.stdout)
 
 
-def test_names_that_tell_nothing_are_paired_in_order_with_a_note(
-    copied: Path, lightpen: Run
-) -> None:
-    for i, path in enumerate(sorted((copied / "right").iterdir())):
-        path.rename(path.with_name(f"{100 + 7 * i}.png"))
-    outcome = calibrate(lightpen, copied)
-
-    assert outcome.returncode == 0
-    assert "do not show which images are simultaneous" in outcome.stderr
-
-
 @pytest.mark.parametrize(
     ("images", "options", "words"),
     [
@@ -234,20 +223,6 @@ def test_two_folders_without_a_rig_ask_for_it(station: Path, lightpen: Run) -> N
     outcome = lightpen("calibrate", station / "left", station / "right", *files)
 
     assert_refused(outcome, "need --rig FILE instead of --camera", 2)
-
-
-def test_a_rig_file_that_names_no_camera_file_is_refused(
-    copied: Path, lightpen: Run
-) -> None:
-    (copied / "right.yaml").unlink()
-
-    assert_refused(calibrate(lightpen, copied), "of right: .*does not exist", 2)
-
-
-def test_the_record_is_not_written_over_a_rig_file(copied: Path, lightpen: Run) -> None:
-    outcome = calibrate(lightpen, copied, "--json", copied / "rig.json")
-
-    assert_refused(outcome, "would replace the input file", 2)
 
 
 def test_the_record_alone_gives_the_same_tip_where_a_camera_lost_an_image(

@@ -2,8 +2,7 @@
 
 import importlib.util
 import subprocess
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -68,12 +67,6 @@ def test_a_first_set_up_makes_the_environment_and_installs(machine: Machine) -> 
 
 def test_what_is_up_to_date_is_left_alone(machine: Machine) -> None:
     machine.environment.set_up("program")
-
-    assert machine.commands_of_set_up("program") == []
-
-
-def test_the_development_group_contains_the_program(machine: Machine) -> None:
-    machine.environment.set_up("development")
 
     assert machine.commands_of_set_up("program") == []
 
@@ -152,58 +145,6 @@ def test_source_paths_of_the_installation_hold_no_umlaut(machine: Machine) -> No
 
     written = path.read_text(encoding="ascii")
     assert (packages / written).resolve() == core.resolve()
-
-
-@dataclass(frozen=True)
-class Started:
-    """What a command of the user set up and became."""
-
-    group: str
-    python: str
-    options: list[str]
-
-
-@pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Started]:
-    """Return a function that gives a command without doing it."""
-
-    def start(*arguments: str) -> Started:
-        groups: list[str] = []
-        commands: list[list[str]] = []
-        with monkeypatch.context() as patch:
-            patch.setattr(
-                run.Environment, "set_up", lambda _, group: groups.append(group)
-            )
-            patch.setattr(run, "become", commands.append)
-            patch.setenv("QT_QPA_PLATFORM", "offscreen")
-            patch.chdir(run.ROOT)  # puts the folder back
-            run.main(arguments)
-        [group], [[python, *options]] = groups, commands
-        return Started(group, python, options)
-
-    return start
-
-
-def test_the_benchmark_gets_its_options_in_the_environment_for_development(
-    started: Callable[..., Started],
-) -> None:
-    bench = started("bench", "speed")
-
-    assert bench.group == "development"
-    assert bench.python == run.Environment(run.ROOT).program("python")
-    script, *options = bench.options
-    assert Path(script).is_file()
-    assert options == ["speed"]
-
-
-def test_the_whole_suite_runs_in_parallel_and_a_chosen_test_in_one_process(
-    started: Callable[..., Started],
-) -> None:
-    whole, chosen = started("test"), started("test", "-k", "pivot")
-
-    assert whole.options == ["-m", "pytest", *run.PARALLEL]
-    assert chosen.options == ["-m", "pytest", "-k", "pivot"]
-    assert whole.group == chosen.group == "development"
 
 
 @pytest.mark.parametrize(

@@ -176,21 +176,6 @@ def test_the_connection_is_reported_as_it_changes(
     assert view.stats.delivered == 0
 
 
-def test_exposure_and_gain_are_reported_when_they_are_in_force(
-    view: LiveView, stage: Stage, qtbot: QtBot
-) -> None:
-    with qtbot.waitSignal(view.settings_applied):
-        stage.open()
-    with qtbot.waitSignal(
-        view.settings_applied, check_params_cb=lambda s: s.exposure_us == 400
-    ):
-        view.set_exposure(400.0)
-    with qtbot.waitSignal(
-        view.settings_applied, check_params_cb=lambda s: s.gain_db == 6
-    ):
-        view.set_gain(6.0)
-
-
 def test_images_that_are_skipped_are_counted_in_the_status_line_alone(
     view: LiveView, stage: Stage, notifications: Notifications, qtbot: QtBot
 ) -> None:
@@ -330,23 +315,6 @@ def test_a_swing_is_captured_though_the_gui_is_busy(
     stage.hold_up_until(lambda: n_kept(run) > N_IMAGES + 2)
 
     assert len(open_record(interrupted).images) >= N_IMAGES + 2
-
-
-def test_a_swing_goes_on_when_its_camera_is_closed_and_another_is_opened(
-    run: SwingRun, view: LiveView, stage: Stage, interrupted: Path
-) -> None:
-    stage.open()
-    resumable = read_resumable(interrupted)
-    run.runner.ask(lambda workflow: workflow.go_on(resumable))
-    stage.hold_up_until(lambda: n_kept(run) > N_IMAGES)
-    stage.close()
-    before = n_kept(run)
-    assert run.runner.status.is_capturing
-    stage.open()
-    stage.hold_up_until(lambda: n_kept(run) > before)
-    numbers = [image.number for image in open_record(interrupted).images]
-
-    assert numbers == list(range(1, len(numbers) + 1))
 
 
 def test_the_operator_follows_the_swing_until_his_camera_is_closed(

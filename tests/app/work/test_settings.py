@@ -72,28 +72,6 @@ def reopened(settings: Settings) -> Settings:
     return Settings(settings.file)
 
 
-def test_preferences_survive_the_program(settings: Settings) -> None:
-    settings.set_preferences(PREFERENCES)
-
-    assert reopened(settings).preferences() == PREFERENCES
-
-
-def test_each_station_remembers_its_own(settings: Settings) -> None:
-    settings.set_station("Hall 3/2", STATION)
-    settings.set_station("Hall\\4", ANN)
-
-    again = reopened(settings)
-
-    assert again.stations() == ("Hall 3/2", "Hall\\4")
-    assert again.station("Hall 3/2") == STATION
-    assert again.station("Hall\\4").names.operator == "Ann"
-
-
-def test_a_new_station_begins_with_the_simulated_pen(settings: Settings) -> None:
-    assert settings.station("new") == Station()
-    assert settings.station("new").camera.source.kind == "simulated"
-
-
 def test_what_the_administrator_set_is_below_what_the_user_chose(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,7 +12,6 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.swing.capture.state import Phase, SwingEventKind, SwingState
@@ -83,21 +82,6 @@ def test_records_and_results_are_kept_in_the_folder(
     assert run.status.record_folder is not None
     assert run.status.record_folder.parent == run.records_folder
     assert "2031" in run.status.record_folder.name
-
-
-def test_what_changed_is_known_when_it_is_reported(
-    run: SwingRun, diary: Diary, interrupted: Path, qtbot: QtBot
-) -> None:
-    resumable = read_resumable(interrupted)
-    run.runner.ask(lambda workflow: workflow.go_on(resumable))
-    hold_up_until(lambda: run.runner.status.is_capturing)
-    assert run.status.state is None  # the GUI was busy
-    assert diary.entries == []
-
-    with qtbot.waitSignal(run.changed, timeout=round(1000 * TIMEOUT)):
-        pass
-    assert run.status is run.runner.status
-    assert run.status.record_folder == interrupted
 
 
 def test_a_gui_that_was_busy_gets_every_event_and_then_the_newest_status(
@@ -199,16 +183,3 @@ def test_a_follower_sees_every_state_though_the_gui_is_busy(
 
     phases = [state.phase for state in watcher.seen]
     assert phases == [Phase.WAIT, Phase.PAUSED, Phase.WAIT]
-
-
-def test_a_swing_is_left_to_be_resumed_when_the_program_ends(
-    run: SwingRun, interrupted: Path
-) -> None:
-    resumable = read_resumable(interrupted)
-    run.runner.ask(lambda workflow: workflow.go_on(resumable))
-    run.runner.ask(lambda workflow: workflow.finish())
-    run.runner.shut_down()
-    assert run.runner.await_end(TIMEOUT)
-
-    (record,) = find_unfinished(run.records_folder).interrupted
-    assert record.folder == interrupted

@@ -211,20 +211,6 @@ def test_a_file_that_cannot_be_read_is_reported_and_must_be_chosen_again(
     assert "pen.json" in stage.sentences[0]
 
 
-def test_files_that_are_gone_are_reported_one_by_one(
-    stage: Stage, tmp_path: Path, recording: Path
-) -> None:
-    source = SourceChoice(SourceKind.RECORDED, str(recording))
-    stage.choose(source=source)
-    pen_file = stage.workbench.selection.preparation.pen_file
-    assert pen_file is not None
-    shutil.rmtree(pen_file.path.parent)
-    now = stage.start_again()
-
-    assert (now.camera_file, now.pen_file) == (None, None)
-    assert ["does not exist" in sentence for sentence in stage.sentences] == [True] * 2
-
-
 @pytest.mark.parametrize(
     "read",
     [
@@ -261,22 +247,6 @@ def test_sample_files_that_cannot_be_written_are_reported(
 
     assert first.selection.preparation.camera_file is None
     assert "a file" in sentences[0]
-
-
-def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
-    stage: Stage, qtbot: QtBot
-) -> None:
-    stage.choose(names=OTHER)
-    chosen = stage.workbench.selection.preparation
-    assert chosen.pen_file is not None
-    chosen.pen_file.path.unlink()
-    stage.start_again()
-    assert stage.sentences
-
-    with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as withdrawn:
-        stage.choose(pen_file=chosen.pen_file)
-
-    assert withdrawn.args == stage.sentences[-1:]
 
 
 @pytest.mark.parametrize(

@@ -133,24 +133,6 @@ def sees_pen(image: LiveImage) -> bool:
 # What is looked for
 
 
-def test_without_camera_and_pen_an_image_shows_its_spots_only(
-    make_live: MakeLive, screen: Screen
-) -> None:
-    make_live()
-    screen.wait_until(lambda: screen.n_spots == 10)
-
-    assert screen.images[-1].detection is None
-
-
-def test_the_pen_is_sighted_as_soon_as_camera_and_pen_are_known(
-    station: "Station", make_live: MakeLive, screen: Screen
-) -> None:
-    live = make_live()
-    screen.wait_for_images(1)
-    live.set_region(station.preparation.region)
-    screen.wait_until(lambda: sees_pen(screen.images[-1]))
-
-
 def test_what_is_to_be_looked_for_may_be_said_before_the_start(
     station: "Station", make_live: MakeLive, screen: Screen
 ) -> None:
@@ -495,20 +477,6 @@ def test_a_swing_waits_for_a_camera_that_is_not_there(
 
     station.solve()
     assert station.status.solution is not None
-
-
-def test_exposure_and_gain_are_set_while_images_come(
-    make_live: MakeLive, screen: Screen
-) -> None:
-    live = make_live()
-    screen.wait_for_images(1)
-    live.worker().set_exposure(500.0)
-    live.worker().set_gain(6.0)
-    screen.wait_until(lambda: screen.images[-1].frame.exposure_us == 500.0)
-
-    caps = live.worker().caps
-    assert caps is not None
-    assert caps.gain_db is not None
 
 
 def test_stopping_twice_or_before_the_start_does_no_harm(make_live: MakeLive) -> None:

@@ -41,7 +41,6 @@ from lightpen.simulator.scene_files import write_scene
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.view import Lamp
 from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
@@ -54,7 +53,6 @@ from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
-from lightpen_app.steps.page import MainAction
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
@@ -232,12 +230,6 @@ def test_cameras_out_of_step_are_reported_with_what_that_costs(live: "Seen") -> 
 def test_each_led_has_a_ring_with_its_number(live: "Seen") -> None:
     assert numbers(live) == {str(led) for led in range(1, 11)}
     assert others(live) == []
-
-
-def test_size_and_rate_of_the_images_are_reported(live: "Seen") -> None:
-    assert "1224 x 1024 px" in live.words
-    assert "fps" in live.words
-    assert "Live" in live.words
 
 
 def test_what_a_narrow_image_has_no_room_for_is_left_out_from_the_end(
@@ -520,20 +512,6 @@ def test_the_complaint_goes_with_a_fit_file(
     assert workbench.selection.preparation.camera_file.path.name == "other.yaml"
 
 
-def test_what_is_wrong_with_a_file_is_reported_in_the_language_of_the_wizard(
-    live: "Seen", qapp: QApplication, tmp_path: Path
-) -> None:
-    broken = tmp_path / "broken.yaml"
-    broken.write_text("image_width: 1224\ncamera_matrix: [1, 2\n")
-    LanguageSwitch(qapp).set_language("zh_CN")
-    live.wait("遮住光笔")
-
-    live.enter("内参文件", str(broken))
-
-    live.wait("broken.yaml 第 3 行不是有效的 YAML")
-    assert "is not valid" not in live.words
-
-
 def test_a_file_is_opened_in_the_dialog(
     live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
@@ -544,16 +522,6 @@ def test_a_file_is_opened_in_the_dialog(
     dialog.accept()
 
     live.until(lambda: workbench.selection.preparation.camera_file.path == path)  # type: ignore[union-attr]
-
-
-def test_a_dialog_that_is_left_changes_nothing(
-    live: "Seen", workbench: Workbench
-) -> None:
-    before = workbench.selection.preparation
-    live.click("Open...")
-    live.child(QFileDialog).reject()
-
-    assert workbench.selection.preparation is before
 
 
 def test_the_files_of_the_simulated_pen_are_used_at_a_click(
@@ -590,19 +558,6 @@ def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> Non
 
     live.choose("GenICam with a vendor's GenTL producer")
     live.wait("Search for the camera and choose it.")
-
-
-def test_files_of_the_simulated_pen_are_not_combined_with_a_recording(
-    live: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    live.choose("Recorded images")
-    live.enter("Folder, record or video", str(recording(tmp_path / "swing")))
-    assert workbench.selection.preparation.camera_file is None
-    assert workbench.selection.preparation.pen_file is None
-
-    live.choose("Simulated pen")
-    live.wait("Matches the live images:")
-    assert workbench.selection.preparation.pen_file is not None
 
 
 def test_a_folder_and_an_intrinsics_file_are_dropped_on_their_places(
@@ -764,20 +719,6 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     assert "are no longer readable." not in live.words
 
 
-def test_a_camera_that_is_not_there_is_reported(
-    seen: "Seen", workbench: Workbench, small_scene: Scene
-) -> None:
-    clock = workbench.around.clock
-    camera = FaultyCamera(small_scene, clock)
-    camera.unplug()
-    workbench.live.open([camera], CameraSettings(), clock)
-    seen.page.entered()
-
-    seen.wait("There is no camera SIM-1.")
-    seen.click("Try again")
-    seen.wait("10 of 10 LEDs")
-
-
 def test_a_silent_camera_is_reported(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
@@ -877,21 +818,6 @@ def test_a_mask_is_clicked_and_drawn_on_the_image(
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=second)
     seen.until(lambda: len(others(seen)) == 1)
     assert len(workbench.selection.preparation.mask) == 1
-
-
-def test_a_mask_is_of_one_source_only(
-    live: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    workbench.selection.set_preparation(
-        replace(workbench.selection.preparation, mask=np.array([[9.0, 9.0, 5.0]]))
-    )
-
-    folder = recording(tmp_path / "swing")
-    live.choose("Recorded images")
-    live.enter("Folder, record or video", str(folder))
-
-    assert workbench.selection.preparation.source.place == str(folder)
-    assert len(workbench.selection.preparation.mask) == 0
 
 
 def test_a_mask_adds_to_the_one_before(
@@ -1032,16 +958,6 @@ def test_the_fault_of_a_swing_is_not_taken_for_one_of_the_camera(
     live.choose("Recorded images")
 
     assert "The disk is full." in window.words()
-
-
-def test_the_step_leads_on_to_the_leds(window: MainWindow, live: "Seen") -> None:
-    assert live.page.main_action() == MainAction("Continue to the LEDs")
-    button = window.findChild(QPushButton, "main_button")
-    assert isinstance(button, QPushButton)
-
-    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
-
-    assert window.page().key == "leds"
 
 
 @pytest.mark.slow

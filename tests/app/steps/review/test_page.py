@@ -3,12 +3,11 @@
 import json
 import re
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -61,16 +60,10 @@ from lightpen.simulator.postures import Postures
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
-from lightpen.swing.capture.shortfall import N_MORE
 from lightpen.swing.capture.state import SwingState
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import (
-    Resumable,
-    read_for_more,
-    read_resumable,
-    recorded_setup,
-)
+from lightpen.swing.resuming import Resumable, read_resumable, recorded_setup
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.steps.page import MainAction
@@ -1097,47 +1090,6 @@ def test_a_click_on_the_misfit_chooses_the_image(
 
 
 @pytest.mark.slow
-def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
-    page: ReviewPage,
-    workbench: Workbench,
-    qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    may_solve = Event()
-
-    def solve(solution: Solution, excluded: Mapping[int, str]) -> Solution:
-        assert may_solve.wait(PATIENCE_MS / 1000)
-        return solve_again(solution, excluded)
-
-    monkeypatch.setattr("lightpen.swing.workflow.solve_again", solve)
-    before = tip(workbench).copy()
-    number = table(page).number()
-    assert number is not None
-    assert not button(page, "Include").isEnabled()
-    assert button(page, "Include").toolTip() == "Already included"
-
-    hindrances: list[str] = []
-    page.changed.connect(lambda: hindrances.append(page.main_action().why_not))
-    click(page, "Exclude")
-    qtbot.waitUntil(lambda: "Computing the tip" in hindrances)
-    may_solve.set()
-    await_count(qtbot, page, included(N_IMAGES - 1, "1 excluded manually"))
-
-    assert table(page).number() == number
-    assert not np.array_equal(tip(workbench), before)
-    assert open_record(workbench.run.records_folder / "swing").excluded == {
-        number: "taken out"
-    }
-    assert not button(page, "Exclude").isEnabled()
-    assert page.main_action().why_not == ""
-
-    click(page, "Include")
-    await_count(qtbot, page, included(N_IMAGES))
-
-    np.testing.assert_array_equal(tip(workbench), before)
-
-
-@pytest.mark.slow
 def test_keys_take_several_images_out_undo_redo_and_put_them_back(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1501,63 +1453,6 @@ def test_after_acceptance_the_next_calibration_starts(
     qtbot.waitUntil(lambda: page.why_closed() == "Swing the pen first.")
 
 
-def test_a_result_that_cannot_be_stored_is_reported_and_the_old_one_stays(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
-) -> None:
-    workbench.run.archive.folder.write_text("a file where a folder should be")
-
-    with qtbot.waitSignal(workbench.notifications.raised) as reported:
-        page.run_main_action()
-
-    assert "cannot be" in reported.args[0]
-    assert not page.is_complete()
-    assert banner(page).word == "PASS: Within limits"
-    assert open_record(workbench.run.records_folder / "swing").verdict is None
-
-
-@pytest.mark.slow
-def test_more_images_are_captured_into_the_same_swing(
-    page: ReviewPage,
-    workbench: Workbench,
-    qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    may_read = Event()
-
-    def read(folder: Path) -> Resumable:
-        assert may_read.wait(PATIENCE_MS / 1000)
-        return read_for_more(folder)
-
-    monkeypatch.setattr("lightpen.swing.workflow.read_for_more", read)
-    workbench.camera.open()
-    assert page.main_action().why_not == ""
-    with qtbot.waitSignal(page.step_requested) as asked:
-        click(page, "Capture more")
-        qtbot.waitUntil(lambda: page.main_action().why_not == "Swing in progress")
-        may_read.set()
-
-    assert asked.args == ["swing"]
-    assert workbench.run.status.is_capturing
-    assert workbench.run.status.setup is not None
-    assert workbench.run.status.setup.limits.min_images == N_IMAGES + N_MORE
-    assert workbench.run.status.state is not None
-    assert workbench.run.status.state.n_kept == N_IMAGES
-    assert workbench.run.status.record_folder == workbench.run.records_folder / "swing"
-
-
-def test_a_record_that_is_gone_cannot_be_captured_into(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
-) -> None:
-    (workbench.run.records_folder / "swing" / "journal.jsonl").write_text("{}\n{}\n")
-
-    with qtbot.waitSignal(workbench.notifications.raised) as reported:
-        click(page, "Capture more")
-
-    assert "is damaged" in reported.args[0]
-    assert workbench.run.status.solution is not None
-    qtbot.waitUntil(lambda: page.main_action().why_not == "")
-
-
 def test_a_repetition_is_asked_for_and_keeps_the_images_of_the_swing(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1578,19 +1473,6 @@ def test_a_repetition_is_asked_for_and_keeps_the_images_of_the_swing(
     assert record.verdict == DISCARDED
     assert len(record.images) == N_IMAGES
     assert workbench.run.status.solution is None
-
-
-def test_a_swing_that_cannot_be_set_aside_is_reported(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
-) -> None:
-    shutil.rmtree(workbench.run.records_folder / "swing")
-    click(page, "Repeat swing")
-
-    with qtbot.waitSignal(workbench.notifications.raised) as reported:
-        answer(page, "Repeat swing")
-
-    assert "does not exist" in reported.args[0]
-    assert workbench.run.status.solution is not None
 
 
 # What is asked

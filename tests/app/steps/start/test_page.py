@@ -51,7 +51,6 @@ from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.steps.start.result_panel import LastResultPanel
-from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings
@@ -279,12 +278,6 @@ def test_at_first_each_missing_name_is_asked_for_in_turn(
     assert start.page.main_action() == MainAction("Continue to the camera")
 
 
-def test_a_name_of_blanks_is_none(start: Opened) -> None:
-    start.type_into("Cone", "   ")
-
-    assert start.why_not == "Enter the name of the cone."
-
-
 def test_the_last_name_counts_before_its_field_is_left(start: Opened) -> None:
     """Else the main button would stay grey, and could not be pressed."""
     start.type_into("Cone", "", end=None)
@@ -338,20 +331,6 @@ def test_all_of_it_is_remembered_for_the_station(
     )
     assert again.selection.preparation.limits == SwingLimits(0.0075, 80, 250)
     again.shut_down()
-
-
-def test_another_tip_has_another_ball_and_nominal_centre(
-    start: Opened, workbench: Workbench
-) -> None:
-    point = np.array([1.0, -90.0, -20.0])
-    workbench.selection.set_preparation(
-        replace(workbench.selection.preparation, nominal_tip=point)
-    )
-    start.type_into("Probe tip", "T-99")
-
-    assert workbench.selection.preparation.names.tip == "T-99"
-    assert workbench.selection.preparation.names.ball_diameter is None
-    assert workbench.selection.preparation.nominal_tip is None
 
 
 def test_a_known_tip_brings_its_ball_and_nominal_centre(
@@ -502,24 +481,6 @@ def test_the_wheel_does_not_change_a_field_that_scrolls_by(
 
 
 # Numbers
-
-
-def test_a_negative_ball_diameter_cannot_be_entered(
-    start: Opened, workbench: Workbench
-) -> None:
-    start.type_into("Ball diameter", "-3")
-
-    assert (workbench.selection.preparation.names.ball_diameter or 0.0) >= 0
-    field = start.field("Ball diameter")
-    assert isinstance(field, NumberField)
-    assert field.reason().startswith("Allowed: 0 to")
-
-
-def test_a_ball_need_not_be_known(start: Opened, workbench: Workbench) -> None:
-    start.type_into("Ball diameter", "0")
-
-    assert start.text_of("Ball diameter") == "Not specified"
-    assert start.page.is_complete()
 
 
 def test_the_nominal_centre_is_that_of_the_led_file_unless_another_is_typed(
@@ -1047,31 +1008,6 @@ def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
 
 
 @pytest.mark.slow
-def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded(
-    show: Show,
-    workbench: Workbench,
-    qtbot: QtBot,
-    holding: Callable[[Path], "subprocess.Popen[str]"],
-) -> None:
-    folder = interrupted(workbench, "a")
-    workbench.camera.open()
-    start = show(workbench)
-    holding(folder)
-    before = (folder / "journal.jsonl").read_bytes()
-
-    start.press("Resume")
-    qtbot.wait_until(lambda: len(start.notices) == 1)
-    start.press("Discard")
-    start.press("Discard")
-    qtbot.wait_until(lambda: len(start.notices) == 2)
-
-    sentence = f"Another program is writing to the swing in {folder}."
-    assert all(notice.startswith(sentence) for notice in start.notices)
-    assert start.steps == []
-    assert (folder / "journal.jsonl").read_bytes() == before
-
-
-@pytest.mark.slow
 def test_a_record_that_cannot_be_written_is_reported(
     show: Show, workbench: Workbench, qtbot: QtBot
 ) -> None:
@@ -1129,22 +1065,6 @@ def test_a_double_click_discards_nothing(
 
     assert second.text() == "Keep"
     assert open_record(folder).verdict is None
-
-
-def test_a_discarded_swing_keeps_its_images_and_is_not_offered_again(
-    show: Show, workbench: Workbench, qtbot: QtBot
-) -> None:
-    folder = interrupted(workbench, "a")
-    interrupted(workbench, "b", hours_ago=5)
-    start = show(workbench)
-
-    start.press("Discard")
-    start.press("Discard")
-    qtbot.wait_until(lambda: len(start.rows()) == 1)
-
-    assert open_record(folder).verdict == DISCARDED
-    assert len(list((folder / "images").iterdir())) == 12
-    assert start.statuses[-1] == f"Swing discarded. The images remain in {folder}."
 
 
 @pytest.mark.slow
@@ -1270,22 +1190,6 @@ def test_whoever_finds_all_as_it_was_goes_on_by_one_key(window: MainWindow) -> N
     QTest.keyClick(focused(), Key.Key_Return)
 
     assert window.page().key == "camera"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["Operator", "Station", "Ball diameter"])
-def test_the_keys_of_a_remote_lead_on_from_every_field(
-    window: MainWindow, workbench: Workbench, name: str
-) -> None:
-    before = workbench.selection.preparation
-    for widget in window.page().findChildren(QWidget):
-        if widget.accessibleName() == name:
-            widget.setFocus()
-
-    QTest.keyClick(focused(), Key.Key_PageDown)
-
-    assert window.page().key == "camera"
-    assert workbench.selection.preparation.names == before.names
 
 
 def test_enter_after_a_name_of_a_station_only_takes_it_over(

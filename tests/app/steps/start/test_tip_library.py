@@ -210,14 +210,6 @@ def test_pens_and_cones_are_chosen_from_their_lists(desk: Desk) -> None:
     assert (names.pen, names.cone) == ("LP-9", "C-9")
 
 
-def test_a_tip_that_is_typed_brings_its_ball_from_the_library(desk: Desk) -> None:
-    desk.add(TIP)
-    desk.enter("Probe tip", "T-7")
-    QTest.keyClick(desk.control("Probe tip"), Qt.Key.Key_Tab)
-
-    assert desk.workbench.selection.preparation.names.ball_diameter == 6.0
-
-
 @pytest.mark.usefixtures("of_real_pen")
 def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
     desk: Desk,

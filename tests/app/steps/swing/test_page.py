@@ -547,27 +547,6 @@ def test_closing_the_window_asks_and_names_the_images(
     assert f"captured images ({capturing.state.n_kept}) are saved" in said
 
 
-def test_other_choices_do_not_change_a_swing_that_is_under_way(
-    qtbot: QtBot, capturing: Desk
-) -> None:
-    workbench, setup = capturing.workbench, capturing.run.status.setup
-    capturing.window.go_to(0)
-    workbench.selection.set_preparation(
-        replace(workbench.selection.preparation, names=replace(NAMES, operator="Bob"))
-    )
-    capturing.window.go_to(1)
-
-    until(qtbot, lambda: "Settings were changed during this swing." in asked(capturing))
-    capturing.click("Continue this swing")
-
-    keep_on(qtbot, capturing)
-    capturing.window.go_to(0)
-    capturing.window.go_to(1)
-    assert asked(capturing) == ""  # it was reported once
-    assert capturing.run.status.setup is setup
-    assert capturing.run.status.names.operator == "Ann"
-
-
 def test_enter_presses_the_main_button_unless_another_was_chosen(
     capturing: Desk,
 ) -> None:
