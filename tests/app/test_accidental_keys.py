@@ -61,26 +61,7 @@ def test_a_second_enter_accepts_no_tip_that_was_not_shown(done: "Walker") -> Non
     assert walker.title() == "Review"
 
 
-@pytest.mark.slow
-def test_after_a_while_enter_accepts(
-    done: "Walker", monkeypatch: pytest.MonkeyPatch
-) -> None:
-    walker = done
-    walker.until(lambda: pressed(walker, Key.Key_Return))
-    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 0)
-    walker.until(walker.main_button().isEnabled)
-
-    walker.until(lambda: accepted(walker))
-
-    assert walker.workbench.run.status.result is not None
-
-
 def pressed(walker: "Walker", key: Key) -> bool:
     """Press a key until the step is another one."""
     walker.press(key)
     return walker.title() != "Swing"
-
-
-def accepted(walker: "Walker") -> bool:
-    walker.press(Key.Key_Return)
-    return walker.workbench.run.status.result is not None

@@ -109,9 +109,3 @@ def test_what_is_set_up_once_is_a_click_away(known: "Walker") -> None:
     walker.click("Show the tips of this station")
     assert not walker.says("Set up station")
     assert walker.main_button().text().startswith("Swing ")
-
-
-@pytest.mark.slow
-def test_a_first_start_opens_the_setup(walker: "Walker") -> None:
-    assert walker.says("Set up station")
-    assert walker.offers("Try it with a simulated pen")

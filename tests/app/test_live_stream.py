@@ -16,18 +16,13 @@ from lightpen.streaming.server import LOOPBACK, StreamPlace
 from lightpen_app.shell.stream_dialog import StreamDialog
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel
-from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
     from tests.app.conftest import Walker
 
 ANY = StreamPlace(port=0)
-
-
-def test_nothing_is_streamed_unless_chosen() -> None:
-    assert not Preferences().streams
-    assert Preferences().stream_address == LOOPBACK
 
 
 @pytest.mark.slow

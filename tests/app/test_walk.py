@@ -210,19 +210,6 @@ def _english_in(text: str) -> str:
     return text if words and not text.startswith(TOO_SLOW) else ""
 
 
-@pytest.mark.parametrize(
-    ("text", "is_english"),
-    [
-        ("\u8fdb\u884c\u4e2d", False),
-        ("10 / 10 LED, 0.03 px; U (k = 2)", False),
-        ("\u6587\u4ef6 /home/ann/leds.csv", False),
-        ("Camera, \u8fdb\u884c\u4e2d", True),
-    ],
-)
-def test_the_search_for_english_words_finds_them(text: str, is_english: bool) -> None:
-    assert bool(_english_in(text)) is is_english
-
-
 def _check_round(walker: "Walker") -> None:
     """Check that the Tab key leads to every control that can be used, each named."""
     visited = walker.tab_round()

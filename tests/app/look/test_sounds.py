@@ -59,13 +59,6 @@ def test_every_sound_has_its_tones(sound: Sound) -> None:
     assert begin == len(samples)
 
 
-def test_good_news_rises_and_bad_news_falls() -> None:
-    for sound in (Sound.SEATED, Sound.FIELD_FULL, Sound.DONE):
-        pitches = [frequency for frequency, _ in TONES[sound]]
-        assert pitches == sorted(pitches)
-    assert TONES[Sound.FAILED][0][0] > TONES[Sound.FAILED][1][0]
-
-
 def test_a_tick_rises_by_an_octave_while_the_swing_goes_on() -> None:
     first = pitch_of(samples_of(sound_wav(Sound.KEPT, 0)))
     last = pitch_of(samples_of(sound_wav(Sound.KEPT, KEPT_STEPS)))

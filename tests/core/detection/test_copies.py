@@ -31,18 +31,6 @@ def reasons(pixels: FloatArray) -> list[Reason]:
     return list(without_copies(observe_centers(centers, CAMERA, PEN)).reasons)
 
 
-def test_the_first_of_equal_images_counts() -> None:
-    pixels = swung()
-    found = reasons(np.concatenate([pixels, pixels[3:5], pixels[3:4]]))
-    assert found == [Reason.NONE] * 40 + [Reason.COPY] * 3
-
-
-def test_an_image_that_was_coded_anew_is_a_copy() -> None:
-    pixels = swung()
-    coded = pixels[:5] + 0.0005 * np.random.default_rng(1).normal(size=(5, 10, 2))
-    assert reasons(np.concatenate([pixels, coded])).count(Reason.COPY) == 5
-
-
 def test_images_of_a_pen_at_rest_differ_by_their_noise() -> None:
     pixels = swung()
     again = pixels[:5] + 0.01 * np.random.default_rng(1).normal(size=(5, 10, 2))

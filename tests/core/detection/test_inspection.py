@@ -143,10 +143,6 @@ def test_the_circle_covers_a_lamp_that_swings() -> None:
         assert abs(x - circle[0]) + 8 < circle[2]
 
 
-def test_no_images_have_no_stray_light() -> None:
-    assert lasting_light([]).shape == (0, 3)
-
-
 def test_a_search_is_over_after_enough_images() -> None:
     search = searched([NOTHING] * (SEARCHED_IMAGES - 1))
 
@@ -174,11 +170,6 @@ def test_what_moves_is_no_stray_light_but_not_dark_either() -> None:
     assert len(search.circles()) == 0
     assert not search.is_dark
     assert searched([NOTHING] * 10).is_dark
-
-
-def test_a_search_that_has_not_begun_finds_nothing() -> None:
-    assert not StraySearch().shows_pen
-    assert len(StraySearch().circles()) == 0
 
 
 def test_clipped_leds_of_ten_bits_ask_for_less_light_and_not_for_more() -> None:

@@ -98,15 +98,6 @@ def test_the_movement_does_not_depend_on_when_it_is_looked_at() -> None:
         np.testing.assert_allclose(seldom, often, atol=1e-6)  # 1 ns of the clock
 
 
-def test_another_seed_swings_otherwise() -> None:
-    scenes = Scene(seed=1), Scene(seed=2)
-    for scene in scenes:
-        scene.operator.swing()
-    one, other = (leans(scene.watch(5)) for scene in scenes)
-
-    assert np.abs(one - other).max() > 0.1
-
-
 def test_the_pen_is_absent_then_approaches_and_then_sits_in_the_cone() -> None:
     scene = Scene(seated=False)
     first = scene.look()
@@ -276,12 +267,6 @@ def test_a_hand_hides_all_leds_until_it_is_taken_away() -> None:
 
     scene.operator.uncover()
     assert scene.watch(0.1)[-1].covered == frozenset()
-
-
-@pytest.mark.parametrize("led", [0, 11])
-def test_an_led_that_the_pen_has_not_cannot_be_covered(led: int) -> None:
-    with pytest.raises(ValueError, match="1 to 10"):
-        Scene().operator.cover(leds=[led])
 
 
 def test_a_long_pause_costs_no_time() -> None:

@@ -297,30 +297,6 @@ def test_a_client_that_stalls_holds_up_nobody_and_misses_poses(
     statuses.wait_for_clients(1)
 
 
-def test_whoever_leaves_is_counted_no_more(
-    stream: PoseStream, statuses: Statuses
-) -> None:
-    with socket.create_connection((LOOPBACK, port_of(stream))):
-        statuses.wait_for_clients(1)
-    statuses.wait_for_clients(0)
-
-    assert not stream.is_heard
-
-
-def test_more_than_the_most_clients_are_turned_away(
-    stream: PoseStream, statuses: Statuses
-) -> None:
-    place = LOOPBACK, port_of(stream)
-    clients = [socket.create_connection(place) for _ in range(MOST_CLIENTS)]
-    statuses.wait_for_clients(MOST_CLIENTS)
-
-    with socket.create_connection(place) as one_more:
-        one_more.settimeout(LONGEST)
-        assert one_more.recv(1) == b""
-    for each in clients:
-        each.close()
-
-
 def test_what_a_client_says_is_passed_over(
     stream: PoseStream,
     statuses: Statuses,
