@@ -149,11 +149,6 @@ def press(qtbot: QtBot) -> Callable[[Key], None]:
     return press_key
 
 
-def test_the_first_page_is_entered_at_once(shell: Shell) -> None:
-    assert shell.shown == "Start"
-    assert shell.pages[0].log == ["entered"]
-
-
 def test_a_shell_without_pages_is_refused(settings: Settings) -> None:
     with pytest.raises(ValueError, match="at least one page"):
         MainWindow([], settings, Preferences(), Notifications())
@@ -373,12 +368,6 @@ def test_every_step_can_be_reached_and_pressed_by_keys_alone(
     camera = next(w for w in seen if w and w.accessibleName() == "Camera, to do")
     QTest.keyClick(camera, Key.Key_Space)
     assert shell.shown == "Camera"
-
-
-def test_a_new_page_has_the_focus_on_its_first_control(shell: Shell) -> None:
-    shell.window.advance()
-
-    assert QApplication.focusWidget() is shell.pages[1].field
 
 
 def test_after_a_click_a_new_page_frames_no_control_until_tab_is_pressed(
@@ -651,18 +640,6 @@ def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
 
 
-def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
-    shell.notifications.notify("The disk is full.", "The disk is full.")
-    shell.notifications.withdraw("The disk is full.")
-    assert "The disk is full." not in shell.window.words()
-
-    shell.notifications.notify("The disk is full.", "The disk is full.")
-    shell.window.show_crash_report("/data/crash-1.txt")
-    shell.notifications.withdraw("The disk is full.")
-
-    assert any("/data/crash-1.txt" in each for each in shell.window.words())
-
-
 def test_what_is_reported_an_unwritable_data_folder_says_where_another_is_chosen(
     shell: Shell,
 ) -> None:
@@ -881,10 +858,6 @@ def test_the_window_comes_back_where_it_was(
     qtbot.addWidget(again.window)
 
     assert again.window.geometry() == place
-
-
-def test_the_window_opens_within_its_screen(shell: Shell) -> None:
-    assert shell.window.screen().availableGeometry().contains(shell.window.geometry())
 
 
 @pytest.mark.parametrize("place", [(20, 30, 3000, 2000), (5000, -700, 760, 640)])

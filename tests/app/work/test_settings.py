@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QRect
-from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
@@ -263,21 +261,6 @@ def test_what_is_set_many_times_in_a_row_is_on_the_disk_as_it_was_last(
         "LP-19",
         "Hall 19",
     )
-
-
-def test_a_window_comes_back_where_it_was(qtbot: QtBot, settings: Settings) -> None:
-    place = QRect(120, 80, 640, 400)
-    windows = [QWidget(), QWidget()]
-    for window in windows:
-        qtbot.addWidget(window)
-        window.setObjectName("main")
-    windows[0].setGeometry(place)
-    settings.save_geometry(windows[0])
-
-    restored = reopened(settings).restore_geometry(windows[1])
-
-    assert restored
-    assert windows[1].geometry() == place
 
 
 def test_what_could_not_be_saved_is_tried_again_and_taken_back(

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import pytest
-from benchmarks.peers import grey_centroids_at
 from tests.simulated_panels import Panel, panel_image
 
 from lightpen.arrays import FloatArray, IntArray
@@ -83,19 +82,6 @@ def test_leds_that_all_differ_by_halo_and_lens_are_not_flagged_for_it() -> None:
     found = found_on(unlike, 4)
     unclipped = found.flaws[(found.flaws & SpotFlaw.SATURATED) == 0]
     assert np.mean((unclipped & (SpotFlaw.MERGED | SpotFlaw.CUT)) > 0) <= 0.1
-
-
-def test_halos_move_centers_less_than_a_plain_centroid() -> None:
-    panel = replace(HALOS, gains=(0.35, 0.95))
-    rng = np.random.default_rng(1)
-    errors = []
-    for _ in range(3):
-        shown = panel_image(panel, rng)
-        starts = shown.centers + rng.normal(0, 0.2, shown.centers.shape)
-        plain = grey_centroids_at(shown.image, starts, panel.width)
-        errors.append(np.linalg.norm(plain - shown.centers, axis=1))
-    of_ours = np.linalg.norm(found_on(panel).errors, axis=1)
-    assert np.median(of_ours) < 0.5 * np.median(np.concatenate(errors))
 
 
 @pytest.mark.parametrize(

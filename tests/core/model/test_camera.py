@@ -139,17 +139,6 @@ def test_jacobian_of_unprojection_is_the_inverse_of_that_of_the_projection(
     )
 
 
-@both_models
-def test_unprojecting_undoes_projecting(distortion: FloatArray) -> None:
-    cam, points = camera(distortion), points_in_view(200)
-    np.testing.assert_allclose(
-        cam.unproject(cam.project(points)),
-        points[:, :2] / points[:, 2:],
-        atol=1e-12,
-        rtol=0,
-    )
-
-
 @given(
     k1=st.floats(-0.2, 0.2),
     k2=st.floats(-0.1, 0.1),

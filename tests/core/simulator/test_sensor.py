@@ -89,23 +89,3 @@ def test_quantised_light_has_no_noise() -> None:
     image = quantize(even_light(0.5), Sensor())
     np.testing.assert_array_equal(image, 128)
     assert quantize(even_light(0.5), Sensor(bits=12)).dtype == np.uint16
-
-
-def test_same_seed_gives_the_same_noise() -> None:
-    one, two, other = (
-        expose(even_light(0.2), Sensor(), np.random.default_rng(seed))
-        for seed in (7, 7, 8)
-    )
-    np.testing.assert_array_equal(one, two)
-    assert (one != other).mean() > 0.5
-
-
-def test_sensor_without_noise_reads_the_same_everywhere() -> None:
-    quiet = Sensor(read_noise=0.0, offset=0.0)
-    image = expose(dark_light(0.0), quiet, np.random.default_rng(9))
-    np.testing.assert_array_equal(image, 0)
-
-
-def test_ten_bits_are_refused() -> None:
-    with pytest.raises(ValueError, match="bits"):
-        Sensor(bits=10)  # type: ignore[arg-type]

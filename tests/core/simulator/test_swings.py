@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulated_centers import displace_centers, drop_centers, swap_centers
 
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.simulator.postures import SWING_KINDS, Postures
@@ -57,11 +56,6 @@ def test_cone_out_of_sight_is_refused() -> None:
     far_aside = PAPER_CONE + np.array([500.0, 0, 0])
     with pytest.raises(ValueError, match="cone_cam"):
         swing_poses(5, np.random.default_rng(1), cone_cam=far_aside)
-
-
-def test_unknown_kind_is_refused() -> None:
-    with pytest.raises(ValueError, match="kind"):
-        swing_poses(5, np.random.default_rng(1), "spiral")  # type: ignore[arg-type]
 
 
 def test_postures_of_the_shared_set_give_its_poses_and_centers(
@@ -137,23 +131,6 @@ def test_leds_outside_the_image_are_missing() -> None:
     assert np.isnan(centers[outside]).all()
 
 
-def test_monte_carlo_faults_hit_as_many_as_asked() -> None:
-    rng = np.random.default_rng(8)
-    centers = rng.random((200, 10, 2)) * 1000
-    missing = np.isnan(drop_centers(centers, 3, rng)).all(axis=-1)
-    np.testing.assert_array_equal(missing.sum(axis=1), 3)
-    moved = np.linalg.norm(displace_centers(centers, 0.3, 2.0, rng) - centers, axis=-1)
-    assert (moved > 0).sum() == 60
-    np.testing.assert_allclose(moved[moved > 0], 2.0)
-    swapped = swap_centers(centers, 0.1, rng)
-    changed = (swapped != centers).any(axis=-1).sum(axis=1)
-    np.testing.assert_array_equal(np.unique(changed), [0, 2])
-    assert (changed == 2).sum() == 20
-    np.testing.assert_array_equal(
-        np.sort(swapped.reshape(200, -1)), np.sort(centers.reshape(200, -1))
-    )
-
-
 def test_perturbed_pen_scatters_about_the_design() -> None:
     rng = np.random.default_rng(9)
     offsets = np.stack(
@@ -161,9 +138,3 @@ def test_perturbed_pen_scatters_about_the_design() -> None:
     )
     # 6000 draws: 1 % standard deviation.
     assert offsets.std() == pytest.approx(0.01, rel=0.04)
-
-
-def test_same_seed_gives_the_same_swing() -> None:
-    one = swing_poses(20, np.random.default_rng(3))
-    two = swing_poses(20, np.random.default_rng(3))
-    np.testing.assert_array_equal(one.rotations, two.rotations)

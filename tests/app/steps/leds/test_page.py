@@ -392,25 +392,11 @@ def test_a_pen_in_its_frame_need_not_be_moved(seen: "Seen") -> None:
 # The table
 
 
-def test_a_cell_that_is_no_number_is_reported(seen: "Seen") -> None:
-    type_cell(seen, 5, Y, "12,4O")
-
-    assert 'LED 5, y: "12,4O" is not a number (letter O).' in seen.words
-    assert why_not(seen) == "Correct the LED table first (see the message above)."
-    assert not seen.page.is_complete()
-
-
 def test_leds_that_cannot_be_a_pen_are_reported_and_still_drawn(seen: "Seen") -> None:
     type_cell(seen, 7, Y, "16")
 
     assert "LEDs 5 and 7 are 4.00 mm apart, too close" in seen.words
     assert seen.child(PenView).value().pen is not None
-
-
-def test_a_number_that_no_pen_has_is_reported(seen: "Seen") -> None:
-    type_cell(seen, 7, Y, "1e300")
-
-    assert "LED 7 is 1e+297 m from the origin, which is implausible" in seen.words
 
 
 def test_a_changed_cell_is_in_use_once_it_is_saved(
@@ -568,32 +554,6 @@ def test_what_is_typed_while_the_table_is_saved_is_still_to_be_saved(
     seen.click("Discard")
     seen.click("Discard changes")
     assert cell(seen, 7, Y) == "161"
-
-
-def test_choosing_units_asks_before_changes_are_lost(
-    seen: "Seen", workbench: Workbench, tmp_path: Path
-) -> None:
-    before = in_use(workbench)
-    path = write_table(tmp_path / "leds.csv", LEDS, units="")
-
-    def choose_units() -> None:
-        open_file(seen, path)
-        type_cell(seen, 7, Y, "161")
-        seen.child(QComboBox).textActivated.emit("mm")
-
-    choose_units()
-    seen.click("Cancel")
-    assert (in_use(workbench), shown_path(seen)) == (before, str(before.path))
-    assert cell(seen, 7, Y) == "161"
-    assert "does not state the unit of its coordinates." not in seen.words
-
-    type_cell(seen, 7, Y, "160")
-    choose_units()
-    seen.click("Discard changes")
-    seen.settle()
-    assert in_use(workbench).path == path
-    assert cell(seen, 7, Y) == "160"
-    assert seen.page.unsaved() == ""
 
 
 def test_changes_outlive_another_file_that_another_step_puts_in_use(
@@ -852,14 +812,6 @@ def test_the_match_follows_the_table_and_another_page_sees_the_pen_in_use(
         pass
 
 
-@pytest.mark.slow
-def test_raw_coordinates_are_matched_too(live: "Seen", tmp_path: Path) -> None:
-    open_file(live, write_table(tmp_path / "raw.csv", raw()))
-
-    live.wait("10 of 10 LEDs")
-    live.wait("The LEDs agree with the images but not with the pen frame.")
-
-
 def test_a_covered_led_is_reported(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
@@ -895,15 +847,6 @@ def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
 
     seen.page.left()  # the swing finds the pen at rest
     seen.until(lambda: camera.operator.doing is HandActivity.SEATED)
-
-
-@pytest.mark.slow
-def test_another_pens_file_is_reported(live: "Seen", tmp_path: Path) -> None:
-    leds = np.random.default_rng(3).uniform(-60, 60, (10, 3))
-    open_file(live, write_table(tmp_path / "other.csv", leds))
-
-    live.wait("Pen not found")
-    live.wait("LEDs of the LED file.")
 
 
 def test_the_file_of_another_pen_is_used_after_a_question_only(
