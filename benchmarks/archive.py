@@ -24,12 +24,12 @@ from benchmarks.rows import Row, table
 
 from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
 from lightpen.archive.chains.growth import append, copy_entries, own_chain
-from lightpen.archive.chains.seal import seal_of
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import Database, look_into, open_file
 from lightpen.errors import ArchiveError
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record, record_files
@@ -159,7 +159,7 @@ def _changed_row() -> Row:
             n_found += _is_found(folder)
             path.write_bytes(whole)
     return Row(
-        "archive, a bit changed anywhere in archive, result, swing or image: found",
+        "archive, a bit changed anywhere in result, swing or image: found",
         f"{n_found} of {N_FLIPS}",
         "all",
         met=n_found == N_FLIPS,
@@ -173,8 +173,7 @@ def _data_files(folder: Path) -> list[Path]:
     results = FolderArchive(folder)
     with closing(Logbook(folder)) as logbook:
         logbook.enter_owed()
-    archive = folder / ARCHIVE
-    return [archive, seal_of(archive), *results.all_files(), *record_files(swing)]
+    return [*results.all_files(), *record_files(swing)]
 
 
 def _is_found(folder: Path) -> bool:

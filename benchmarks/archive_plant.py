@@ -28,10 +28,11 @@ from benchmarks.rows import Row, table
 from lightpen.archive.chains.chains import chain_at_home, entries_of, heads
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.logbook.lazy_logbook import SERVER
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
 from lightpen.errors import ArchiveError
+from lightpen.record.library.entered_files import ARCHIVE
 
 STATIONS = ("Hall 2", "Hall 3")
 WORKING_S, AWAY_S = 10.0, 60.0

@@ -32,12 +32,13 @@ from msgspec import structs
 from lightpen.archive.chains.entries import Kind
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.history.queries import EntryFilter, newest
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.replication.comparison import check_server, require_same
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into
 from lightpen.formats.stored_messages import StoredMessage
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item, change_item
 from lightpen.record.library.signing.keys import KEYS
 from lightpen.record.library.tip_library import ItemKind, ListedCone, read_library

@@ -12,12 +12,12 @@ import pytest
 from tests.core.archive.conftest import accepted
 
 from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.logbook.lazy_logbook import SERVER
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import open_file
 from lightpen.commands.supervisor import PASSWORD
 from lightpen.local_time import local_now
+from lightpen.record.library.entered_files import ARCHIVE, entered_files
 from lightpen.record.library.signing.keys import key_folder
 from lightpen.record.library.supervision import Signature, read_supervision
 from lightpen.record.library.supervision_changes import set_password
@@ -33,7 +33,7 @@ def data(tmp_path: Path) -> Path:
     chain = own_chain(database)
     for n in range(3):
         append(database, chain, *accepted(n))
-    close_sealed(database)
+    database.close()
     return folder
 
 
@@ -156,7 +156,7 @@ def test_a_lost_station_key_is_replaced_with_the_approval_of_a_supervisor(
     result = lightpen("archive", "new-key", "--supervisor", "Eve", "--data", moved)
 
     assert (result.stderr, result.returncode) == ("", 0)
-    public = read_supervision(moved).station_keys[-1]
+    public = entered_files(moved).station_key
     assert result.stdout == f"The station key is {public} from now on.\n"
     checked = lightpen("archive", "check", "--data", moved)
     assert (checked.returncode, "Note" in checked.stdout) == (0, False)

@@ -11,8 +11,9 @@ from subprocess import CompletedProcess
 from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.chains.entries import Kind
 from lightpen.archive.chains.growth import own_chain
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import open_file
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.logbook.result_entry import ArchivePlace, entry_of_file
+from lightpen.archive.logbook.result_entry import entry_of_file
 from lightpen.formats.hashes import InputFile, with_content
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
@@ -28,6 +28,7 @@ from lightpen.record.folder.verifications import (
     data_folder_of_verification,
     read_verification,
 )
+from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.swings.names import Names
 from lightpen_app.work.job import LatestJob
@@ -46,7 +47,7 @@ class ReportContent:
     calibration_file: CalibrationFile
     # Its images, where the file holds enough for that.
     reestimated: ReestimatedPoses | None
-    entered: ArchivePlace | None  # archive entry of the calibration
+    entered: EntryPlace | None  # archive entry of the calibration
 
 
 def read_calibration_file(file: Path) -> ReportContent:
@@ -67,7 +68,7 @@ class KeptVerification(NamedTuple):
 
     file: InputFile
     done: StoredVerification
-    entered: ArchivePlace | None
+    entered: EntryPlace | None
     traced: tuple[TracedItem, ...] = ()
 
 

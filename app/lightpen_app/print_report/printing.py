@@ -14,13 +14,13 @@ from PySide6.QtGui import (
     QPdfWriter,
 )
 
-from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
 from lightpen.record.exports.exports import export_stem
+from lightpen.record.library.entered_files import EntryPlace
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.print_report.blocks import DOTS_AN_INCH
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out, paint_page
@@ -45,7 +45,7 @@ A4 = QPageLayout(
 def print_report_of(
     calibration_file: CalibrationFile,
     reestimated: ReestimatedPoses | None,
-    entered: ArchivePlace | None = None,
+    entered: EntryPlace | None = None,
     laboratory: Laboratory | None = None,
 ) -> PrintReport:
     """Return the pages of the report of a calibration, in the selected language.

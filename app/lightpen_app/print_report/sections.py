@@ -7,7 +7,6 @@ from datetime import datetime
 from PySide6.QtCore import QCoreApplication, QRectF
 from PySide6.QtGui import QPainter
 
-from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
@@ -15,6 +14,7 @@ from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
 from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
@@ -52,7 +52,7 @@ GRADE_COLORS = {
 def all_sections(
     calibration_file: CalibrationFile,
     reestimated: ReestimatedPoses | None,
-    entered: ArchivePlace | None,
+    entered: EntryPlace | None,
     laboratory: Laboratory | None = None,
 ) -> tuple[Block, ...]:
     """Return the blocks of the whole report, from its title to its end mark."""
@@ -260,14 +260,12 @@ def record_number(sha256: str) -> str:
     return translate("paper", "No. {0}").format(number)
 
 
-def proof_blocks(
-    name: str, sha256: str, entered: ArchivePlace | None
-) -> Iterable[Block]:
+def proof_blocks(name: str, sha256: str, entered: EntryPlace | None) -> Iterable[Block]:
     """Return the hashes that bind the report to its file."""
     return (replace(block, keeps=True) for block in _binding(name, sha256, entered))
 
 
-def _binding(name: str, sha256: str, entered: ArchivePlace | None) -> Iterable[Block]:
+def _binding(name: str, sha256: str, entered: EntryPlace | None) -> Iterable[Block]:
     yield heading(translate("paper", "Source of this report"))
     rows = [(translate("paper", "JSON file"), name), ("SHA-256", sha256)]
     if entered is None:

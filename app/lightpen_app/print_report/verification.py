@@ -11,13 +11,13 @@ from typing import Any
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.folder.verifications import StoredVerification
+from lightpen.record.library.entered_files import EntryPlace
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.quantities import number_text
@@ -64,7 +64,7 @@ LONGEST_TABLE = 50  # rows
 def verification_print_report(
     file: InputFile,
     done: StoredVerification,
-    entered: ArchivePlace | None,
+    entered: EntryPlace | None,
     traced: Sequence[TracedItem] = (),
     laboratory: Laboratory | None = None,
 ) -> PrintReport:

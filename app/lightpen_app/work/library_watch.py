@@ -12,7 +12,6 @@ from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
-from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.look.sentences import worded
@@ -132,10 +131,9 @@ class LibraryWatch(QObject):
 
     def _change_next(self) -> None:
         asked, change = self._asked.popleft()
-        logbook, folder = self._logbook, self._folder
+        logbook = self._logbook
 
         def make(_: Report) -> None:
-            logbook.confirm(read_supervision(folder))
             change()
             with suppress(ArchiveError):  # it stays owed
                 logbook.opened().enter_owed()

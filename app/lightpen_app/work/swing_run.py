@@ -43,7 +43,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         with suppress(FileError):  # `Settings.fault` reports it
             address = server_address()
         self.logbook = LazyLogbook(folder, address)  # any thread may use it
-        self.archive = FolderArchive(folder, self.logbook.confirm)
+        self.archive = FolderArchive(folder)
         self.follower: GuidedOperator | None = None  # leads a simulated hand
         self.runner = SwingRunner(
             self.records_folder, self.archive, self, now, self.logbook

@@ -8,13 +8,12 @@ from pathlib import Path
 
 from lightpen.archive.chains.chains import chain_head, note_delivered
 from lightpen.archive.chains.entries import SHORT, Kind
-from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.history.history import Line, lines
 from lightpen.archive.history.listing import entries_csv
 from lightpen.archive.history.queries import EntryFilter, newest
 from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.replication.comparison import check_server, require_same
 from lightpen.archive.replication.exchange import deliver, export_entries
 from lightpen.archive.replication.fetching import fetch
@@ -27,7 +26,7 @@ from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
 from lightpen.local_time import local_now, local_time
 from lightpen.messages import printable
-from lightpen.record.library.supervision import read_supervision
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision_changes import renew_station_key
 
 CHANGED = 1  # exit status of a check that found something
@@ -125,7 +124,6 @@ def _new_key(options: argparse.Namespace) -> None:
     data = data_of(options)
     with closing(Logbook(data)) as logbook:
         signature = supervisor_signature(options.supervisor)
-        logbook.confirm(read_supervision(data))
         public = renew_station_key(data, logbook.chain, signature, local_now())
         for fault in logbook.enter_owed():
             print(shown(str(fault)))
@@ -164,7 +162,7 @@ def _opened(data: Path) -> Iterator[Database]:
     try:
         yield database
     finally:
-        close_sealed(database)
+        database.close()
 
 
 def _kinds(name: str) -> tuple[Kind, ...]:

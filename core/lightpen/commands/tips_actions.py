@@ -3,24 +3,22 @@
 import argparse
 import json
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from msgspec import structs, to_builtins
 
-from lightpen.archive.chains.chains import chain_at_home
 from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook, confirm_limits
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.logbook.shared_library import take_over
 from lightpen.archive.logbook.tip_status import folder_statuses
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
-from lightpen.archive.store.database import look_into
 from lightpen.commands.arguments import FORGOTTEN, data_of
 from lightpen.commands.console import Command, printing, shown
 from lightpen.commands.supervisor import supervisor_signature
-from lightpen.errors import ArchiveError, NoArchiveError, UsageError
+from lightpen.errors import ArchiveError, UsageError
 from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
@@ -32,7 +30,6 @@ from lightpen.record.library.library_changes import (
     known_item,
     retire_item,
 )
-from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import (
     MADE,
     AnyItem,
@@ -106,7 +103,6 @@ def _share(options: argparse.Namespace) -> None:
         raise UsageError("archive.no-server", variable=SERVER)
     signature = supervisor_signature(options.supervisor)
     with closing(Logbook(data)) as logbook, closing(open_server(address)) as server:
-        logbook.confirm(read_supervision(data))
         logbook.enter_owed()
         deliver(logbook.database, logbook.chain, server)
         taken = take_over(data, logbook.database, local_now(), server, signature)
@@ -170,10 +166,7 @@ def _point(option: str, words: list[Any]) -> Any:
 
 
 def _author(options: argparse.Namespace) -> Author:
-    """Return the author of a change, once the archive has confirmed the guard."""
-    data = data_of(options)
-    with suppress(NoArchiveError), closing(look_into(data / ARCHIVE)) as database:
-        confirm_limits(database, chain_at_home(database), read_supervision(data))
+    """Return the author of a change."""
     signature = supervisor_signature(options.supervisor)
     return Author(options.station, options.operator, options.reason, signature)
 

@@ -6335,6 +6335,10 @@ mm</translation>
         <translation>档案库已关闭：程序正在结束。</translation>
     </message>
     <message>
+        <source>The archive {archive} lacks entry {number}, which was entered in this user account: it was removed, or replaced by an older copy. Nothing is accepted until it is restored, or fetched from the server. To begin anew without it, an administrator removes {memory}.</source>
+        <translation>档案库 {archive} 缺少第 {number} 条，该条目曾在此用户账户中录入：它已被移除，或被较旧的副本替换。在恢复或从服务器取回之前，不接受任何结果。若要在没有它的情况下重新开始，由管理员删除 {memory}。</translation>
+    </message>
+    <message>
         <source>The base of the rig file and the scale of the LED file contradict each other: the pen is {wanted:.6g} ± {wanted_u:.2g} times as large by the rig, 1 ± {stated_u:.2g} by its file (k = 2). Either file may be wrong. Check that both belong together, then measure the pen or calibrate the rig again.</source>
         <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
     </message>
@@ -6345,6 +6349,10 @@ mm</translation>
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
+    </message>
+    <message>
+        <source>The chain {chain} is not known in this user account: it was begun in another one. Compare its name with that on earlier reports.</source>
+        <translation>此用户账户不认识链 {chain}：它是在另一账户中开始的。请将其名称与以前报告上的名称核对。</translation>
     </message>
     <message>
         <source>The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
@@ -6359,12 +6367,32 @@ mm</translation>
         <translation>文件 {file} 已损坏：{what}。</translation>
     </message>
     <message>
+        <source>The file {file} is not entered in the archive and does not count.</source>
+        <translation>文件 {file} 未录入档案库，不生效。</translation>
+    </message>
+    <message>
+        <source>The file {file} names a supervisor who did not approve it, or needs one. It does not count.</source>
+        <translation>文件 {file} 所列主管并未批准它，或它需要主管批准。它不生效。</translation>
+    </message>
+    <message>
+        <source>The file {file} of entry {number} in the archive is missing. Nothing is accepted until it is restored from a copy, or fetched from the server.</source>
+        <translation>档案库第 {number} 条的文件 {file} 缺失。在从副本恢复或从服务器取回之前，不接受任何结果。</translation>
+    </message>
+    <message>
         <source>The file {file} of entry {number} is missing.</source>
         <translation>第 {number} 个条目的文件 {file} 缺失。</translation>
     </message>
     <message>
         <source>The file {file} of the tip library was written by a later version of the program. Use that version.</source>
         <translation>测头库文件 {file} 由更新版本的程序写成。请使用该版本。</translation>
+    </message>
+    <message>
+        <source>The file {file} was changed after it was entered in the archive as entry {number}. Nothing is accepted until it is restored from a copy.</source>
+        <translation>文件 {file} 在作为第 {number} 条录入档案库之后被更改。在从副本恢复之前，不接受任何结果。</translation>
+    </message>
+    <message>
+        <source>The file {file} was changed before it was entered in the archive. Nothing is accepted until it is restored from a copy.</source>
+        <translation>文件 {file} 在录入档案库之前被更改。在从副本恢复之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
@@ -6401,6 +6429,10 @@ mm</translation>
     <message>
         <source>The length of {length:g} mm does not fit LEDs {first} and {second}: in the file of the pen their distance is {sketched:.2f} mm. Check which LEDs were measured, and the file.</source>
         <translation>长度 {length:g} mm 与 LED {first} 和 {second} 不符：光笔文件中两者的距离为 {sketched:.2f} mm。请核对测量的是哪两个 LED，并检查文件。</translation>
+    </message>
+    <message>
+        <source>The limits in {file} were not approved by a supervisor of this station. Nothing is accepted until the file is removed.</source>
+        <translation>{file} 中的限值未经本工位主管批准。在移除该文件之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
@@ -6445,10 +6477,6 @@ mm</translation>
     <message>
         <source>The scale of the LED file is not checked by this calibration. Verify a known length.</source>
         <translation>本次标定不检验 LED 文件的尺度。请用已知长度验证。</translation>
-    </message>
-    <message>
-        <source>The seal {file} of the archive was changed or damaged.</source>
-        <translation>档案库的封印文件 {file} 被改动过或已损坏。</translation>
     </message>
     <message>
         <source>The swing does not fit the intrinsics file. Check that the file is of this camera, zoom and focus, or find the camera without a file.</source>
@@ -6677,10 +6705,6 @@ mm</translation>
     <message>
         <source>scale of the LEDs</source>
         <translation>LED 坐标的尺度</translation>
-    </message>
-    <message>
-        <source>seal</source>
-        <translation>封印文件</translation>
     </message>
     <message>
         <source>shown mirrored left to right</source>
@@ -7093,10 +7117,6 @@ mm</translation>
     <message>
         <source>8 distortion coefficients (rational model): they reduce the cross-validated error to {held_out:.4f} px; {others}.</source>
         <translation>8 个畸变系数（有理模型）：交叉验证误差降至 {held_out:.4f} px；{others}。</translation>
-    </message>
-    <message>
-        <source>A file is missing among the limits in {folder}. Nothing is accepted until the folder is restored from a copy.</source>
-        <translation>{folder} 的限值中缺少一个文件。在从副本恢复该文件夹之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>A password in the system keyring needs the package keyring, which is not installed. Install it with: pip install &quot;lightpen[keyring]&quot;.</source>
@@ -7871,10 +7891,6 @@ mm</translation>
         <translation>链 {chain} 的第 {number} 个条目与前一条不衔接：两者之一被替换。</translation>
     </message>
     <message>
-        <source>Entry {number} of chain {chain} existed when the archive was closed but is missing now: entries were removed or the archive was replaced.</source>
-        <translation>链 {chain} 的第 {number} 条在档案关闭时存在，现已不存在：有条目被删除，或档案被替换。</translation>
-    </message>
-    <message>
         <source>Entry {number} of chain {chain} introduces a station key that neither the key before nor a supervisor approved. Ask the station whether its data folder was moved to another computer.</source>
         <translation>链 {chain} 的第 {number} 条记录引入了一个工位密钥，既未经之前的密钥也未经主管批准。请询问该工位其数据文件夹是否被移到另一台计算机。</translation>
     </message>
@@ -8367,10 +8383,6 @@ mm</translation>
         <translation>大多数图像中 LED 宽度为 {width:.1f} px；至少需要 {needed:.0f} px。请将相机移近，或使用更长的焦距或更高分辨率的相机。</translation>
     </message>
     <message>
-        <source>The archive of this data folder is not the one its limits belong to. Nothing is accepted until the archive is restored from a copy.</source>
-        <translation>本数据文件夹的档案不是其限值所属的档案。在从副本恢复档案之前，不接受任何结果。</translation>
-    </message>
-    <message>
         <source>The archive {file} does not exist or is empty. Check the data folder.</source>
         <translation>没有档案 {file}，或其中尚无任何条目。请检查数据文件夹。</translation>
     </message>
@@ -8623,20 +8635,12 @@ mm</translation>
         <translation>文件 {file} 在档案中尚无记录。请启动程序进行登记。</translation>
     </message>
     <message>
-        <source>The file {file} is not signed by this station and its supervisor: it was changed or comes from elsewhere. Restore it from a copy, or move it away to continue without it.</source>
-        <translation>文件 {file} 未由本工位及其主管签名：它被更改或来自别处。请从副本恢复，或将其移走后继续。</translation>
-    </message>
-    <message>
         <source>The file {file} names no version, such as {{&quot;version&quot;: &quot;1.1.0&quot;}}. Ask the administrator to correct it.</source>
         <translation>文件 {file} 未给出版本，例如 {{&quot;version&quot;: &quot;1.1.0&quot;}}。请管理员更正。</translation>
     </message>
     <message>
         <source>The file {file} of entry {number} was modified after it was entered.</source>
         <translation>第 {number} 个条目的文件 {file} 与录入时不符。</translation>
-    </message>
-    <message>
-        <source>The file {file} was changed by another program after Lightpen closed it.</source>
-        <translation>文件 {file} 在本程序关闭后被其他程序改动过。</translation>
     </message>
     <message>
         <source>The file {path} cannot be read: {reason}. Check the name and the read permission.</source>
@@ -8717,18 +8721,6 @@ mm</translation>
     <message>
         <source>The lengths of the board {text} are not valid: they must be above 0 mm, and markers or circles smaller than their squares. Measure them again.</source>
         <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
-    </message>
-    <message>
-        <source>The limits and the supervisor password in {folder} are missing, or older than those seen here before. Nothing is accepted until the folder is restored. To begin anew without them, an administrator removes {memory}.</source>
-        <translation>{folder} 中的限值和主管密码缺失，或比此前在此见到的更旧。在恢复该文件夹之前，不接受任何结果。如需不带它们重新开始，由管理员删除 {memory}。</translation>
-    </message>
-    <message>
-        <source>The limits and the supervisor password of this data folder are not those entered in its archive: {file} is missing or was changed. Nothing is accepted until the folder is restored from a copy.</source>
-        <translation>本数据文件夹的限值和主管密码与其档案中登记的不符：{file} 缺失或被更改。在从副本恢复该文件夹之前，不接受任何结果。</translation>
-    </message>
-    <message>
-        <source>The limits in {file} are not signed by this station and its supervisor: the file was changed or comes from elsewhere. Nothing is accepted until it is restored from a copy or removed.</source>
-        <translation>{file} 中的限值未由本工位及其主管签名：该文件被更改或来自别处。在从副本恢复或删除之前，不接受任何结果。</translation>
     </message>
     <message>
         <source>The limits in {file} were modified or damaged after they were saved. Restore the file from a copy.</source>
@@ -9821,10 +9813,6 @@ mm</translation>
     <message>
         <source>The points are {rms:.2f} px from those of a flat board {board}: its squares differ from the description, it is bent, or the images are not from one camera with one focus. Count and measure its squares again.</source>
         <translation>各点与平面标定板 {board} 的点相差 {rms:.2f} px：方格与描述不符、标定板弯曲，或图像并非来自同一相机同一对焦。请重新数并测量方格。</translation>
-    </message>
-    <message>
-        <source>The seal {file} is missing: entries removed from the end of the archive cannot be detected.</source>
-        <translation>缺少封签 {file}：无法发现从存档末尾删除的条目。</translation>
     </message>
     <message>
         <source>{name} is a list; an LED file is a mapping with leds and units. Correct the file.</source>

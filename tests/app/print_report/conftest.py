@@ -13,7 +13,6 @@ from PySide6.QtCore import QBuffer, QSize
 from PySide6.QtGui import QPainter
 from PySide6.QtSvg import QSvgGenerator
 
-from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import write_whole
 from lightpen.formats.stored_messages import StoredMessage
@@ -23,6 +22,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.reestimated_poses import reestimate_poses
 from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.results.results import Result, result_bytes
 from lightpen.record.swings.names import Names
 from lightpen.swing_messages import Code
@@ -90,7 +90,7 @@ def printed(tmp_path: Path) -> Callable[..., PrintReport]:
 
     def put_on_paper(
         result: Result,
-        entered: ArchivePlace | None = None,
+        entered: EntryPlace | None = None,
         traced: tuple[TracedItem, ...] = (),
         laboratory: Laboratory | None = None,
         status: tuple[str, ...] = (),

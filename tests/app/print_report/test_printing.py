@@ -13,13 +13,13 @@ from benchmarks.small_records import record_of
 from msgspec import structs
 from PySide6.QtWidgets import QApplication
 
-from lightpen.archive.logbook.result_entry import ArchivePlace
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
 from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind, ListedPen
 from lightpen.record.results.results import Result, TipChange, result_bytes
 from lightpen_app.look.languages import LanguageSwitch
@@ -148,7 +148,7 @@ def test_what_an_auditor_asks_for_is_there(
         as_found_expanded_uncertainty_mm=(0.001, 0.002, 0.003),
         limit_mm=0.02,
     )
-    entered = ArchivePlace(number=41, sha256=64 * "a", previous=64 * "b")
+    entered = EntryPlace(number=41, sha256=64 * "a", previous=64 * "b")
 
     reported = " ".join(
         " ".join(page)

@@ -14,7 +14,7 @@ from sqlalchemy import update
 from tests.core.archive.conftest import NOON, Station, accepted
 
 from lightpen.archive.chains.chains import entries_of, heads, records_of
-from lightpen.archive.chains.entries import NOTHING_BEFORE, FileHash, Kind
+from lightpen.archive.chains.entries import FileHash, Kind
 from lightpen.archive.chains.growth import append, copy_entries, own_chain
 from lightpen.archive.history.queries import (
     EntryFilter,
@@ -25,6 +25,7 @@ from lightpen.archive.history.queries import (
 from lightpen.archive.store.database import open_file
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError
+from lightpen.record.library.entered_files import NOTHING_BEFORE
 
 N_EACH = 20
 

@@ -1,4 +1,4 @@
-"""A check notes what may be honest: no seal, files without entries, times, keys."""
+"""A check notes what may be honest: files without entries, times, keys."""
 
 import shutil
 from collections.abc import Callable
@@ -11,9 +11,10 @@ import pytest
 from msgspec import structs
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains.seal import seal_of
 from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
+from lightpen.record.library.entered_files import ARCHIVE
+from lightpen.record.library.signing.keys import KEYS
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 
 
@@ -40,14 +41,22 @@ def test_of_an_honest_history_nothing_is_noted(data: Path) -> None:
     assert notes(data) == set()
 
 
-def test_a_missing_seal_is_noted(data: Path) -> None:
-    seal_of(data / ARCHIVE).unlink()
-    assert notes(data) == {"archive.no-seal"}
-
-
 def test_a_file_without_an_entry_is_noted(data: Path) -> None:
     FolderArchive(data).store(result(data, 2))
+    assert notes(data) == {"archive.file-owed"}
+
+
+def test_a_file_that_the_program_did_not_write_is_noted(data: Path) -> None:
+    results = data / "results"
+    shutil.copy(results / "000002.json", results / "000003.json")
     assert notes(data) == {"archive.file-not-entered"}
+
+
+def test_an_archive_of_another_account_is_noted(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(KEYS, str(tmp_path / "other keys"))
+    assert notes(data) == {"archive.unknown-here"}
 
 
 def test_impossible_times_are_noted(data: Path) -> None:

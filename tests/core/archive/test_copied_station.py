@@ -13,7 +13,9 @@ from tests.core.archive.conftest import NOON
 
 from lightpen.archive.logbook.lazy_logbook import SERVER
 from lightpen.archive.logbook.logbook import Logbook
+from lightpen.errors import FileError
 from lightpen.record.library.library_changes import Author, add_item
+from lightpen.record.library.signing.keys import KEYS, key_folder
 from lightpen.record.library.tip_library import ListedCone, ListedTip, read_library
 
 Run = Callable[..., CompletedProcess[str]]
@@ -36,18 +38,24 @@ def test_one_copy_goes_on_and_the_other_begins_a_new_folder(
     add_item(station, ListedTip(id="T-1"), BY, NOON)
     enter(station)
     shutil.copytree(station, copy)
-    for n, folder in enumerate((station, copy)):
-        add_item(folder, ListedCone(id=f"C-{n}"), BY, NOON + HOUR)
-        enter(folder)
+    copied_keys = shutil.copytree(key_folder(), tmp_path / "copied keys")
+    add_item(station, ListedCone(id="C-0"), BY, NOON + HOUR)
+    enter(station)
     assert lightpen("archive", "deliver", "--data", station).returncode == 0
 
-    # It is found, and named.
-    refused = lightpen("archive", "deliver", "--data", copy)
-    assert refused.returncode == 2
-    assert "a data folder was copied and both copies were used" in refused.stderr
-    checked = lightpen("archive", "check", "--server", "--data", copy)
-    assert checked.returncode == 1
-    assert "Entry 2 of chain" in checked.stdout
+    # In the same user account it does not go on; in another one it is found, and named.
+    with pytest.raises(FileError, match="replaced by an older copy"):
+        add_item(copy, ListedCone(id="C-1"), BY, NOON + HOUR)
+    with monkeypatch.context() as other_account:
+        other_account.setenv(KEYS, str(copied_keys))
+        add_item(copy, ListedCone(id="C-1"), BY, NOON + HOUR)
+        enter(copy)
+        refused = lightpen("archive", "deliver", "--data", copy)
+        assert refused.returncode == 2
+        assert "a data folder was copied and both copies were used" in refused.stderr
+        checked = lightpen("archive", "check", "--server", "--data", copy)
+        assert checked.returncode == 1
+        assert "Entry 2 of chain" in checked.stdout
 
     # The other copy stays as it is; its work goes on in a new folder, as a new station.
     new, abandoned = tmp_path / "new", tmp_path / "abandoned.jsonl"

@@ -14,12 +14,11 @@ from tests.core.archive.conftest import Station, accepted
 from lightpen.archive.chains.chains import records_of
 from lightpen.archive.chains.entries import FileHash
 from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import ARCHIVE
 from lightpen.archive.replication.exchange import deliver, export_entries
 from lightpen.archive.store.database import open_file
 from lightpen.errors import ArchiveError, NameTakenError
+from lightpen.record.library.entered_files import ARCHIVE
 
 
 def test_an_export_has_every_entry_with_its_record(
@@ -101,5 +100,5 @@ def data_of_pipes(tmp_path: Path) -> Path:
         event, record = accepted(n)
         file = FileHash(str(place), "0" * 64)
         append(database, chain, structs.replace(event, result=file), record)
-    close_sealed(database)
+    database.close()
     return data

@@ -13,15 +13,15 @@ from tests.core.archive.test_logbook import result
 
 from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.fetching import FetchResult, fetch
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import StationLimits
+from lightpen.record.library.entered_files import ARCHIVE, add_numbered
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.numbered_files import add_numbered
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.library.tip_library import ListedCone, read_library
@@ -114,7 +114,7 @@ def test_the_number_of_a_file_that_is_lost_is_not_given_again(
 
     lost = ("limits/000001.json", "limits/000002.json")
     assert fetch_all(new, address).lost == lost
-    assert add_numbered(new / "limits", b"{}").name == "000003.json"
+    assert add_numbered(new, new / "limits", b"{}").name == "000003.json"
 
 
 def test_a_file_that_is_here_is_left_as_it_is(data: Path, address: str) -> None:

@@ -15,13 +15,14 @@ from lightpen.archive.chains.growth import append
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.due import due_tips
 from lightpen.archive.history.history import known_names
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.logbook.tip_status import folder_statuses, statuses
 from lightpen.archive.store.database import look_into
 from lightpen.formats.decoding import encode_png
 from lightpen.messages import Message
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus, TipStatus
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import (
     Author,
     add_item,

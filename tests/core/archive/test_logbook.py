@@ -15,11 +15,12 @@ from tests.core.archive.conftest import NOON
 from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import Entry, Kind
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import look_into
 from lightpen.errors import ArchiveError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.interrupted import discard_damaged, discard_swing

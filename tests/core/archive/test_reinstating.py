@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from datetime import timedelta
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -33,9 +32,13 @@ from lightpen.model.limits import DueRule
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.library_changes import Author, add_item, retire_item
-from lightpen.record.library.signing.keys import key_folder, station_key
-from lightpen.record.library.signing.station import memory_file
-from lightpen.record.library.supervision import Signature, read_supervision
+from lightpen.record.library.signing.keys import SigningKey, key_folder, station_key
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    read_supervision,
+    require_supervisor,
+)
 from lightpen.record.library.supervision_changes import renew_station_key, set_password
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
@@ -243,17 +246,15 @@ def test_a_tip_whose_file_was_changed_is_not_reinstated(
         logbook.restore(first, BEA, "It was better.")
 
 
-def test_limits_that_are_not_those_of_the_archive_stop_every_acceptance(
+def test_limits_that_are_missing_stop_every_acceptance(
     data: Path, logbook: Logbook
 ) -> None:
     set_password(data, EVE, EVE.password, local_now())
     logbook.enter_owed()
     shutil.rmtree(data / LIMITS_FOLDER)
-    memory_file(data).unlink()
-    archive = FolderArchive(data, logbook.confirm)
-    with pytest.raises(AcceptanceError, match="not those entered in its archive"):
-        archive.supervision()
-    with pytest.raises(AcceptanceError, match="not those entered in its archive"):
+    with pytest.raises(FileError, match="Nothing is accepted until"):
+        FolderArchive(data).supervision()
+    with pytest.raises(FileError, match="Nothing is accepted until"):
         logbook.restore(entries(logbook)[0], BEA, "It was better.")
 
 
@@ -263,61 +264,55 @@ def test_a_result_that_was_written_by_hand_is_neither_in_force_nor_entered(
     archive = FolderArchive(data)
     set_password(data, EVE, EVE.password, local_now())
     logbook.enter_owed()
-    n_entries = len(entries(logbook))
+    n_entries, before = len(entries(logbook)), archive.in_force("LP-04", "T-10")
+    assert before is not None
     chef = replace(result(data, 2), supervisor="Chef")
     (archive.folder / "000003.json").write_bytes(result_bytes(chef, "records/swing"))
-    with pytest.raises(FileError, match="not signed"):
-        archive.in_force("LP-04", "T-10")
-    (why,) = logbook.enter_owed()
-    assert why.code == "signing.unsigned-file"
+    shutil.copy(archive.folder / "000001.json", archive.folder / "000004.json")
+    assert logbook.enter_owed() == ()
+    found = archive.in_force("LP-04", "T-10")
+    assert found is not None
+    assert found.accepted == before.accepted
     assert len(entries(logbook)) == n_entries
 
-    (archive.folder / "000003.json").unlink()
-    archive.store(replace(result(data, 2), supervisor=""))
-    signed = (archive.folder / "000003.json").read_bytes()
-    (archive.folder / "000004.json").write_bytes(signed)  # once more, at the end
-    with pytest.raises(FileError, match="not signed"):
-        archive.in_force("LP-04", "T-10")
 
-
-def test_files_from_before_the_password_count_only_as_they_were(data: Path) -> None:
-    archive = FolderArchive(data)
+def test_a_result_that_names_a_supervisor_needs_the_approval(
+    data: Path, logbook: Logbook
+) -> None:
+    """Whoever has the key of a station, and no password, approves nothing."""
     set_password(data, EVE, EVE.password, local_now())
+    logbook.enter_owed()
+    archive = FolderArchive(data)
+    archive.store(replace(result(data, 2), supervisor="Eve"))
+    file = archive.all_files()[-1]
+    logbook.enter_owed()
+    with pytest.raises(FileError, match="did not approve"):
+        archive.in_force("LP-04", "T-10")
+    with pytest.raises(FileError, match="did not approve"):
+        read_calibration(file)
+    guard = read_supervision(data)
+    archive.store(replace(result(data, 3), supervisor="Eve"), guard_key(guard))
+    assert archive.in_force("LP-04", "T-10") is not None
+    logbook.enter_owed()
     assert archive.in_force("LP-04", "T-10") is not None
 
-    other = result_bytes(result(data, 7), "records/swing")
-    (archive.folder / "000002.json").write_bytes(other)
-    with pytest.raises(FileError, match="not signed"):
-        archive.in_force("LP-04", "T-10")
+
+def guard_key(guard: Supervision) -> SigningKey:
+    return require_supervisor(guard, EVE)
 
 
-def test_a_station_key_that_a_supervisor_replaced_signs_no_result_any_more(
+def test_files_from_before_the_password_count_as_they_were(
     data: Path, logbook: Logbook
 ) -> None:
     archive = FolderArchive(data)
     set_password(data, EVE, EVE.password, local_now())
-    archive.store(result(data, 2))
-    old = read_supervision(data).signers()
-    renew_station_key(data, logbook.chain, EVE, local_now())
+    logbook.enter_owed()
     assert archive.in_force("LP-04", "T-10") is not None
 
-    sign = partial(old.signed, place="results/000004.json")
-    forged = result_bytes(result(data, 3), "records/swing", sign)
-    (archive.folder / "000004.json").write_bytes(forged)
-    with pytest.raises(FileError, match="not signed"):
+    other = result_bytes(result(data, 7), "records/swing")
+    (archive.folder / "000002.json").write_bytes(other)
+    with pytest.raises(FileError, match="was changed after it was entered"):
         archive.in_force("LP-04", "T-10")
-
-
-def test_a_result_that_was_written_by_hand_is_neither_exported_nor_reported(
-    data: Path,
-) -> None:
-    set_password(data, EVE, EVE.password, local_now())
-    file = data / "results" / "000003.json"
-    chef = replace(result(data, 2), supervisor="Chef")
-    file.write_bytes(result_bytes(chef, "records/swing"))
-    with pytest.raises(FileError, match="not signed"):
-        read_calibration(file)
-    assert read_calibration(data / "results" / "000002.json").names.tip == "T-10"
 
 
 def lost_key(logbook: Logbook) -> None:

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from benchmarks.small_records import small_record
 
-from lightpen.archive.chains.entries import NOTHING_BEFORE
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.logbook.result_entry import entry_of_file
-from lightpen.errors import ArchiveError, FileError
+from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.library.entered_files import ARCHIVE, NOTHING_BEFORE
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
@@ -79,14 +79,15 @@ def test_what_is_in_no_archive_has_no_entry(results: list[Path]) -> None:
 def test_an_archive_that_cannot_be_read_is_reported(results: list[Path]) -> None:
     (results[0].parents[1] / ARCHIVE).write_bytes(b"precious" * 100)
 
-    with pytest.raises(ArchiveError):
+    with pytest.raises(FileError, match="is not available"):
         entry_of_file(results[0], digest(results[0]))
 
 
-def test_without_an_archive_there_is_no_entry(results: list[Path]) -> None:
+def test_an_archive_that_was_removed_is_reported(results: list[Path]) -> None:
     (results[0].parents[1] / ARCHIVE).unlink()
 
-    assert entry_of_file(results[0], digest(results[0])) is None
+    with pytest.raises(FileError, match="lacks entry 2"):
+        entry_of_file(results[0], digest(results[0]))
 
 
 def test_an_export_says_that_a_result_has_no_entry(

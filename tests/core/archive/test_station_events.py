@@ -12,7 +12,7 @@ from tests.core.archive.conftest import NOON
 from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.checks.check import check_archive
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import look_into
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
@@ -23,7 +23,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_trial
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
-from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.library.entered_files import ARCHIVE, add_numbered
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -65,7 +65,7 @@ def keep(data: Path, grade: Grade, folder: str = VERIFICATIONS) -> Path:
         {"radius": 0.01},
         {"images": [{"file": "7", "sha256": HASH}]},
     )
-    return add_numbered(data / folder, record_bytes(record))
+    return add_numbered(data, data / folder, record_bytes(record))
 
 
 def found_by(data: Path) -> list[str]:
@@ -109,7 +109,7 @@ def test_a_verification_that_did_not_pass_is_refused_until_somebody_accepts_it(
         "supervisor": "Eve",
         "reason": "for a trial",
     }
-    add_numbered(tmp_path / VERIFICATIONS, record_bytes(conclusion))
+    add_numbered(tmp_path, tmp_path / VERIFICATIONS, record_bytes(conclusion))
 
     refused, accepted = events(logbook)
     assert (refused.outcome, accepted.outcome) == (
@@ -158,10 +158,7 @@ def test_a_change_of_limits_and_of_the_password_is_entered_with_who_and_when(
     password, limits = events(logbook)
     assert {password.kind, limits.kind} == {Kind.LIMITS}
     assert password.settings["changes_password"] is True
-    assert set(password.settings) == {
-        *("changes_password", "station_key", "station_key_signature"),
-        *("supervisor_key", "supervisor_signature"),
-    }
+    assert set(password.settings) == {*("changes_password", "supervisor_key")}
     assert (limits.names.operator, limits.names.station) == ("Eve", "Hall 2")
     assert limits.at == NOON
     assert limits.settings["max_radius_mm"] == StationLimits().verification.radius
@@ -197,7 +194,7 @@ def test_an_absurd_time_is_not_entered(tmp_path: Path, logbook: Logbook) -> None
         "created": datetime(1, 1, 1).isoformat(),
         "verification": "circle",
     }
-    add_numbered(tmp_path / VERIFICATIONS, record_bytes(record))
+    add_numbered(tmp_path, tmp_path / VERIFICATIONS, record_bytes(record))
 
     (fault,) = logbook.enter_owed()
     assert fault.code == "verification.damaged"
@@ -226,16 +223,18 @@ def test_a_signed_conclusion_of_a_verification_is_entered(
     assert events(logbook)[-1].kind is Kind.VERIFICATION
 
 
-def test_conclusions_without_the_right_signatures_are_not_entered(
+def test_conclusions_without_approval_are_not_entered(
     tmp_path: Path, logbook: Logbook
 ) -> None:
     set_password(tmp_path, EVE, EVE.password, NOON)
     record = accepted_by_supervisor()
-    add_numbered(tmp_path / VERIFICATIONS, record_bytes(record))  # by hand
+    by_hand = tmp_path / VERIFICATIONS / "000001.json"
+    by_hand.parent.mkdir()
+    by_hand.write_bytes(record_bytes(record))
     keep_verification(tmp_path, record, None, is_simulated=False)  # without password
 
     troubles = logbook.enter_owed()
-    assert [each.code for each in troubles] == 2 * ["signing.unsigned-file"]
+    assert [each.code for each in troubles] == ["signing.unapproved"]
     written = entries_of(logbook.database, logbook.chain)
     assert [each.entry.event.kind for each in written] == [Kind.LIMITS]
 

@@ -14,19 +14,21 @@ from benchmarks.postgres_server import Postgres
 from msgspec import structs
 from tests.core.archive.conftest import NOON
 from tests.core.archive.test_logbook import result
+from tests.entering import enter_in
 
 from lightpen.archive.chains.chains import entries_of, heads
 from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
 from lightpen.archive.chains.rows import columns_of
-from lightpen.archive.chains.seal import close_sealed, seal_of
 from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.replication.comparison import check_server
 from lightpen.archive.replication.exchange import deliver
+from lightpen.archive.replication.fetching import fetch
 from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into, open_file
-from lightpen.errors import ArchiveError
+from lightpen.errors import ArchiveError, FileError
 from lightpen.model.limits import StationLimits
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits
@@ -120,7 +122,7 @@ def exchange_results(plant: Plant) -> None:
     shutil.copy(results / "000001.json", results / f"{N_RESULTS:06d}.json")
 
 
-def by_sql(*statements: str, is_sealed: bool = False) -> Callable[[Plant], None]:
+def by_sql(*statements: str) -> Callable[[Plant], None]:
     """Return what changes an archive with a tool that knows SQL."""
 
     def change(plant: Plant) -> None:
@@ -128,16 +130,8 @@ def by_sql(*statements: str, is_sealed: bool = False) -> Callable[[Plant], None]
         with closing(sqlite3.connect(archive)) as connection, connection:
             for statement in statements:
                 assert connection.execute(statement).rowcount > 0
-        if is_sealed:
-            seal_anew(plant)
 
     return change
-
-
-def seal_anew(plant: Plant) -> None:
-    """Seal an archive as the program would."""
-    seal_of(plant.data / ARCHIVE).unlink()
-    close_sealed(open_file(plant.data / ARCHIVE))
 
 
 DROP_LAST = (
@@ -148,7 +142,7 @@ DROP_LAST = (
 
 
 def roll_back_archive(plant: Plant) -> None:
-    """Replace the archive by an older copy, and leave its seal."""
+    """Replace the archive by an older copy."""
     shutil.copy(plant.before / ARCHIVE, plant.data / ARCHIVE)
 
 
@@ -179,7 +173,7 @@ def forged(entries: list[StoredEntry]) -> list[StoredEntry]:
 
 
 def rewrite(plant: Plant) -> None:
-    """Write the end of a chain anew with the right hashes, and seal it."""
+    """Write the end of a chain anew with the right hashes."""
     archive = plant.data / ARCHIVE
     with closing(look_into(archive)) as database:
         (head,) = heads(database)
@@ -188,7 +182,6 @@ def rewrite(plant: Plant) -> None:
         for each in new:
             connection.execute(*_update(each, "?"))
         connection.execute("UPDATE archive_chains SET sha256 = ?", (new[-1].sha256,))
-    seal_anew(plant)
 
 
 def rewrite_server(plant: Plant) -> None:
@@ -241,17 +234,14 @@ KINDS: dict[str, Callable[[Plant], None]] = {
         " WHERE number = 4"
     ),
     "a searched column of an entry was modified": by_sql(
-        "UPDATE archive_entries SET pen = 'LP-05' WHERE number = 4", is_sealed=True
+        "UPDATE archive_entries SET pen = 'LP-05' WHERE number = 4"
     ),
     "an entry was removed": by_sql("DELETE FROM archive_entries WHERE number = 4"),
     "the last entry was removed": by_sql(*DROP_LAST),
-    "the last entry was removed and the archive sealed": by_sql(
-        *DROP_LAST, is_sealed=True
-    ),
     "a record was modified": by_sql(
-        "UPDATE archive_records SET text = replace(text, '2.0', '2.5')", is_sealed=True
+        "UPDATE archive_records SET text = replace(text, '2.0', '2.5')"
     ),
-    "a record was removed": by_sql("DELETE FROM archive_records", is_sealed=True),
+    "a record was removed": by_sql("DELETE FROM archive_records"),
     "the chain was written anew with right hashes": rewrite,
     "the archive was begun anew": empty,
     "the archive was replaced by an older copy": roll_back_archive,
@@ -303,16 +293,19 @@ def test_a_rolled_back_folder_delivers_nothing_and_says_what_to_do(
         deliver(logbook.database, logbook.chain, server)
 
 
-@pytest.mark.slow
-def test_a_rolled_back_folder_that_went_on_is_reported_from_its_first_new_entry(
-    plant: Plant,
-) -> None:
+def test_a_rolled_back_folder_does_not_go_on(plant: Plant) -> None:
     roll_back_folder(plant)
-    FolderArchive(plant.data).store(result(plant.data, 9))
+    with pytest.raises(FileError, match=f"lacks entry {N_ENTRIES}"):
+        FolderArchive(plant.data).store(result(plant.data, 9))
+
+
+def test_a_rolled_back_folder_is_fetched_and_goes_on(plant: Plant) -> None:
+    roll_back_folder(plant)
     with (
-        closing(Logbook(plant.data)) as logbook,
+        closing(open_file(plant.data / ARCHIVE)) as database,
         closing(open_server(plant.server)) as server,
     ):
-        logbook.enter_owed()
-        with pytest.raises(ArchiveError, match=f"Entry {N_ENTRIES} of chain"):
-            deliver(logbook.database, logbook.chain, server)
+        assert fetch(database, plant.data, server).n_files == 1
+    FolderArchive(plant.data).store(result(plant.data, 9))
+    enter_in(plant.data)
+    assert check_file(plant.data / ARCHIVE, plant.data, lambda _: None).findings == ()

@@ -12,8 +12,9 @@ from lightpen.archive.chains.chains import entries_of, heads
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook.logbook import ARCHIVE, Logbook
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import look_into
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.swing.runner import SwingRunner
 
@@ -116,12 +117,14 @@ def test_a_swing_without_a_tip_is_entered_as_abandoned(logging: Station) -> None
     assert (checked.n_files, checked.findings) == (4 + 2, ())
 
 
-def test_a_tip_comes_into_force_though_nothing_can_be_entered(
+def test_no_tip_comes_into_force_while_the_archive_cannot_be_read(
     logging: Station, acceptable: Path
 ) -> None:
     (logging.folder / ARCHIVE).write_bytes(b"no database at all " * 50)
     logging.go_on(acceptable)
     logging.solve()
-    logging.accept()
+    logging.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    logging.wait_until(lambda: logging.witness.faults != [])
 
     assert any("not a database" in fault for fault in logging.witness.faults)
+    assert logging.status.result is None

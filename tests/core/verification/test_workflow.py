@@ -24,6 +24,7 @@ from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
 from lightpen.model.rig import rig_of
 from lightpen.record.folder.verifications import TOUCHES, VERIFICATIONS
+from lightpen.record.library.signing.station import STATION_FILE
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_password
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
@@ -294,6 +295,7 @@ def test_a_verification_with_another_camera_file_is_not_resumed(
     trace.touch(*leant(2))
     copy = tmp_path / "killed"
     shutil.copytree(trace.folder / SIMULATED, copy / SIMULATED)
+    shutil.copy(trace.folder / STATION_FILE, copy)
     trace.workflow.shut_down()
     assert trace.prepared.camera_file is not None
     renewed = copy / "camera.yaml"

@@ -9,7 +9,7 @@ from lightpen.formats.json_records import Plain
 from lightpen.model.limits import LIMITS
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.library.key_changes import (
+from lightpen.record.library.signing.chain_keys import (
     OLD_KEY_SIGNATURE,
     STATION_KEY,
     SUPERVISOR_KEY,

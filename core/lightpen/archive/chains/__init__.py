@@ -1,1 +1,1 @@
-"""Chains of signed entries, each with the hash of the one before, and their seals."""
+"""Chains of signed entries, each with the hash of the one before."""

@@ -8,9 +8,9 @@ from sqlalchemy import Connection, Select, func, select, tuple_, update
 
 from lightpen.archive.chains.entries import EPOCH, ChainHead, Kind, StoredEntry
 from lightpen.archive.chains.rows import READ, read_entries, read_row, searchable
-from lightpen.archive.chains.signatures import key_in
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.record.library.signing.chain_keys import key_in
 
 AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
 BATCH = 200  # entries that are copied in one transaction

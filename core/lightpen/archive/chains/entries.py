@@ -30,10 +30,10 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import Message, message, printable
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.library.entered_files import NOTHING_BEFORE
 from lightpen.record.results.results import TipChange
 from lightpen.record.swings.names import Names
 
-NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
 TICK = timedelta(microseconds=1)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 SHORT = 8  # characters by which a chain is named
@@ -89,6 +89,7 @@ class Event(Struct, frozen=True):
     files: tuple[FileHash, ...] = ()  # swing's record, touches' journals, picture
     record_sha256: Digest | None = None  # of ``result`` as a text, or a calibration
     concerns: Digest | None = None  # the entry that it restores, revokes or is on
+    approval: str = ""  # of the supervisor whom the file names, see `approval_of`
 
     def __post_init__(self) -> None:
         require_usual(self.at)

@@ -12,7 +12,6 @@ from sqlalchemy.dialects import postgresql
 
 from lightpen.archive.chains.chains import AT_HOME, head_in, of_limits
 from lightpen.archive.chains.entries import (
-    NOTHING_BEFORE,
     SHORT,
     ChainHead,
     Event,
@@ -24,12 +23,19 @@ from lightpen.archive.chains.entries import (
     text_sha256,
 )
 from lightpen.archive.chains.rows import columns_of, searchable
-from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys, entry_signature
+from lightpen.archive.chains.signatures import entry_signature, signature_finding
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import CHAIN_WRITERS, CHAINS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
+from lightpen.record.library.entered_files import NOTHING_BEFORE
+from lightpen.record.library.signing.account import (
+    head_file,
+    remember_head,
+    remembered_head,
+)
+from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
 from lightpen.record.library.signing.keys import chain_of, make_station_key
 from lightpen.record.library.signing.station import station_name
 
@@ -73,6 +79,7 @@ def append(
     with database.writing() as connection:
         if _is_entered(connection, chain, event):
             return None
+        _require_remembered(connection, chain, database)
         head = head_in(connection, chain)
         entry = chained(head, event)
         signature = entry_signature(head, event, entry.sha256)
@@ -80,6 +87,7 @@ def append(
         if record is not None:
             _keep_records(connection, {text_sha256(record): record})
         _put(connection, chain, [entry])
+    remember_head(chain, entry.entry.number, entry.sha256)
     return entry
 
 
@@ -139,6 +147,41 @@ def adopt_entries(
         _require_signed(connection, chain, entries)
         _keep_records(connection, _named(entries, records))
         _put(connection, chain, entries)
+    remember_head(chain, entries[-1].entry.number, entries[-1].sha256)
+
+
+def forgotten(database: Database, chain: str) -> Message | None:
+    """Return that a chain lacks the last entry that this user account remembers."""
+    with database.reading() as connection:
+        return _forgotten(connection, chain, database)
+
+
+def _require_remembered(connection: Connection, chain: str, database: Database) -> None:
+    finding = _forgotten(connection, chain, database)
+    if finding is not None:
+        raise ArchiveError(finding)
+
+
+def _forgotten(
+    connection: Connection, chain: str, database: Database
+) -> Message | None:
+    try:
+        head = remembered_head(chain)
+    except FileError as error:
+        return error.message
+    if head is None:
+        return None
+    there = select(ENTRIES.c.sha256).where(
+        ENTRIES.c.chain == chain, ENTRIES.c.number == head.number
+    )
+    if connection.execute(there).scalar_one_or_none() == head.sha256:
+        return None
+    return message(
+        "archive.rolled-back",
+        archive=database.name,
+        number=head.number,
+        memory=head_file(chain),
+    )
 
 
 def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
@@ -243,9 +286,11 @@ def _require_signed(
         before = [read_entry(row.text, row.signature) for row in limits]
     except DamagedError as error:
         raise ArchiveError("archive.copy-damaged", chain=chain[:SHORT]) from error
-    keys = ChainKeys(chain, before)
+    keys = ChainKeys(chain)
+    for each in before:
+        signature_finding(keys, each)
     for each in new:
-        finding = keys.finding(each)
+        finding = signature_finding(keys, each)
         if finding is not None and finding.code != UNAPPROVED:
             raise ArchiveError(finding)
 

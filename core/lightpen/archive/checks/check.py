@@ -9,22 +9,22 @@ from typing import Any
 from sqlalchemy import Row, exists, select, text
 
 from lightpen.archive.chains.chains import chain_at_home, heads
-from lightpen.archive.chains.entries import (
-    NOTHING_BEFORE,
-    SHORT,
-    ChainHead,
-    named_entry,
-    text_sha256,
-)
+from lightpen.archive.chains.entries import SHORT, ChainHead, named_entry, text_sha256
+from lightpen.archive.chains.growth import forgotten
 from lightpen.archive.chains.rows import searchable, sound_entry
-from lightpen.archive.chains.seal import is_sealed_otherwise, lost_heads, read_seal
-from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys
+from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.checks.check_notes import check_notes
 from lightpen.archive.checks.files_check import FilesCheck
 from lightpen.archive.store.database import Database, is_open, look_into
 from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
-from lightpen.errors import LightpenError
+from lightpen.errors import FileError, LightpenError
 from lightpen.messages import Message, message
+from lightpen.record.library.entered_files import (
+    NOTHING_BEFORE,
+    ROLLED_BACK,
+    entered_files,
+)
+from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
 
 BATCH = 200  # rows that are read at one time
 SOUND = "ok"  # SQLite's word for a file without damage
@@ -53,7 +53,7 @@ def check_archive(
     ends, home = heads(database), chain_at_home(database)
     n_all = max(1, sum(head.number for head in ends))
     files = FilesCheck(data)
-    stages = [_damage(database), _broken_seal(database, ends)]
+    stages = [_damage(database), _rolled_back(database, home, data)]
     n_before = 0
     for head in ends:
         start, share = n_before / n_all, head.number / n_all
@@ -109,16 +109,19 @@ def _damage(database: Database) -> Iterator[Message]:
             yield message("archive.file-damaged", file=database.name, what=str(found))
 
 
-def _broken_seal(database: Database, ends: tuple[ChainHead, ...]) -> Iterator[Message]:
-    seal = None if database.file is None else read_seal(database.file)
-    if database.file is None or seal is None:
-        return
-    for head in lost_heads(database, seal):
-        yield message(
-            "archive.sealed-missing", number=head.number, chain=head.chain[:SHORT]
-        )
-    if is_sealed_otherwise(database.file, ends, seal):
-        yield message("archive.seal-broken", file=database.name)
+def _rolled_back(
+    database: Database, home: str | None, data: Path | None
+) -> Iterator[Message]:
+    """Yield that the archive lacks what this user account remembers of the folder."""
+    finding = None if home is None else forgotten(database, home)
+    if finding is not None:
+        yield finding
+    elif data is not None:
+        try:
+            entered_files(data)
+        except FileError as error:
+            if error.message.code == ROLLED_BACK:  # the rest is found below
+                yield error.message
 
 
 def _walked(
@@ -155,7 +158,7 @@ def _walked(
                 )
             else:
                 sound.append(entry)
-                unsigned = keys.finding(entry)
+                unsigned = signature_finding(keys, entry)
                 if unsigned is not None and unsigned.code != UNAPPROVED:
                     yield unsigned
             number, previous = row.number, row.sha256

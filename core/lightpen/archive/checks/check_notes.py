@@ -18,14 +18,16 @@ from lightpen.archive.chains.chains import (
     heads,
     records_of,
 )
-from lightpen.archive.chains.entries import IN_FORCE_BY
-from lightpen.archive.chains.seal import seal_of
-from lightpen.archive.chains.signatures import UNAPPROVED, ChainKeys
+from lightpen.archive.chains.entries import IN_FORCE_BY, SHORT
+from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.events.station_events import station_files
-from lightpen.archive.store.database import Database, is_open
+from lightpen.archive.store.database import Database
 from lightpen.errors import FileError
 from lightpen.formats.own_json import DamagedError, ZonedTime, parse_own_json
 from lightpen.messages import Message, message, printable
+from lightpen.record.library.signing.account import owed_files, remembered_head
+from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
+from lightpen.record.library.signing.keys import station_key
 from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive
 
@@ -41,31 +43,27 @@ class _Accepted(Struct):
 def check_notes(database: Database, data: Path) -> Iterator[Message]:
     """Yield notes on the archive of a data folder.
 
-    Files without entries, a missing seal, keys that nobody approved, clocks that were
-    set back, and tips that were accepted before they were computed.
+    Files without entries, keys that are not known or that nobody approved, clocks that
+    were set back, and tips that were accepted before they were computed.
     """
     home = chain_at_home(database)
-    yield from _missing_seal(database)
     for head in heads(database):
         yield from _unapproved_keys(database, head.chain)
     if home is not None:
+        yield from _unknown_here(home)
         yield from _not_entered(database, data, home)
         yield from _impossible_times(database, home)
 
 
-def _missing_seal(database: Database) -> Iterator[Message]:
-    file = database.file
-    has_entries = any(head.number for head in heads(database))
-    if file is None or not has_entries or is_open(file):
-        return
-    if not seal_of(file).exists():
-        yield message("archive.no-seal", file=seal_of(file))
+def _unknown_here(home: str) -> Iterator[Message]:
+    if station_key(home) is None and remembered_head(home) is None:
+        yield message("archive.unknown-here", chain=home[:SHORT])
 
 
 def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
     keys = ChainKeys(chain)
     for entry in entries_of_limits(database, chain):
-        finding = keys.finding(entry)
+        finding = signature_finding(keys, entry)
         if finding is not None and finding.code == UNAPPROVED:
             yield finding
 
@@ -74,9 +72,12 @@ def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]
     entered, results = ArchivedFiles(database, home), FolderArchive(data)
     entered.read()
     files = (*results.all_files(), *library_files(data), *station_files(data))
+    owed = {each.place for each in owed_files(home)}
     for file in files:
         place = results.place_of(file)
-        if place not in entered:
+        if place not in entered and place in owed:
+            yield message("archive.file-owed", file=printable(place))
+        elif place not in entered:
             yield message("archive.file-not-entered", file=printable(place))
 
 

@@ -19,13 +19,13 @@ from lightpen.record.folder.verifications import (
     read_verification,
 )
 from lightpen.record.library.guard_files import LIMITS_FOLDER, read_limits_change
-from lightpen.record.library.key_changes import (
+from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.library.signing.chain_keys import (
     OLD_KEY_SIGNATURE,
     STATION_KEY,
     SUPERVISOR_KEY,
     SUPERVISOR_SIGNATURE,
 )
-from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.record.swings.journal import JOURNAL
@@ -62,7 +62,7 @@ def event_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
 
 
 def _of_limits(file: Path, content: bytes, place: FileHash) -> Event:
-    """Return a change of limits, once all of them are known to be signed."""
+    """Return a change of limits, once all of them are known to be approved."""
     read_supervision(file.parents[1])
     change = read_limits_change(content, file)
     settings: dict[str, Plain] = {"changes_password": change.password is not None}

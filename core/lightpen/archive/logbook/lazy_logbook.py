@@ -8,10 +8,8 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from lightpen.archive.store.uses import closed
-from lightpen.errors import AcceptanceError, ArchiveError
 from lightpen.formats.machine_settings import machine_settings
 from lightpen.messages import Message
-from lightpen.record.library.supervision import Supervision
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.solving import Solution
 
@@ -63,20 +61,6 @@ class LazyLogbook:
             logbook.enter_refused(solution, assessment, at)
         else:
             logbook.enter_owed()
-
-    def confirm(self, supervision: Supervision) -> None:
-        """Confirm limits; see `lightpen.archive.logbook.logbook.Logbook.confirm`.
-
-        An archive that cannot be read stops nothing in a data folder without a
-        supervisor password.
-        """
-        try:
-            logbook = self._open()
-            if logbook is not None:
-                logbook.confirm(supervision)
-        except ArchiveError as error:
-            if supervision.is_guarded:
-                raise AcceptanceError(error.message) from error
 
     def opened(self) -> "Logbook":
         """Return the logbook, opened by now."""

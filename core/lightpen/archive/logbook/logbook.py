@@ -1,12 +1,11 @@
 """The logbook of a station: enters the events of a data folder in its chain.
 
-One rule joins it to the files. A result file makes a tip current, or revokes it, the
-journal of a swing says that it was abandoned, and changes of the tip library, limits,
-verifications and calibrated cameras have files of their own: these files are the truth,
-written whole before anything else, and each gets one entry, as soon as it is written;
-where that failed, or the program was killed, or had no archive yet, with whatever is
-entered next, and at every start. So nothing is current or revoked that the archive does
-not contain from the next start on, and no entry is of nothing.
+A result file makes a tip current, or revokes it, and changes of the tip library,
+limits, verifications and calibrated cameras have files of their own. Each gets one
+entry, as soon as it is written; where that failed, or the program was killed, with
+whatever is entered next, and at every start, by the note in the user account: no file
+is entered that the program did not write, and none counts without its entry. The
+journal of a swing says that it was abandoned.
 """
 
 import logging
@@ -14,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from threading import Lock
 
@@ -21,14 +21,12 @@ from msgspec import structs
 
 from lightpen.archive.chains.chains import (
     ArchivedFiles,
-    entries_of_limits,
     entry_of_result,
     heads,
     records_of,
 )
 from lightpen.archive.chains.entries import Event, Kind, StoredEntry, this_program
 from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.chains.seal import close_sealed
 from lightpen.archive.events.event_extraction import (
     ExtractedEvent,
     event_of_abandoned,
@@ -37,11 +35,7 @@ from lightpen.archive.events.event_extraction import (
     event_of_result,
     event_of_unreadable,
 )
-from lightpen.archive.events.station_events import (
-    event_of_station,
-    is_station_file,
-    station_files,
-)
+from lightpen.archive.events.station_events import event_of_station, is_station_file
 from lightpen.archive.logbook.reinstating import (
     due_doubts,
     require_restorable,
@@ -55,18 +49,14 @@ from lightpen.errors import AcceptanceError, ArchiveError, FileError, UsageError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
-from lightpen.messages import Message, message, printable
+from lightpen.messages import Message, message
 from lightpen.model.limits import StationLimits
-from lightpen.record.library.guard_files import LIMITS_FOLDER
-from lightpen.record.library.numbered_files import number_of, numbered_files
+from lightpen.record.library.entered_files import ARCHIVE, entered_files
+from lightpen.record.library.signing.account import OwedFile, forget_owed, owed_files
 from lightpen.record.library.signing.keys import chain_of, station_key
-from lightpen.record.library.supervision import (
-    Signature,
-    Supervision,
-    approval_of_change,
-)
+from lightpen.record.library.supervision import Signature, approval_of_change
 from lightpen.record.library.supervision_changes import renew_station_key
-from lightpen.record.library.tip_library import LIBRARY, library_files
+from lightpen.record.library.tip_library import LIBRARY
 from lightpen.record.results.acceptance import require_in_use
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
@@ -76,7 +66,6 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.solving import Solution
 
-ARCHIVE = "archive.sqlite"
 LONGEST_FAREWELL_S = 1.0  # maximum delay of the program's end by a server
 
 _logger = logging.getLogger(__name__)
@@ -101,7 +90,7 @@ class Logbook:
 
     def __init__(self, data: Path, server: str = "") -> None:
         self._data = data
-        self._results = FolderArchive(data, self.confirm)
+        self._results = FolderArchive(data)
         self._lock = Lock()
         self.database: Database = open_file(data / ARCHIVE)
         try:
@@ -127,11 +116,16 @@ class Logbook:
         """
         with self._lock:
             self._entered.read()
-            owed, faults = tuple(self._owed()), []
-            for n_done, path in enumerate(owed):
-                report(n_done / len(owed))
+            owed, swings, faults = (*self._owed(),), (*self._abandoned(),), []
+            n_all = len(owed) + len(swings)
+            steps = (
+                *(partial(self._enter_file, each) for each in owed),
+                *(partial(self._enter_swing, each) for each in swings),
+            )
+            for n_done, step in enumerate(steps):
+                report(n_done / n_all)
                 try:
-                    self._enter(self._event_of(path))
+                    step()
                 except FileError as error:
                     faults.append(error.message)
         return tuple(faults)
@@ -200,10 +194,6 @@ class Logbook:
         self.enter_owed()
         return result
 
-    def confirm(self, supervision: Supervision) -> None:
-        """Raise `AcceptanceError` unless the limits of the folder are those entered."""
-        confirm_limits(self.database, self.chain, supervision)
-
     def delivery(self) -> ReplicationState | None:
         """Return the progress of the replication; None without a server."""
         if self._replicator is None:
@@ -233,50 +223,61 @@ class Logbook:
                 self.shared += () if notice in self.shared else (notice,)
 
     def close(self) -> None:
-        """Close the archive, and seal its file unless another process has it open."""
+        """Close the archive."""
         if self._replicator is not None:
             self._replicator.close(LONGEST_FAREWELL_S)
         with self._lock:
-            close_sealed(self.database)
+            self.database.close()
 
     def _renew_lost_key(self) -> None:
         """Continue with a new key in a moved folder, without a password."""
         # Every acceptance reports these errors.
         with suppress(FileError, AcceptanceError):
             guard = self._results.supervision()
-            name = (
-                chain_of(guard.station_keys[-1]) if guard.station_keys else self.chain
-            )
+            present = entered_files(self._data).station_key
+            name = chain_of(present) if present else self.chain
             if not guard.is_guarded and station_key(name) is None:
                 renew_station_key(self._data, self.chain, None, local_now())
 
-    def _owed(self) -> Iterator[Path]:
-        """Yield the files, and then the swings, that have no entry."""
-        limits = reversed(numbered_files(self._data / LIMITS_FOLDER))
-        own = (*library_files(self._data), *station_files(self._data))
-        for file in dict.fromkeys((*limits, *self._results.all_files(), *own)):
-            if not self._is_entered(file):
-                yield file
+    def _owed(self) -> Iterator[OwedFile]:
+        """Yield the files to be entered that are there."""
+        for owed in owed_files(self.chain):
+            if (self._data / owed.place).exists():
+                yield owed
+
+    def _abandoned(self) -> Iterator[Path]:
+        """Yield the abandoned swings that have no entry."""
         for folder in _set_aside(self._data / RECORDS):
-            if not self._is_entered(folder):
+            if self._results.place_of(folder) not in self._entered:
                 yield folder
 
-    def _is_entered(self, path: Path) -> bool:
-        return self._results.place_of(path) in self._entered
+    def _enter_file(self, owed: OwedFile) -> None:
+        file = self._data / owed.place
+        extracted = self._event_of(file)
+        event = extracted.event
+        if event.result is None or event.result.sha256 != owed.sha256:
+            raise FileError("archive.another-result", file=file)
+        event = structs.replace(event, approval=owed.approval)
+        self._enter(replace(extracted, event=event))
+        forget_owed(self.chain, owed)
 
     def _event_of(self, path: Path) -> ExtractedEvent:
         if path.parent.name == LIBRARY:
             return event_of_change(self._results, path)
         if is_station_file(path):
             return event_of_station(self._results, path)
-        if path.parent.name != RECORDS:
-            return event_of_result(self._results, path)
-        at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)
+        return event_of_result(self._results, path)
+
+    def _enter_swing(self, folder: Path) -> None:
+        """Enter an abandoned swing."""
+        at = datetime.fromtimestamp((folder / JOURNAL).stat().st_mtime, UTC)
         try:
-            record = open_record(path)
+            record = open_record(folder)
         except FileError as error:
-            return event_of_unreadable(self._results, path, at, error.message)
-        return event_of_abandoned(self._results, record, at)
+            why = error.message
+            self._enter(event_of_unreadable(self._results, folder, at, why))
+        else:
+            self._enter(event_of_abandoned(self._results, record, at))
 
     def _enter(self, extracted: ExtractedEvent) -> None:
         event = extracted.event
@@ -311,16 +312,3 @@ def _set_aside(records: Path) -> Iterator[Path]:
         with suppress(OSError):  # it is no record
             if last_verdict(folder) == DISCARDED:
                 yield folder
-
-
-def confirm_limits(
-    database: Database, chain: str | None, supervision: Supervision
-) -> None:
-    """Raise `AcceptanceError` unless limits are those entered in a chain."""
-    if supervision.chain not in ("", chain):
-        raise AcceptanceError("limits.other-archive")
-    entries = entries_of_limits(database, chain) if chain else ()
-    for file in filter(None, (each.entry.event.result for each in entries)):
-        number = number_of(Path(file.place))
-        if supervision.hashes[number - 1 : number] != (file.sha256,):
-            raise AcceptanceError("limits.not-entered", file=printable(file.place))

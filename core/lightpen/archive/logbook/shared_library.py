@@ -17,12 +17,13 @@ from sqlalchemy import text
 
 from lightpen.archive.chains.chains import chain_at_home
 from lightpen.archive.chains.entries import StoredEntry, read_entry, text_sha256
-from lightpen.archive.chains.signatures import ChainKeys
+from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.store.database import Database
 from lightpen.formats.own_json import DamagedError
 from lightpen.local_time import local_time
 from lightpen.messages import Message, message, printable
 from lightpen.record.library.library_changes import adopt_change
+from lightpen.record.library.signing.chain_keys import ChainKeys
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import (
     KIND_WORDS,
@@ -136,7 +137,7 @@ def _on_server(server: Database) -> Iterator[tuple[StoredEntry, LibraryChange]]:
             entry = read_entry(row.text, row.signature)
         except DamagedError:
             continue
-        if ChainKeys(entry.entry.chain).finding(entry) is None:
+        if signature_finding(ChainKeys(entry.entry.chain), entry) is None:
             yield from _changes(entry, row.record)
 
 

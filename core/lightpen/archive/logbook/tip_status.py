@@ -6,12 +6,12 @@ from pathlib import Path
 
 from lightpen.archive.chains.chains import chain_at_home
 from lightpen.archive.history.due import due_tips
-from lightpen.archive.logbook.logbook import ARCHIVE
 from lightpen.archive.store.database import Database, look_into
 from lightpen.errors import NoArchiveError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import CurrentResult, StationStatus
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.tip_library import Library
 
 

@@ -26,9 +26,9 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message, printable
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.record.library.entered_files import entered_files
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.opening import data_folder_of
-from lightpen.record.results.result_folder import signed_heading
 from lightpen.record.results.results import TipChange, has_head, parse_result
 from lightpen.record.swings.names import Names
 
@@ -162,13 +162,17 @@ def floats(numbers: object) -> FloatArray:
 def read_calibration(path: Path) -> CalibrationFile:
     """Read a calibration, or raise `UsageError` if the file holds none.
 
-    Raises `FileError` if it was changed, or is a result in a data folder and not signed
-    as it must be.
+    Raises `FileError` if it was changed, or is a result in a data folder and a
+    supervisor whom it names did not approve it.
     """
     content, data = read_bytes(path, WHAT, LARGEST_RECORD), data_folder_of(path)
-    if data is not None and has_head(content):
-        signed_heading(data, path, content, read_supervision(data))
-    return parse_calibration(content, path)
+    found = parse_calibration(content, path)
+    if data is None or found.accepted is None:
+        return found
+    counted = entered_files(data).counted(path, content)
+    if counted is not None and found.supervisor:
+        counted.require_approved(read_supervision(data).key)
+    return found
 
 
 def parse_calibration(data: bytes, path: Path) -> CalibrationFile:

@@ -27,7 +27,7 @@ from lightpen.intrinsics.views import BoardTolerances
 from lightpen.messages import message
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.library.entered_files import add_numbered
 from lightpen.record.swings.names import Names
 
 CAMERA_CALIBRATIONS = "camera-calibrations"
@@ -83,7 +83,7 @@ def keep_camera_trial(
         "calibration": intrinsics,
         "inputs": {"images": [_entry(*image) for image in trial.images.items()]},
     }
-    return add_numbered(data / CAMERA_CALIBRATIONS, record_bytes(record))
+    return add_numbered(data, data / CAMERA_CALIBRATIONS, record_bytes(record))
 
 
 def read_camera_trial(content: bytes, file: Path) -> StoredTrial:

@@ -18,6 +18,7 @@ from lightpen.formats.own_json import (
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.library.entered_files import entered_files
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
@@ -97,16 +98,16 @@ def is_verification(content: bytes) -> bool:
 
 
 def read_verification(content: bytes, file: Path) -> StoredVerification:
-    """Read the file of a verification, signed as it must be in a data folder."""
+    """Read the file of a verification, approved as it must be in a data folder."""
     try:
         done = parse_checked(content, StoredVerification)
     except DamagedError as error:
         raise FileError("verification.damaged", file=file) from error
     data = data_folder_of_verification(file)
-    if data is not None:
-        read_supervision(data).require_signed(
-            data, file, content, has_supervisor=bool(done.supervisor)
-        )
+    if data is not None and done.supervisor:
+        counted = entered_files(data).counted(file, content)
+        if counted is not None:
+            counted.require_approved(read_supervision(data).key)
     return done
 
 

@@ -1,15 +1,10 @@
 """Changes of password, limits and station key of a data folder, one file each.
 
-Each file has the hash of the previous one and the signatures of the station and of the
-supervisor who made the change, see `lightpen.record.library.signing`. The first
-introduces the station key. Where a supervisor introduces a key or a password, the
-hashes of the files that count until then are listed: all others must be signed by the
-new one. All files have the mode 0600: a password can be guessed by its salt and public
-key.
+A file counts if it is entered, see `lightpen.record.library.entered_files`, and once
+there is a password, if a supervisor approved it. All files have the mode 0600: a
+password can be guessed by its salt and public key.
 """
 
-from collections.abc import Mapping
-from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -17,11 +12,10 @@ from msgspec import Meta, Struct
 
 from lightpen.errors import FileError
 from lightpen.formats import upgrades
-from lightpen.formats.files import MEGABYTE, create_whole
+from lightpen.formats.files import MEGABYTE
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
-    Digest,
     ZonedTime,
     require_usual,
     with_checksum,
@@ -29,6 +23,7 @@ from lightpen.formats.own_json import (
 from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
 from lightpen.messages import message
 from lightpen.model.limits import StationLimits
+from lightpen.record.library.entered_files import write_counted
 from lightpen.record.library.numbered_files import make_folder, numbered_file
 from lightpen.record.library.signing.keys import (
     PRIVATE,
@@ -37,12 +32,10 @@ from lightpen.record.library.signing.keys import (
     SigningKey,
     supervisor_key,
 )
-from lightpen.record.library.signing.signed_text import Signers, place_in
 
 LIMITS_FOLDER = "limits"
 LIMIT = 8 * MEGABYTE  # holds some 80,000 files
 WHAT = message("file.limits")
-NOTHING_BEFORE = "0" * 64
 
 _Signed: TypeAlias = Annotated[str, Meta(pattern="^([0-9a-f]{128})?$")]
 
@@ -69,14 +62,10 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
     password: PasswordVerifier | None = None  # None: unchanged
     # By `Limit.key`.
     limits: dict[str, float] | None = None
-    previous: Digest = NOTHING_BEFORE
-    # Of the archive; in the first file.
-    chain: Annotated[str, Meta(pattern="^([0-9a-f]{32})?$")] = ""
     # Public key from then on
     station_key: Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")] = ""
     station_key_signature: _Signed = ""  # of `key_change` by the key before
     key_approval: _Signed = ""  # and by the supervisor
-    known: Mapping[str, Digest] | None = None  # files that count as they are
 
     def __post_init__(self) -> None:
         require_usual(self.at)
@@ -84,7 +73,7 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
 
 
 def read_limits_change(content: bytes, file: Path) -> LimitsChange:
-    """Return the content of a file of limits, without verifying signatures."""
+    """Return the content of a file of limits, whether it counts or not."""
     try:
         return parse_upgraded(content, LimitsChange, upgrades.LIMITS)
     except LaterFormatError as error:
@@ -94,15 +83,13 @@ def read_limits_change(content: bytes, file: Path) -> LimitsChange:
 
 
 def write_limits_change(
-    data: Path, number: int, change: LimitsChange, signers: Signers
-) -> str:
-    """Write a change as the file of a number, and return its hash.
+    data: Path, number: int, change: LimitsChange, supervisor: SigningKey | None
+) -> None:
+    """Write a change as the file of a number, approved by a supervisor.
 
     Raises `NameTakenError` if another program made a change meanwhile.
     """
     file = numbered_file(data / LIMITS_FOLDER, number)
     make_folder(file.parent)
-    text = signers.signed(json_bytes(change), place_in(data, file))
-    content = with_checksum(text) + b"\n"
-    create_whole(file, content, PRIVATE)
-    return sha256(content).hexdigest()
+    content = with_checksum(json_bytes(change)) + b"\n"
+    write_counted(data, file, content, supervisor, PRIVATE)

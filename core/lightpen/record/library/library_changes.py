@@ -1,4 +1,4 @@
-"""Changes of the tip library: checked, signed if necessary, and stored."""
+"""Changes of the tip library: checked, approved if necessary, and stored."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from lightpen.formats.own_json import with_checksum
 from lightpen.formats.upgrades import newest_format
 from lightpen.messages import Message, message, printable
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
+from lightpen.record.library.entered_files import write_counted
 from lightpen.record.library.numbered_files import (
     make_folder,
     newest_number,
     numbered_file,
 )
-from lightpen.record.library.signing.signed_text import place_in
 from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
@@ -180,11 +180,11 @@ def no_such_item(kind: ItemKind, name: str) -> Message:
 
 def _keep(data: Path, number: int, item: AnyItem, by: Author, now: datetime) -> Library:
     """Keep a change as the file of a number; `NameTakenError` if there is another."""
-    supervisor, signers = "", None
+    supervisor, key = "", None
     supervision = read_supervision(data)
     if supervision.is_guarded:
         signature = by.signature or Signature("", "")
-        signers = supervision.signers(require_supervisor(supervision, signature))
+        key = require_supervisor(supervision, signature)
         supervisor = signature.name.strip()
     change = LibraryChange(
         format=newest_format(upgrades.LIBRARY),
@@ -197,10 +197,7 @@ def _keep(data: Path, number: int, item: AnyItem, by: Author, now: datetime) -> 
     )
     file = numbered_file(data / LIBRARY, number)
     make_folder(file.parent)
-    text = json_bytes(change)
-    if signers is not None:
-        text = signers.signed(text, place_in(data, file))
-    create_whole(file, with_checksum(text) + b"\n")
+    write_counted(data, file, with_checksum(json_bytes(change)) + b"\n", key)
     return read_library(data)
 
 

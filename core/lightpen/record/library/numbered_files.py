@@ -5,9 +5,7 @@ try the same number, one gets it and the other the next. An empty ``000007.missi
 reserves the number of a lost file.
 """
 
-from collections.abc import Callable
 from contextlib import suppress
-from itertools import count
 from pathlib import Path
 
 from lightpen.errors import FileError, NameTakenError
@@ -15,21 +13,6 @@ from lightpen.formats.files import FOLDER, create_whole, sync_folder, unreadable
 from lightpen.formats.system_reasons import strerror
 
 MISSING = ".missing"
-
-
-def add_numbered(folder: Path, data: bytes | Callable[[Path], bytes]) -> Path:
-    """Add a file, the newest of all, and return it.
-
-    When this returns, the file is durable; when it raises or is killed, it is stored
-    whole or not at all. The content may depend on the file.
-    """
-    make_folder(folder)
-    for free in count(1 + newest_number(folder)):
-        file = numbered_file(folder, free)
-        with suppress(NameTakenError):  # by another program, just now
-            create_whole(file, data if isinstance(data, bytes) else data(file))
-            break
-    return file
 
 
 def numbered_file(folder: Path, number: int) -> Path:

@@ -33,8 +33,9 @@ from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
 from lightpen.messages import Message, message
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen.model.names import same_name
+from lightpen.record.library.entered_files import entered_files
 from lightpen.record.library.numbered_files import numbered_files
-from lightpen.record.library.supervision import Supervision, read_supervision
+from lightpen.record.library.supervision import read_supervision
 
 LIBRARY = "library"
 PICTURES = "pictures"  # sub-folder
@@ -265,9 +266,15 @@ def item_entries(item: AnyItem) -> dict[str, Plain]:
 
 def library_changes(data: Path) -> Iterator[tuple[Path, LibraryChange]]:
     """Yield the changes of a library with their files, the oldest first."""
-    supervision = read_supervision(data)
-    for file in library_files(data):
-        yield file, read_change(file, supervision)
+    entered, present = entered_files(data), read_supervision(data).key
+    files = library_files(data)
+    entered.require_all(data / LIBRARY)
+    for file in files:
+        counted = entered.counted(file, read_bytes(file, WHAT, MEGABYTE))
+        if counted is not None:
+            change = read_change(file)
+            counted.require_approved(present)
+            yield file, change
 
 
 def library_files(data: Path) -> tuple[Path, ...]:
@@ -275,24 +282,17 @@ def library_files(data: Path) -> tuple[Path, ...]:
     return tuple(reversed(numbered_files(data / LIBRARY)))
 
 
-def read_change(file: Path, supervision: Supervision | None = None) -> LibraryChange:
-    """Return the change that a file holds, with the supervision of its data folder.
+def read_change(file: Path) -> LibraryChange:
+    """Return the change that a file holds, whether it counts or not.
 
-    Raises `FileError` if it was changed, is not signed though there is a supervisor
-    password, or is of a later version of the program.
+    Raises `FileError` if it is damaged, or of a later version of the program.
     """
-    text = read_bytes(file, WHAT, MEGABYTE)
-    data = file.parents[1]
-    if supervision is None:
-        supervision = read_supervision(data)
     try:
-        change = parse_change(text)
+        return parse_change(read_bytes(file, WHAT, MEGABYTE))
     except LaterFormatError as error:
         raise FileError("library.later-version", file=file) from error
     except DamagedError as error:
         raise FileError("library.damaged", file=file) from error
-    supervision.require_signed(data, file, text, has_supervisor=True)
-    return change
 
 
 def parse_change(content: bytes) -> LibraryChange:

@@ -7,19 +7,22 @@ own folder.
 """
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import LARGEST_RECORD, opened, read_bytes
+from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.messages import message
 from lightpen.model.names import folded_name
-from lightpen.record.library.numbered_files import add_numbered, numbered_files
+from lightpen.record.library.entered_files import (
+    EnteredFiles,
+    add_numbered,
+    entered_files,
+)
+from lightpen.record.library.numbered_files import numbered_files
 from lightpen.record.library.signing.keys import SigningKey
-from lightpen.record.library.signing.signed_text import place_in
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -31,8 +34,6 @@ from lightpen.record.results.results import (
     Result,
     ResultHeading,
     Withdrawal,
-    has_head,
-    head_of,
     parse_heading,
     parse_result,
     parse_withdrawal,
@@ -43,7 +44,6 @@ from lightpen.record.results.results import (
 RECORDS, RESULTS = "records", "results"
 SIMULATED = "simulated"  # folder of the files and results of the simulated pen
 WHAT = message("file.result")
-HEAD = 16_384  # bytes, in which the first entries of a result end, or it is read whole
 
 _logger = logging.getLogger(__name__)
 
@@ -54,18 +54,12 @@ class FolderArchive:
     Results are added and never changed or removed: a revoked one is kept, and its
     predecessor is current again. Results of a simulated pen are kept apart and are
     never current for a real one. All methods may take as long as a disk or a network
-    does, and may be called from any thread. Of a result of another pen, tip or swing
-    only the first entries are read, so that thousands of them cost little. ``confirm``
-    raises an `AcceptanceError` where the limits are not those of the archive.
+    does, and may be called from any thread. A result
+    that is not entered in the archive is passed over.
     """
 
-    def __init__(
-        self,
-        data: Path,
-        confirm: Callable[[Supervision], None] = lambda supervision: None,
-    ) -> None:
+    def __init__(self, data: Path) -> None:
         self._data = data.absolute()
-        self._confirm = confirm
 
     @property
     def folder(self) -> Path:
@@ -73,16 +67,15 @@ class FolderArchive:
         return self._data / RESULTS
 
     def store(self, result: Result, supervisor: SigningKey | None = None) -> None:
-        """Make a result current, signed by the supervisor whom it names.
+        """Make a result current, approved by the supervisor whom it names.
 
         When this returns, the result is durable; when it raises or is killed, it is
         stored whole or not at all.
         """
         root, record = self._root(result.is_simulated), self.place_of(result.record)
-        sign = self._signing(read_supervision(self._data), supervisor)
-        # An unreadable result is never current.
-        parse_result(result_bytes(result, record), root, Path)
-        add_numbered(root, lambda file: result_bytes(result, record, sign(file)))
+        content = result_bytes(result, record)
+        parse_result(content, root, Path)  # an unreadable result is never current
+        add_numbered(self._data, root, content, supervisor)
 
     def revoke(
         self,
@@ -115,10 +108,7 @@ class FolderArchive:
             if signature is None or key is None
             else signature.name.strip(),
         )
-        sign = self._signing(supervision, key)
-        add_numbered(
-            file.parent, lambda place: withdrawal_bytes(withdrawal, sign(place))
-        )
+        add_numbered(self._data, file.parent, withdrawal_bytes(withdrawal), key)
         _logger.info("result withdrawn: %s, by %r", file, operator)
 
     def in_force(
@@ -164,13 +154,8 @@ class FolderArchive:
         )
 
     def supervision(self) -> Supervision:
-        """Return the present limits and who guards them, as the archive confirms them.
-
-        Raises `AcceptanceError` if they are not those that were entered in the archive.
-        """
-        supervision = read_supervision(self._data)
-        self._confirm(supervision)
-        return supervision
+        """Return the present limits and who guards them."""
+        return read_supervision(self._data)
 
     def library(self) -> Library:
         """Return the pens, tips and cones that are known."""
@@ -196,9 +181,10 @@ class FolderArchive:
 
     def content(self, file: Path) -> Result | Withdrawal:
         """Return the content of one of `all_files`."""
-        if self._heading(file, read_supervision(self._data)).takes_back is None:
+        content = read_bytes(file, WHAT, LARGEST_RECORD)
+        if parse_heading(content, file).takes_back is None:
             return self.read(file)
-        return parse_withdrawal(read_bytes(file, WHAT, LARGEST_RECORD), file)
+        return parse_withdrawal(content, file)
 
     def place_of(self, path: Path) -> str:
         """Return the path of a file, relative to the data folder if inside."""
@@ -226,35 +212,23 @@ class FolderArchive:
         self, root: Path, *, passes_over_damage: bool = False
     ) -> Iterator[tuple[Path, ResultHeading]]:
         """Yield the results that are not revoked, the newest first."""
-        revoked, supervision = set[str](), read_supervision(self._data)
-        for file in numbered_files(root):
+        entered, present = entered_files(self._data), read_supervision(self._data).key
+        revoked, files = set[str](), numbered_files(root)
+        if not passes_over_damage:
+            entered.require_all(root)
+        for file in files:
             try:
-                heading = self._heading(file, supervision)
+                heading = _counted_heading(entered, file, present)
             except FileError:
                 if passes_over_damage:
                     continue
                 raise
+            if heading is None:  # it is not entered
+                continue
             if heading.takes_back is not None:
                 revoked.add(heading.takes_back)
             elif file.stem not in revoked:
                 yield file, heading
-
-    def _heading(self, file: Path, supervision: Supervision) -> ResultHeading:
-        """Read the first entries of a result, all of them if it has no calibration."""
-        with opened(file, WHAT, LARGEST_RECORD) as stream:
-            start = stream.read(HEAD)
-        if not has_head(start):
-            start = read_bytes(file, WHAT, LARGEST_RECORD)
-        return signed_heading(self._data, file, start, supervision)
-
-    def _signing(
-        self, supervision: Supervision, supervisor: SigningKey | None
-    ) -> Callable[[Path], Callable[[bytes], bytes]]:
-        """Return a function that returns, for a file, what signs its text."""
-        if not supervision.is_guarded:
-            return lambda file: bytes
-        signers = supervision.signers(supervisor)
-        return lambda file: partial(signers.signed, place=place_in(self._data, file))
 
     def read(self, file: Path) -> Result:
         """Return the result in a file of the archive."""
@@ -262,14 +236,16 @@ class FolderArchive:
         return parse_result(read_bytes(file, WHAT, LARGEST_RECORD), file, located)
 
 
-def signed_heading(
-    data: Path, file: Path, start: bytes, supervision: Supervision
-) -> ResultHeading:
-    """Return the heading in the start of a result, signed as it must be."""
-    heading = parse_heading(start, file)
-    supervision.require_signed(
-        data, file, head_of(start), has_supervisor=bool(heading.supervisor)
-    )
+def _counted_heading(
+    entered: EnteredFiles, file: Path, present: str
+) -> ResultHeading | None:
+    """Return the heading of a result, approved as it must be; None if not entered."""
+    counted = entered.counted(file, read_bytes(file, WHAT, LARGEST_RECORD))
+    if counted is None:
+        return None
+    heading = parse_heading(counted.content, file)
+    if heading.supervisor:
+        counted.require_approved(present)
     return heading
 
 

@@ -193,13 +193,8 @@ class Result:
         return np.array(self.calibration.expanded_uncertainty_mm)
 
 
-def result_bytes(
-    result: Result, record: str, sign: Callable[[bytes], bytes] = bytes
-) -> bytes:
-    """Return a result as JSON, with the path of the swing's folder as written there.
-
-    ``sign`` returns the text of the head with its signatures.
-    """
+def result_bytes(result: Result, record: str) -> bytes:
+    """Return a result as JSON, with the path of the swing's folder as written there."""
     names = result.names
     rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
     head = _Head(
@@ -223,15 +218,13 @@ def result_bytes(
         restores=result.restores,
         calibration_sha256=sha256(rest).hexdigest(),
     )
-    return with_checksum(sign(json_bytes(head))).removesuffix(b"}") + rest
+    return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
 
 
-def withdrawal_bytes(
-    withdrawal: Withdrawal, sign: Callable[[bytes], bytes] = bytes
-) -> bytes:
-    """Return a revocation as JSON; ``sign`` as of `result_bytes`."""
+def withdrawal_bytes(withdrawal: Withdrawal) -> bytes:
+    """Return a revocation as JSON."""
     entries = {"format": newest_format(WITHDRAWAL), **to_builtins(withdrawal)}
-    return with_checksum(sign(json_bytes(entries)))
+    return with_checksum(json_bytes(entries))
 
 
 def has_head(start: bytes) -> bool:

@@ -12,14 +12,11 @@ from typing import Any
 
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import file_entry, json_bytes, record_bytes
-from lightpen.formats.own_json import with_checksum
+from lightpen.formats.json_records import file_entry, record_bytes
 from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
-from lightpen.record.library.numbered_files import add_numbered
+from lightpen.record.library.entered_files import add_numbered
 from lightpen.record.library.signing.keys import SigningKey
-from lightpen.record.library.signing.signed_text import place_in
-from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.verification.probing.current_tip import CurrentTip
 from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
@@ -52,19 +49,10 @@ def keep_verification(
 ) -> Path:
     """Keep the record of a verification in a data folder, and return its file.
 
-    Where there is a supervisor password, it is signed by the station, and by the
-    supervisor whom the record names.
+    The supervisor whom it names approves it.
     """
     folder = verifications_folder(data, is_simulated=is_simulated)
-    supervision = read_supervision(data)
-    if not supervision.is_guarded:
-        return add_numbered(folder, record_bytes(record))
-    signers, text = supervision.signers(supervisor), json_bytes(record)
-
-    def signed(file: Path) -> bytes:
-        return with_checksum(signers.signed(text, place_in(data, file))) + b"\n"
-
-    return add_numbered(folder, signed)
+    return add_numbered(data, folder, record_bytes(record), supervisor)
 
 
 def verifications_folder(data: Path, *, is_simulated: bool) -> Path:

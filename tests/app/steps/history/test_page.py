@@ -34,7 +34,6 @@ from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.chains.growth import append
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook.logbook import ARCHIVE
 from lightpen.archive.store.database import Database
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
@@ -42,6 +41,7 @@ from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.origin import Origin
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits

@@ -612,7 +612,7 @@ def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
     page = bed.show()
 
     assert banner(page).word == "CHECK: No comparison possible"
-    assert "is damaged" in banner(page).detail
+    assert "was changed before it was entered" in banner(page).detail
     assert "No earlier result" in reported_of_result(page)
 
 

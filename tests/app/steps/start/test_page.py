@@ -703,7 +703,7 @@ def test_a_damaged_result_is_reported_where_the_result_would_be(
 
     (sentence,) = show(workbench).last()
 
-    assert sentence.startswith(f"The result {file} is damaged.")
+    assert sentence.startswith(f"The file {file} was changed before it was entered")
 
 
 # Interrupted swings

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from msgspec import structs
+from tests.entering import put_in
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
 from lightpen.formats.decoding import encode_png
@@ -157,7 +158,7 @@ def test_a_changed_file_is_reported_and_nothing_older_counts(tmp_path: Path) -> 
     _, newest = library_files(tmp_path)
     newest.write_bytes(newest.read_bytes().replace(b"0.02", b"0.92"))
 
-    with pytest.raises(FileError, match=r"000002\.json was modified or damaged"):
+    with pytest.raises(FileError, match=r"000002\.json was changed"):
         read_library(tmp_path)
 
 
@@ -166,7 +167,7 @@ def test_a_file_of_a_later_version_is_refused(tmp_path: Path) -> None:
 
     (tmp_path / LIBRARY).mkdir()
     file = tmp_path / LIBRARY / "000001.json"
-    file.write_bytes(record_bytes({"format": 2, "new": True}))
+    put_in(tmp_path, file, record_bytes({"format": 2, "new": True}))
 
     with pytest.raises(FileError, match="later version"):
         read_library(tmp_path)
@@ -230,5 +231,5 @@ def test_with_a_password_a_change_that_was_written_by_hand_is_refused(
     del entries["checksum"]
     entries["item"]["max_change_mm"] = 9.0
     file.write_bytes(with_checksum(json_bytes(entries)))
-    with pytest.raises(FileError, match="not signed"):
+    with pytest.raises(FileError, match="was changed"):
         read_library(tmp_path)

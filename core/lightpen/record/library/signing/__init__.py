@@ -1,1 +1,1 @@
-"""Signatures in a data folder: station key, supervisor key, signed texts."""
+"""Keys of stations and supervisors, and what a user account remembers."""

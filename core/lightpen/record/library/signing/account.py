@@ -1,0 +1,131 @@
+"""What a user account remembers of the archive of its station, beside the private keys.
+
+The last entry of its chain: so an archive that was removed or replaced by an older copy
+is found, whatever else was removed with it, and at whatever path. And the files that
+the program is writing, until they are entered: after a power cut these are entered, and
+no others.
+"""
+
+import logging
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, read_bytes, write_whole
+from lightpen.formats.json_records import json_bytes
+from lightpen.formats.own_json import DamagedError, Digest, parse_own_json
+from lightpen.formats.system_reasons import strerror
+from lightpen.messages import message
+from lightpen.record.library.signing.keys import SigningKey, is_signed, key_folder
+
+WHAT = message("file.station-key")
+
+_logger = logging.getLogger(__name__)
+
+
+class RememberedHead(Struct, frozen=True):
+    """Number and hash of the last entry of a chain."""
+
+    number: int
+    sha256: Digest
+
+
+class OwedFile(Struct, frozen=True):
+    """A file that the program wrote and will enter."""
+
+    place: str  # from the data folder
+    sha256: Digest
+    approval: str = ""  # signature of a supervisor, see `approval_of`
+
+    @property
+    def name(self) -> str:
+        """Name under which it is noted."""
+        return sha256(f"{self.place}\n{self.sha256}".encode()).hexdigest()[:32]
+
+
+def head_file(chain: str) -> Path:
+    """Return the file in which this account remembers the last entry of a chain."""
+    return key_folder() / f"head-{chain}.json"
+
+
+def remembered_head(chain: str) -> RememberedHead | None:
+    """Return the last entry of a chain that this account knows, if any."""
+    file = head_file(chain)
+    if not file.exists():
+        return None
+    try:
+        return parse_own_json(read_bytes(file, WHAT, MEGABYTE), RememberedHead)
+    except DamagedError as error:
+        raise FileError("signing.key-damaged", file=file) from error
+
+
+def remember_head(chain: str, number: int, digest: str) -> None:
+    """Remember an entry, once it is durable; an earlier one changes nothing.
+
+    A full disk leaves the memory as it was: the next entry brings it up to date.
+    """
+    try:
+        before = remembered_head(chain)
+        if before is None or before.number < number:
+            _write(head_file(chain), RememberedHead(number, digest))
+    except FileError as error:
+        _logger.warning("the last entry is not remembered: %s", error)
+
+
+def approval_of(key: SigningKey | None, chain: str, place: str, digest: str) -> str:
+    """Return the signature by which a supervisor approves a file; empty without one."""
+    return "" if key is None else key.sign(_approved(chain, place, digest))
+
+
+def is_approved(
+    public: str, approval: str, chain: str, place: str, digest: str
+) -> bool:
+    """Return whether the supervisor with a public key approved a file."""
+    return is_signed(public, approval, _approved(chain, place, digest))
+
+
+def owe(chain: str, file: OwedFile) -> None:
+    """Note a file before it is written."""
+    _write(_owed(chain) / f"{file.name}.json", file)
+
+
+def owed_files(chain: str) -> tuple[OwedFile, ...]:
+    """Return the files that are not entered yet, in the order of their writing."""
+    found = []
+    for note in _owed(chain).glob("*.json") if chain else ():
+        with suppress(FileNotFoundError):  # it was entered just now
+            found.append((note.stat().st_mtime_ns, note))
+    return tuple(_read(note) for _, note in sorted(found) if note.exists())
+
+
+def forget_owed(chain: str, file: OwedFile) -> None:
+    """Forget a file that was entered, or not written."""
+    (_owed(chain) / f"{file.name}.json").unlink(missing_ok=True)
+
+
+def _owed(chain: str) -> Path:
+    return key_folder() / f"owed-{chain}"
+
+
+def _approved(chain: str, place: str, digest: str) -> bytes:
+    return f"lightpen approval\n{chain}\n{place}\n{digest}".encode()
+
+
+def _read(file: Path) -> OwedFile:
+    try:
+        return parse_own_json(read_bytes(file, WHAT, MEGABYTE), OwedFile)
+    except DamagedError as error:
+        raise FileError("signing.key-damaged", file=file) from error
+
+
+def _write(file: Path, content: Struct) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError as error:
+        raise FileError(
+            "results.no-folder", folder=file.parent, reason=strerror(error)
+        ) from error
+    write_whole(file, json_bytes(content))

@@ -1,0 +1,31 @@
+"""Entering what a test wrote in the archive of its data folder."""
+
+from contextlib import closing
+from hashlib import sha256
+from pathlib import Path
+
+from lightpen.archive.logbook.logbook import Logbook
+from lightpen.record.library.signing.account import (
+    OwedFile,
+    forget_owed,
+    owe,
+    owed_files,
+)
+from lightpen.record.library.signing.station import station_name
+
+
+def enter_in(data: Path) -> None:
+    """Enter everything that is owed, as a start of the program does."""
+    with closing(Logbook(data)) as logbook:
+        assert logbook.enter_owed() == ()
+
+
+def put_in(data: Path, file: Path, content: bytes) -> None:
+    """Put a file in a data folder as if the program had written it."""
+    place = file.absolute().relative_to(data.absolute()).as_posix()
+    for each in owed_files(station_name(data)):
+        if each.place == place:
+            forget_owed(station_name(data), each)
+    owe(station_name(data), OwedFile(place, sha256(content).hexdigest()))
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(content)
