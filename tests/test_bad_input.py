@@ -377,27 +377,6 @@ def test_an_image_of_another_size_is_dropped_by_name(
     assert "39 of 40 used" in outcome.stdout
 
 
-def test_cropped_colour_and_deep_images_in_one_folder_are_distinguished(
-    swing: Swing, images: Path, lightpen: Run
-) -> None:
-    first, second, third, *_ = sorted(images.iterdir())
-    write(first, read(first)[:500])
-    write(second, cv2.cvtColor(read(second), cv2.COLOR_GRAY2BGR))
-    write(third, read(third).astype(np.uint16) * np.uint16(257))
-    outcome = swing.calibrate(lightpen, images=images)
-    assert_tip(outcome, swing)
-    assert "39 of 40 used" in outcome.stdout
-    assert "1 wrong size: frame_0001.png" in outcome.stdout
-
-
-def test_a_turned_image_is_refused_or_dropped(
-    swing: Swing, images: Path, lightpen: Run
-) -> None:
-    for path in images.iterdir():
-        write(path, np.rot90(read(path)).copy())
-    assert_refused(swing.calibrate(lightpen, images=images), "1024", "1224")
-
-
 @pytest.mark.parametrize("name", ["nowhere", "nowhere/*.png", "nowhere.avi"])
 def test_images_that_do_not_exist_are_refused_by_name(
     name: str, swing: Swing, lightpen: Run, tmp_path: Path

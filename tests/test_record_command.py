@@ -91,15 +91,6 @@ def test_a_swing_that_another_program_captures_can_be_calibrated(
     assert calibrated(folder)[0]["tip_pen_mm"] == untouched["tip_pen_mm"]
 
 
-def test_the_nominal_tip_of_the_record_is_compared_with(
-    untouched: dict[str, Any],
-) -> None:
-    nominal = untouched["nominal_tip_mm"]
-
-    assert nominal == pytest.approx([0.0, -95.0, -25.0], abs=100)
-    assert "change from nominal" in untouched["text"]
-
-
 def test_the_files_of_the_record_are_named_with_their_hashes(
     untouched: dict[str, Any], swung: Callable[..., Path]
 ) -> None:

@@ -31,15 +31,6 @@ def window(
         window.close()
 
 
-def test_all_pages_are_shown(
-    qtbot: QtBot,
-    window: PrintReportWindow,
-    result: Result,
-    printed: Callable[..., PrintReport],
-) -> None:
-    qtbot.waitUntil(lambda: window.n_pages() == printed(result).n_pages)
-
-
 def test_escape_closes_it_and_nothing_is_scrolled_to_the_sides(
     qtbot: QtBot, window: PrintReportWindow
 ) -> None:

@@ -205,14 +205,6 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
 # Capture
 
 
-def test_a_paused_swing_can_be_finished(station: "Station", interrupted: Path) -> None:
-    station.go_on(interrupted)
-    station.runner.ask(lambda workflow: workflow.pause())
-    station.solve()
-
-    assert station.status.solution is not None
-
-
 def test_nothing_is_kept_after_the_end(station: "Station", interrupted: Path) -> None:
     station.go_on(interrupted)
     station.keep(1)
