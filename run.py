@@ -30,7 +30,7 @@ Usage: {run} COMMAND
 Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
-PIP = "pip>=25.1"
+SETUP = "requirements-setup.lock"  # pip, and what builds the program
 # All tests of a file in one process: what they share is made once. Many tests wait for
 # a camera or a clock: a process more than there are cores.
 PARALLEL = (
@@ -56,6 +56,7 @@ COMPILE = (
 COMPILED = {
     "requirements.lock": ("pyproject.toml",),
     "requirements-dev.lock": ("--group", "dev", "--constraint", "requirements.lock"),
+    SETUP: ("--group", "setup", "--constraint", "requirements-dev.lock"),
 }
 
 
@@ -119,7 +120,7 @@ class Environment:
 
     def _project(self) -> str:
         found = hashlib.sha256()
-        for name in ("pyproject.toml", *LOCKS["development"]):
+        for name in ("pyproject.toml", SETUP, *LOCKS["development"]):
             found.update((self.root / name).read_bytes())
         return f"pyproject.toml and locks {found.hexdigest()}"
 
@@ -159,10 +160,11 @@ class Environment:
         self._write_record(["unfinished"])
         quiet = [] if sys.stderr.isatty() else ["--quiet"]
         pip = [self.program("python"), "-m", "pip", "install", *quiet]
-        self._call([*pip, PIP])
+        hashed = [*pip, "--require-hashes"]
         locks = [word for name in LOCKS[group] for word in ("--requirement", name)]
-        self._call([*pip, "--require-hashes", *locks])
-        self._call([*pip, "--no-deps", "--editable", "."])
+        self._call([*hashed, "--requirement", SETUP])
+        self._call([*hashed, *locks])
+        self._call([*pip, "--no-deps", "--no-build-isolation", "--editable", "."])
         self._make_source_paths_relative()
 
     def _make_source_paths_relative(self) -> None:

@@ -96,14 +96,13 @@ def honest_row(n_histories: int = N_HISTORIES, seed: int = SEED) -> Row:
         folder = Path(name)
         folder.chmod(0o755)  # for the user of the server
         os.environ[KEYS] = str(folder / "keys")
-        make_data(folder / "before")
         (folder / "server").mkdir()
         server = Postgres(folder / "server", programs)
         try:
             admin = server.new_database()
             for _ in range(n_histories):
                 data = folder / "data"
-                shutil.copytree(folder / "before", data)
+                make_data(data)
                 address = server.new_role(admin, "lightpen_station")
                 for _ in range(rng.randint(1, MOST_CUTS)):
                     _live_until_cut(data, address, rng)

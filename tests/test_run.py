@@ -51,7 +51,7 @@ class Machine:
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Machine:
     root = tmp_path / "Müller & Söhne"
     root.mkdir()
-    for name in ("pyproject.toml", *run.LOCKS["development"]):
+    for name in ("pyproject.toml", run.SETUP, *run.LOCKS["development"]):
         (root / name).write_text("[project]", encoding="utf-8")
     machine = Machine(root)
     monkeypatch.setattr(run.subprocess, "run", machine.run)
@@ -82,11 +82,15 @@ def test_tests_add_to_the_environment_of_the_program(machine: Machine) -> None:
 def test_all_that_is_installed_is_what_the_lock_files_hold(machine: Machine) -> None:
     commands = machine.commands_of_set_up("program")
 
-    assert commands[-2].endswith("--require-hashes --requirement requirements.lock")
-    assert "--no-deps" in commands[-1]
+    setup, program, own = commands[-3:]
+    assert setup.endswith("--require-hashes --requirement requirements-setup.lock")
+    assert program.endswith("--require-hashes --requirement requirements.lock")
+    assert "--no-deps --no-build-isolation" in own  # built by what was just installed
 
 
-@pytest.mark.parametrize("changed", ["pyproject.toml", "requirements.lock"])
+@pytest.mark.parametrize(
+    "changed", ["pyproject.toml", "requirements.lock", "requirements-setup.lock"]
+)
 def test_a_changed_file_is_installed_into_the_same_environment(
     machine: Machine, changed: str
 ) -> None:
