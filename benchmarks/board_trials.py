@@ -41,7 +41,7 @@ from lightpen.intrinsics.distortion import FEW, PULLS, fit_camera
 from lightpen.intrinsics.effects import MixedFit, fit_effects
 from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.start import BoardPoses, start_camera
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
 from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
@@ -75,7 +75,6 @@ FIELD = 0.005, 0.06  # px
 LENGTH = 0.15, 0.5  # of the image's width
 SMOOTH = 0.0, 0.02  # px
 NORMAL_95 = 1.959964
-TOLERANCES = BoardTolerances()
 
 
 class Trial(NamedTuple):
@@ -190,7 +189,7 @@ def run_trial(seed: int, *, rendered: bool, size: str = "400x300") -> Trial | st
     draw = render_points if rendered else draw_points
     views = _views(camera, board, draw(camera, board, poses, field, rng))
     try:
-        found = calibrate_camera(views, TOLERANCES)
+        found = calibrate_camera(views)
     except CalibrationError as error:
         return error.message.code
     if found.choice.n_coefficients != FEW:
@@ -226,14 +225,13 @@ def photographed(seed: int) -> Views:
 def seems_changed(seed: int) -> bool:
     """Return whether the camera of `photographed` views is said to have changed."""
     views = photographed(seed)
-    tolerances = BoardTolerances(flatness=5.0)
-    fitted = fit_camera(views, tolerances, start_camera(views, FEW))
+    fitted = fit_camera(views, start_camera(views, FEW))
     kept = without_outliers(views, fitted)
-    fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
+    fitted = fit_camera(kept, fitted.state.cameras[0])
     try:
         return find_change(fit_effects(kept, fitted).adjustment) is not None
     except CalibrationError:  # it folds the corners: as `calibrate_camera` draws it in
-        fitted = fit_camera(kept, tolerances, fitted.state.cameras[0], PULLS[-1])
+        fitted = fit_camera(kept, fitted.state.cameras[0], PULLS[-1])
         return find_change(fit_effects(kept, fitted).adjustment) is not None
 
 
@@ -257,7 +255,7 @@ def _halves(found: CameraCalibration, rng: np.random.Generator) -> FloatArray:
 
 
 def _fit(views: Views, near: BoardFit) -> MixedFit:
-    return fit_effects(views, fit_camera(views, TOLERANCES, near.state.cameras[0]))
+    return fit_effects(views, fit_camera(views, near.state.cameras[0]))
 
 
 def _views(camera: Camera, board: Board, pixels: FloatArray) -> Views:

@@ -23,7 +23,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import calibrate_camera
 from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
@@ -35,7 +35,6 @@ from lightpen.simulator.swings import (
     swing_poses,
 )
 
-TOLERANCES = BoardTolerances()
 SET_BOARD = "chessboard:11x8:20"
 FOCAL_LIMIT, CENTER_LIMIT, RMS_LIMIT, N_VIEWS = 0.15, 0.4, 0.03, 24  # px
 N_TRIALS, N_SETS = 240, 200
@@ -79,7 +78,7 @@ def _of_set(data: Path) -> Row:
     truth = read_camera(data / "chessboard" / "camera_truth.yaml")
     source = find_images(str(data / "chessboard"))
     observed = observe_board(source, parse_board(SET_BOARD), lambda fraction: None)
-    found = calibrate_camera(observed.views, TOLERANCES)
+    found = calibrate_camera(observed.views)
     assert found.camera.covariance is not None
     errors = found.camera.intrinsics - truth.intrinsics
     sigmas = np.sqrt(np.diag(found.camera.covariance))
@@ -183,7 +182,7 @@ def _timed(what: str, folder: str, word: str) -> Row:
     start = time.process_time()
     observed = observe_board(find_images(folder), board, lambda fraction: None)
     searched = time.process_time() - start
-    calibrate_camera(observed.views, TOLERANCES)
+    calibrate_camera(observed.views)
     taken = time.process_time() - start
     theirs = _time_of_opencv(folder, board)
     return Row(
@@ -241,6 +240,6 @@ def _tip_deviations(part: int) -> FloatArray:
 
 def _calibrated(views: Views) -> Camera:
     try:
-        return calibrate_camera(views, TOLERANCES).camera
+        return calibrate_camera(views).camera
     except CalibrationError as error:
         raise RuntimeError(f"A set of boards was refused: {error}") from error

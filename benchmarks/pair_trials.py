@@ -15,7 +15,6 @@ from benchmarks.board_trials import (
     CAMERA,
     NORMAL_95,
     STREAM,
-    TOLERANCES,
     draw_field,
     draw_uneven,
     observe_points,
@@ -77,7 +76,7 @@ def run_pair_trial(seed: int) -> FloatArray | str:
     """
     rng = np.random.default_rng([STREAM, 1, seed])
     try:
-        rig = calibrate_pair(draw_pair(rng), TOLERANCES, ("left", "right")).rig
+        rig = calibrate_pair(draw_pair(rng), ("left", "right")).rig
     except CalibrationError as error:
         return error.message.code
     assert rig.covariance is not None

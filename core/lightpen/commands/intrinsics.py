@@ -27,7 +27,7 @@ from lightpen.formats.rig_files import write_rig
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import calibrate_camera
 from lightpen.intrinsics.observing import observe_board, observe_board_of_rig
-from lightpen.intrinsics.pair import calibrate_pair
+from lightpen.intrinsics.pair import SCALE_SIGMA, calibrate_pair
 from lightpen.intrinsics.report import (
     intrinsics_record,
     intrinsics_text,
@@ -35,11 +35,9 @@ from lightpen.intrinsics.report import (
     pair_text,
 )
 from lightpen.intrinsics.scale_check import ScaleCheck
-from lightpen.intrinsics.views import BoardTolerances
 from lightpen.local_time import local_now
 from lightpen.messages import printable
 
-USUAL = BoardTolerances()
 SIDES = ("left", "right")
 
 
@@ -121,18 +119,11 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         "(distance, diameter), asymmetric-circles:4x11:20:10",
     )
     parser.add_argument(
-        "--flatness",
-        type=number_from(1e-6, 10.0, "uncertainty", "mm"),
-        default=USUAL.flatness,
-        metavar="MM",
-        help=f"standard uncertainty of the board flatness ({USUAL.flatness:g})",
-    )
-    parser.add_argument(
         "--scale-sigma",
         type=number_from(1e-9, 0.1, "share", "of 1"),
-        default=USUAL.scale,
+        default=SCALE_SIGMA,
         metavar="SHARE",
-        help=f"relative standard uncertainty of the board's scale ({USUAL.scale:g})",
+        help=f"relative standard uncertainty of the board's scale ({SCALE_SIGMA:g})",
     )
     parser.add_argument(
         "--measured",
@@ -153,18 +144,18 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _board(options: argparse.Namespace) -> tuple[Board, BoardTolerances]:
-    """Return the board in mm, with its measured scale if any, and its tolerances."""
+def _board(options: argparse.Namespace) -> tuple[Board, float]:
+    """Return the board in mm, with its measured scale if any, and the scale's sigma."""
     board, scale = parse_board(options.board), options.scale_sigma
     if options.measured:
         check = ScaleCheck(*options.measured)
         board, scale = check.scaled(board), check.sigma
-    return board, BoardTolerances(flatness=options.flatness, scale=scale)
+    return board, scale
 
 
 @printing
 def _intrinsics(options: argparse.Namespace) -> None:
-    board, tolerances = _board(options)
+    board, _ = _board(options)
     source = images_at(*options.images)
     require_other_file(options.json, *source.files, options.out)
     _require_new_file(options.out, *source.files)
@@ -174,7 +165,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
         _require_known(options.leave_out, source.names)
         kept = ~np.isin(views.names, options.leave_out)
         calibration = calibrate_camera(
-            views.chosen(kept), tolerances, local_now().date(), _part(report, 0.7, 1.0)
+            views.chosen(kept), local_now().date(), _part(report, 0.7, 1.0)
         )
     camera = replace(
         calibration.camera, serial=options.serial, temperature_c=options.temperature
@@ -183,13 +174,13 @@ def _intrinsics(options: argparse.Namespace) -> None:
     print(shown(intrinsics_text(calibration, observed)))
     print(shown(f"\nThe intrinsics file is {options.out}."))
     if options.json is not None:
-        record = intrinsics_record(calibration, observed.unseen, tolerances)
+        record = intrinsics_record(calibration, observed.unseen)
         write_record(options.json, plain(record))
 
 
 @printing
 def _extrinsics(options: argparse.Namespace) -> None:
-    board, tolerances = _board(options)
+    board, scale_sigma = _board(options)
     names = (options.names[0], options.names[1])
     _require_names(names)
     sources = [images_at(options.left), images_at(options.right)]
@@ -213,7 +204,7 @@ def _extrinsics(options: argparse.Namespace) -> None:
                 seen_width=size[0],
                 seen_height=size[1],
             )
-    calibration = calibrate_pair(observed.views, tolerances, names, cameras)
+    calibration = calibrate_pair(observed.views, names, cameras, scale_sigma)
     written = list(given)
     if not written:
         for name, camera in zip(names, calibration.rig.cameras, strict=True):
@@ -233,7 +224,7 @@ def _extrinsics(options: argparse.Namespace) -> None:
     print(shown(pair_text(calibration, observed)))
     print(shown(f"\nThe rig file is {options.out}."))
     if options.json is not None:
-        record = pair_record(calibration, observed, tolerances)
+        record = pair_record(calibration, observed)
         write_record(options.json, plain(record))
 
 

@@ -35,7 +35,7 @@ from lightpen.intrinsics.board_fit import (
 )
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.start import BoardPoses
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_centroids
 from lightpen.model.rigid import rotation_from_vector, skew
@@ -46,6 +46,8 @@ FIRST_DAMPING = 1e-3
 CONVERGED = 1e-6  # of the sum of squares: a thousandth of a standard uncertainty
 FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
 NOISE_ROUNDS = 3
+# Standard deviations of a board's shape, which the views tell: relative, and mm.
+SQUARENESS, FLATNESS = 0.1, 5.0
 VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
 
 
@@ -73,10 +75,7 @@ class LinearSight(NamedTuple):
 
 
 def adjust_board(
-    views: Views,
-    start: BoardState,
-    tolerances: BoardTolerances,
-    stated: tuple[FloatArray | None, ...] = (),
+    views: Views, start: BoardState, stated: tuple[FloatArray | None, ...] = ()
 ) -> BoardFit:
     """Fit everything to the points of all views.
 
@@ -89,7 +88,7 @@ def adjust_board(
     stated : tuple of (4 + n, 4 + n) array or None
         Information of the intrinsics of each camera beside the views; none where None.
     """
-    prior = _prior(start, tolerances, stated)
+    prior = _prior(start, stated)
     origin, state = start, start
     sigma = max(_rms(board_residuals(views, state)), FINEST)
     for _ in range(NOISE_ROUNDS):
@@ -354,17 +353,13 @@ def linearise(
         yield LinearSight(left, shared, own, by_board)
 
 
-def _prior(
-    start: BoardState,
-    tolerances: BoardTolerances,
-    stated: tuple[FloatArray | None, ...],
-) -> FloatArray:
+def _prior(start: BoardState, stated: tuple[FloatArray | None, ...]) -> FloatArray:
     places = places_at(start.cameras)
     information = np.zeros((places.stop + N_SHAPE,) * 2)
     for at, known in zip(intrinsics_at(start.cameras), stated, strict=False):
         if known is not None:
             information[at, at] = known
-    sigmas = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
+    sigmas = np.repeat([SQUARENESS, FLATNESS], [2, 3])
     information[places.stop :, places.stop :] = np.diag(sigmas**-2.0)
     return information
 

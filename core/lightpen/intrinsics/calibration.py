@@ -17,19 +17,13 @@ from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.changes import (
     FEWEST,
-    ROTATED,
-    UPRIGHT,
     CameraChange,
-    are_rotated,
     change_error,
     changed_camera,
     find_change,
-    held_out_ratios,
+    find_rotated,
     message_on_change,
     rotated_message,
-    rotated_ratios,
-    seem_rotated,
-    settled_change,
 )
 from lightpen.intrinsics.distortion import (
     FEW,
@@ -42,7 +36,7 @@ from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplic
 from lightpen.intrinsics.effects import MixedFit, fit_effects
 from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
@@ -57,11 +51,10 @@ WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
 UNCERTAIN = 0.005  # of the image's longer side, of projections over the image
 FARTHEST = np.tan(np.radians(84.0))  # in the normalised plane
 MIN_POINTS = 6  # of a view
-MAX_ROUNDS = 5  # of setting aside rotated images
 LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
-CONTRADICTED = 3.0  # times the tolerances of a board
-RELEASED, RELEASED_MM = 0.1, 5.0  # tolerances of a contradicted board
+CONTRADICTED = 3.0  # standard uncertainties of the shape of a board
+BENT = 0.3  # mm, beyond its uncertainty
 STRETCHED = 3e-3  # relative, beyond its uncertainty
 USUAL_SIDES = 10.0, 3000.0  # mm, of a board
 
@@ -109,7 +102,6 @@ class _Found:
 
 def calibrate_camera(
     views: Views,
-    tolerances: BoardTolerances,
     calibrated_on: date | None = None,
     report: Callable[[float], None] = lambda fraction: None,
 ) -> CameraCalibration:
@@ -131,7 +123,7 @@ def calibrate_camera(
             "intrinsics.few-distinct", n_views=views.n_views, least=MIN_VIEWS
         )
     require_views(views)
-    first = fit_camera(views, tolerances, start)
+    first, remarks = fit_camera(views, start), []
     report(0.1)
     try:
         kept = without_outliers(views, first)
@@ -140,53 +132,50 @@ def calibrate_camera(
         if change is not None and change.is_clear:
             raise change_error(change, views.names) from error
         raise
-    found = _calibrated(kept, tolerances, first, report)
-    found = _without_rotated(views, tolerances, found, report)
+    found = _calibrated(kept, first, report)
+    rotated = find_rotated(views, found.effects.adjustment, found.change)
+    if rotated.any():
+        remarks.append(rotated_message(views.names, rotated))
+        if rotated.sum() >= FEWEST:
+            raise CalibrationError(remarks[0])
+        views = views.chosen(~rotated)
+        first = fit_camera(views, found.effects.adjustment.state.cameras[0])
+        found = _calibrated(without_outliers(views, first), first, report)
     change = found.change
     if change is not None and change.is_clear:
         if change.is_gradual or change.fewer.sum() >= FEWEST:
-            if not (change.is_gradual or change.is_step):
-                change = settled_change(found.views, tolerances, change)
             raise change_error(change, found.views.names)
-        remark = message_on_change(change, found.views.names)
+        remarks.append(message_on_change(change, found.views.names))
         others = found.views.chosen(~change.fewer)
-        found = _calibrated(others, tolerances, found.effects.adjustment, report)
-        found = replace(found, remarks=(remark, *found.remarks))
+        found = _calibrated(others, found.effects.adjustment, report)
     report(1.0)
+    found = replace(found, remarks=(*remarks, *found.remarks))
     return _result(given, duplicates, found, calibrated_on)
 
 
 def _calibrated(
-    views: Views,
-    tolerances: BoardTolerances,
-    near: BoardFit,
-    report: Callable[[float], None],
+    views: Views, near: BoardFit, report: Callable[[float], None]
 ) -> _Found:
     require_views(views)
-    fitted = fit_camera(views, tolerances, near.state.cameras[0])
-    sizes = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
-    stated = tolerances
-    if np.any(np.abs(fitted.state.shape) > CONTRADICTED * sizes):
-        tolerances = replace(tolerances, flatness=RELEASED_MM, squareness=RELEASED)
-        fitted = fit_camera(views, tolerances, fitted.state.cameras[0])
+    fitted = fit_camera(views, near.state.cameras[0])
     report(0.2)
-    choice, fitted = choose_distortion(views, tolerances, fitted, report)
+    choice, fitted = choose_distortion(views, fitted, report)
     remarks = [*_message_on_alike(fitted)]
-    choice, effects = _fit_unfolded(views, tolerances, choice, fitted)
+    choice, effects = _fit_unfolded(views, choice, fitted)
     report(0.9)
     fit = effects.adjustment
-    remarks += [*_messages_on_board(fit, stated), *_message_on_projection(fit, choice)]
+    remarks += [*_messages_on_board(fit), *_message_on_projection(fit)]
     return _Found(views, choice, effects, find_change(fit), tuple(remarks))
 
 
 def _fit_unfolded(
-    views: Views, tolerances: BoardTolerances, choice: Choice, fitted: BoardFit
+    views: Views, choice: Choice, fitted: BoardFit
 ) -> tuple[Choice, MixedFit]:
     """Return the fit with effects; they may fold the image where the fit does not."""
     near = fitted.state.cameras[0]
     for pull in choice.pulls:
         if pull != choice.pull:
-            fitted = fit_camera(views, tolerances, near, pull)
+            fitted = fit_camera(views, near, pull)
         try:
             effects = fit_effects(views, fitted)
         except CalibrationError as error:
@@ -196,44 +185,6 @@ def _fit_unfolded(
         if not effects.adjustment.state.cameras[0].folded_share:
             return replace(choice, pull=pull), effects
     raise CalibrationError("intrinsics.folds")
-
-
-def _without_rotated(
-    views: Views,
-    tolerances: BoardTolerances,
-    found: _Found,
-    report: Callable[[float], None],
-) -> _Found:
-    """Return the camera without rotated images, which are a finding if they are few."""
-    fit = found.effects.adjustment
-    ratios, again = rotated_ratios(views, fit), found
-    members = np.isin(views.names, found.views.names)
-    away = np.zeros(views.n_views, dtype=np.bool_)
-    for _ in range(MAX_ROUNDS):
-        if np.median(ratios) < UPRIGHT:
-            return found
-        doubted = (seem_rotated(ratios) | away.any())[members]
-        if doubted.any():
-            ratios[np.flatnonzero(members)[doubted]] = held_out_ratios(
-                again.views, fit, doubted
-            )
-        before, away = away, seem_rotated(ratios)
-        if ratios.min() > ROTATED or (~away).sum() < MIN_VIEWS:
-            return found
-        if np.array_equal(before, away):
-            break
-        again, members = (
-            _calibrated(views.chosen(~away), tolerances, fit, report),
-            ~away,
-        )
-        fit = again.effects.adjustment
-        ratios = rotated_ratios(views, fit)
-    if not are_rotated(ratios, away):
-        return found
-    remark = rotated_message(views.names, away)
-    if away.sum() >= FEWEST:
-        raise CalibrationError(remark)
-    return replace(again, remarks=(remark, *again.remarks))
 
 
 def _result(
@@ -315,10 +266,8 @@ def without_outliers(views: Views, fitted: BoardFit) -> Views:
     return left
 
 
-def _messages_on_board(
-    fitted: BoardFit, tolerances: BoardTolerances
-) -> tuple[Message, ...]:
-    """Return messages on a board that contradicts its tolerances."""
+def _messages_on_board(fitted: BoardFit) -> tuple[Message, ...]:
+    """Return messages on a board that is not as it should be."""
     shape, sigmas = fitted.state.shape, np.sqrt(np.diag(fitted.covariance))
     beyond = np.abs(shape) - CONTRADICTED * sigmas[fitted.of_shape]
     stretch, shear = shape[:2].tolist()
@@ -332,10 +281,9 @@ def _messages_on_board(
                 shear=float(np.degrees(shear)),
             )
         )
-    if beyond[2:].max() > CONTRADICTED * tolerances.flatness:
+    if beyond[2:].max() > BENT:
         bend = float(np.abs(shape[2:]).max())
-        stated = tolerances.flatness
-        remarks.append(message("intrinsics.board-bent", bend=bend, stated=stated))
+        remarks.append(message("intrinsics.board-bent", bend=bend))
     return tuple(remarks)
 
 
@@ -350,11 +298,10 @@ def messages_on_size(board: Board) -> tuple[Message, ...]:
     )
 
 
-def _message_on_projection(fitted: BoardFit, choice: Choice) -> tuple[Message, ...]:
+def _message_on_projection(fitted: BoardFit) -> tuple[Message, ...]:
     """Return the message on a lens that the views leave open."""
     camera, at = fitted.state.cameras[0], fitted.of_intrinsics(0)
     px = map_uncertainty(camera, fitted.covariance[at, at]).typical
-    px = float(np.hypot(px, choice.apart))
     if px < UNCERTAIN * max(camera.image_size):
         return ()
     return (message("intrinsics.uncertain", px=px),)

@@ -11,16 +11,16 @@ from lightpen.intrinsics.adjustment import adjust_board
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS
-from lightpen.intrinsics.coverage import cells_of
 from lightpen.intrinsics.distortion import FEW
 from lightpen.intrinsics.next_view import choose_next_view, first_views
 from lightpen.intrinsics.start import start_board_poses, start_camera
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 
 STILL = 0.0015  # of the image's longer side, between detections, rms
 STILL_TIME = 0.4  # s
 NEW = 0.05  # of the image's longer side, from each captured view, rms
 MAX_VIEWS = 60
+COLUMNS, ROWS = 8, 6  # of cells that the image is divided into
 
 
 class BoardVisibility(StrEnum):
@@ -78,6 +78,16 @@ class Capture:
         return cells_of(self.views)
 
 
+def cells_of(views: Views) -> IntArray:
+    """Return the number of points of one camera in each cell of the image, (6, 8)."""
+    places = views.pixels[views.seen] / np.array(views.image_sizes[0])
+    at = np.floor(places * np.array([COLUMNS, ROWS])).astype(np.int64)
+    at = np.clip(at, 0, [COLUMNS - 1, ROWS - 1])
+    cells = np.zeros((ROWS, COLUMNS), dtype=np.int64)
+    np.add.at(cells, (at[:, 1], at[:, 0]), 1)
+    return cells
+
+
 def wanted_outline(capture: Capture) -> FloatArray:
     """Return the suggested outline of the board, (4, 2), px, from its first corner on.
 
@@ -96,7 +106,7 @@ def wanted_outline(capture: Capture) -> FloatArray:
         np.zeros(N_SHAPE),
     )
     try:
-        fitted = adjust_board(views, state, BoardTolerances())
+        fitted = adjust_board(views, state)
         return choose_next_view(fitted, capture.board).outline
     except CalibrationError:  # they are alike
         return guesses[views.n_views % MIN_VIEWS]

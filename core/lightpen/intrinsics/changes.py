@@ -19,9 +19,10 @@ from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import fit_board_poses
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.distortion import fit_camera
+from lightpen.intrinsics.effects import held_out_errors
 from lightpen.intrinsics.start import start_board_poses
 from lightpen.intrinsics.uncertainty_map import moved_in_image
-from lightpen.intrinsics.views import BoardTolerances, Views, listed_names
+from lightpen.intrinsics.views import Views, listed_names
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 
@@ -33,8 +34,10 @@ USELESS = 0.001  # of the image's longer side, by which a change moves the image
 MAX_ROUNDS = 10
 N_WAYS = 3  # zoom and shift of the principal point along x and y
 RIDGE = 1e-10  # of a normal matrix scaled to ones
-ROTATED, UPRIGHT = 0.6, 1.2  # residuals of a rotated view over those as it is
-SUSPECT = 0.45  # of the median of these: a view that may be rotated
+# Residuals of a rotated view as it was, of others rotated, over those as they are.
+ROTATED, UPRIGHT = 1.6, 1.2
+BETTER, NEARLY = 1.1, 0.9  # ratio of the errors, and its share of that by a change
+SUSPECT, N_DRAWN = 0.45, 2  # of the median, of a view that may be; first rounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,71 +211,74 @@ def _settled_groups(views: _ViewEquations, share: FloatArray) -> FloatArray:
     return share
 
 
-def rotated_ratios(views: Views, fitted: BoardFit) -> FloatArray:
-    """Return the residuals of views if rotated by 180 degrees, over those as they are.
+def find_rotated(
+    views: Views, fitted: BoardFit, change: CameraChange | None
+) -> BoolArray:
+    """Return which views are of images rotated by 180 degrees, (V,).
 
-    By a known camera and board, (V,); ones where the camera does not image them.
+    Views that fit better so are turned round until all fit one camera, each by the
+    others in the end. They count as rotated, the fewer of them, where they fit much
+    better than as they were, and views are predicted better, as by a change of the
+    camera.
     """
+    none = np.zeros(views.n_views, dtype=np.bool_)
+    turned, now, offsets = none, fitted, fitted.state.offsets
     try:
-        turned, upright = (
-            _by_poses(each, fitted).view_rms[:, 0] for each in (_rotated(views), views)
-        )
-    except CalibrationError:
-        return np.ones(views.n_views)
-    return np.asarray(turned / upright)
+        for n_done in range(MAX_ROUNDS):
+            ratio = _ratios(views, turned, now, n_done >= N_DRAWN)
+            # At first the camera is between those of both; what is wrong draws it.
+            suspect = SUSPECT * float(np.median(ratio)) if n_done < N_DRAWN else 1.0
+            before, turned = turned, turned ^ (ratio < max(suspect, 1.0))
+            if np.array_equal(before, turned) and n_done != N_DRAWN - 1:
+                break
+            camera = now.state.cameras[0]
+            now = fit_camera(_turned(views, turned), camera, offsets=offsets)
+        if not turned.any() or turned.all() or np.median(ratio[turned]) < ROTATED:
+            return none
+        errors = held_out_errors(views, fit_camera(views, camera, offsets=offsets))
+        less = held_out_errors(_turned(views, turned), now)
+    except CalibrationError:  # the camera does not image them so
+        return none
+    better = float(np.sqrt(np.mean(errors**2) / np.mean(less**2)))
+    least = BETTER if change is None else max(BETTER, NEARLY * change.ratio)
+    is_rotated = better > least and np.median(ratio[~turned]) > UPRIGHT
+    return min(turned, ~turned, key=np.count_nonzero) if is_rotated else none
 
 
-def held_out_ratios(views: Views, fitted: BoardFit, which: BoolArray) -> FloatArray:
-    """Return `rotated_ratios` of some views of a fit, each by the others alone."""
-    steps, camera = _ViewEquations.of(fitted).without_each(), fitted.state.cameras[0]
-    ratios = []
-    for v in np.flatnonzero(which):
-        step = steps[v, : len(camera.intrinsics)]
+def _ratios(
+    views: Views, turned: BoolArray, fitted: BoardFit, by_others: bool
+) -> FloatArray:
+    """Return the residuals of views if turned otherwise, over those as they are, (V,).
+
+    Each by all views, or by the others alone.
+    """
+    own, other = _turned(views, turned), _turned(views, ~turned)
+    if not by_others:
+        rms = [_by_poses(each, fitted).view_rms[:, 0] for each in (other, own)]
+        return np.asarray(rms[0] / rms[1])
+    camera, ratios = fitted.state.cameras[0], []
+    steps = _ViewEquations.of(fitted).without_each()[:, : len(camera.intrinsics)]
+    for v, step in enumerate(steps):
         cameras = (camera.with_intrinsics(camera.intrinsics + step),)
-        own = replace(fitted, state=replace(fitted.state, cameras=cameras))
-        alone = views.chosen(np.arange(views.n_views) == v)
-        ratios.append(rotated_ratios(alone, own)[0])
+        near = replace(fitted, state=replace(fitted.state, cameras=cameras))
+        alone = np.arange(views.n_views) == v
+        rms = [_by_poses(e.chosen(alone), near).view_rms[0, 0] for e in (other, own)]
+        ratios.append(rms[0] / rms[1])
     return np.array(ratios)
 
 
-def seem_rotated(ratios: FloatArray) -> BoolArray:
-    """Return which views may be rotated, given `rotated_ratios` by all of them."""
-    return np.asarray(ratios < max(1.0, SUSPECT * float(np.median(ratios))))
-
-
-def are_rotated(ratios: FloatArray, which: BoolArray) -> bool:
-    """Return whether some views are rotated, given `rotated_ratios` by the others."""
-    usual = float(np.median(ratios[~which]))
-    return bool(np.all(ratios[which] < ROTATED)) and usual > UPRIGHT
-
-
-def _rotated(views: Views) -> Views:
-    return replace(views, pixels=np.array(views.image_sizes[0]) - 1.0 - views.pixels)
+def _turned(views: Views, which: BoolArray) -> Views:
+    """Return the views with the images of some rotated by 180 degrees."""
+    other = np.array(views.image_sizes[0]) - 1.0 - views.pixels
+    return replace(
+        views, pixels=np.where(which[:, None, None, None], other, views.pixels)
+    )
 
 
 def _by_poses(views: Views, fitted: BoardFit) -> BoardFit:
     """Return the fit of the poses of views before a known camera and board."""
     poses = start_board_poses(fitted.state.cameras[0], views)
     return fit_board_poses(views, replace(fitted.state, poses=poses))
-
-
-def settled_change(
-    views: Views, tolerances: BoardTolerances, change: CameraChange
-) -> CameraChange:
-    """Return a change after views have moved to the camera that fits them better."""
-    share, cameras = change.share, change.settings
-    for _ in range(MAX_ROUNDS):
-        fits = [
-            fit_camera(views.chosen(share == part), tolerances, camera)
-            for part, camera in zip((0.0, 1.0), cameras, strict=True)
-        ]
-        one, other = (_by_poses(views, fit).view_rms[:, 0] for fit in fits)
-        cameras = fits[0].state.cameras[0], fits[1].state.cameras[0]
-        now = (other < one).astype(np.float64)
-        if np.array_equal(now, share) or not FEWEST <= now.sum() <= len(now) - FEWEST:
-            break
-        share = now
-    return replace(change, share=share, settings=cameras)
 
 
 def change_error(change: CameraChange, names: tuple[str, ...]) -> CalibrationError:

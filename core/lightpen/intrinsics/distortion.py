@@ -18,8 +18,7 @@ from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.effects import held_out_errors
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
-from lightpen.intrinsics.uncertainty_map import apart_in_image
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
 
@@ -32,6 +31,7 @@ WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
 LARGE = 10.0  # of a coefficient, if the views do not determine it
 ALIKE = 1.5  # times the held-out error: another model that is near to the views
 SIGMAS = 2.0  # of the gain of all views
+NOWHERE = np.zeros(3)
 MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
 
@@ -45,9 +45,6 @@ class Choice:
     # Prior standard deviation of k3, or of k4 k5 k6, that keeps the image from folding;
     # None if it does not fold.
     pull: float | None = None
-    # Distance of the images by this model and by another that fits a wide lens as well,
-    # px rms; largest where no view shows the board.
-    apart: float = 0.0
 
     @property
     def message(self) -> Message:
@@ -140,10 +137,7 @@ def _other_model(n_coefficients: int, rms: float) -> Message:
 
 
 def choose_distortion(
-    views: Views,
-    tolerances: BoardTolerances,
-    fitted: BoardFit,
-    report: Callable[[float], None],
+    views: Views, fitted: BoardFit, report: Callable[[float], None]
 ) -> tuple[Choice, BoardFit]:
     """Return the lens model and its fit.
 
@@ -152,10 +146,9 @@ def choose_distortion(
     first = _Drawn(fitted, None)
     is_plain = first.camera.lens is LensModel.BROWN
     if is_plain and first.camera.folded_share:
-        first = _unfolded(views, tolerances, first.camera) or first
+        first = _unfolded(views, first.camera) or first
     best, errors = first, held_out_errors(views, first.fitted)
     held_out = {best.n_coefficients: rms_together(errors, views)}
-    tried = {best.n_coefficients: best.camera}
     is_off = is_wide(first.camera, views.pixels[:, 0])
     others = []
     if is_plain and _promises_more(views, first.fitted, errors):
@@ -167,12 +160,11 @@ def choose_distortion(
     for done, n in enumerate(others, 1):
         report(0.4 + 0.4 * done / len(others))
         with suppress(CalibrationError):  # the views do not determine so many
-            trial = _trial(views, tolerances, first.fitted, n)
+            trial = _trial(views, first.fitted, n)
             if trial is None:
                 continue
             trial_errors = held_out_errors(views, trial.fitted)
-            rms = rms_together(trial_errors, views)
-            held_out[n], tried[n] = rms, trial.camera
+            rms = held_out[n] = rms_together(trial_errors, views)
             before = held_out[best.n_coefficients]
             if n == FEW:  # the plain lens, unless contradicted
                 is_better = not is_significantly_less(before, rms, errors, trial_errors)
@@ -181,13 +173,7 @@ def choose_distortion(
             if is_better:
                 best, errors = trial, trial_errors
     report(0.8)
-    own = best.n_coefficients
-    another = {FEW: FISHEYE, FISHEYE: FEW}.get(own, own)
-    apart = 0.0
-    if another in tried and held_out[another] < ALIKE * held_out[own]:
-        seen = views.pixels[views.seen]
-        apart = apart_in_image(best.camera, tried[another], seen)
-    return Choice(own, held_out, best.pull, apart), best.fitted
+    return Choice(best.n_coefficients, held_out, best.pull), best.fitted
 
 
 def _promises_more(views: Views, fitted: BoardFit, errors: FloatArray) -> bool:
@@ -237,33 +223,29 @@ def is_wide(camera: Camera, pixels: FloatArray) -> bool:
     return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
 
 
-def _trial(
-    views: Views, tolerances: BoardTolerances, first: BoardFit, n_coefficients: int
-) -> "_Drawn | None":
+def _trial(views: Views, first: BoardFit, n_coefficients: int) -> "_Drawn | None":
     """Return the fit with another lens model, started from a fit."""
     camera = first.state.cameras[0]
     if n_coefficients != MANY:
         near = convert_lens(camera, n_coefficients)
         most = ALIKE * first.rms
-        return None if near is None else _fit_whole(views, tolerances, near, most)
+        return None if near is None else _fit_whole(views, near, most)
     few = camera if camera.lens is LensModel.BROWN else convert_lens(camera, FEW)
     if few is None:
         near = convert_lens(camera, MANY)
-        return None if near is None else _fit_whole(views, tolerances, near)
+        return None if near is None else _fit_whole(views, near)
     more = np.append(few.distortion, np.zeros(MANY - FEW))
-    return _fit_whole(views, tolerances, replace(few, distortion=more))
+    return _fit_whole(views, replace(few, distortion=more))
 
 
-def _fit_whole(
-    views: Views, tolerances: BoardTolerances, near: Camera, most: float = np.inf
-) -> "_Drawn | None":
+def _fit_whole(views: Views, near: Camera, most: float = np.inf) -> "_Drawn | None":
     """Return the fit with the weakest prior that does not fold the image.
 
     Just the strongest one if the residuals are more than `most` without any, px rms.
     """
     pulls: tuple[float, ...] = PULLS
     try:
-        free = _Drawn(fit_camera(views, tolerances, near), None)
+        free = _Drawn(fit_camera(views, near), None)
         if not free.camera.folded_share:
             return free
         pulls = PULLS if free.fitted.rms < most else PULLS[-1:]
@@ -271,13 +253,16 @@ def _fit_whole(
         if len(near.distortion) != MANY:
             raise
     is_fisheye = near.lens is LensModel.KANNALA_BRANDT
-    return None if is_fisheye else _unfolded(views, tolerances, near, pulls)
+    return None if is_fisheye else _unfolded(views, near, pulls)
 
 
 def fit_camera(
-    views: Views, tolerances: BoardTolerances, near: Camera, pull: float | None = None
+    views: Views, near: Camera, pull: float | None = None, offsets: FloatArray = NOWHERE
 ) -> BoardFit:
-    """Fit camera, poses and board from an initial camera; see `Choice` for the pull."""
+    """Fit camera, poses and board from an initial camera; see `Choice` for the pull.
+
+    ``offsets`` (N, 3), mm, are those of the points of the board from its shape.
+    """
     known, poses = None, rough_poses(near, views)
     if pull is not None:
         distortion = near.distortion.copy()
@@ -288,9 +273,9 @@ def fit_camera(
         at = 4 + np.array(folding)
         known[at, at] = pull**-2
     state = BoardState(
-        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
+        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE), offsets
     )
-    return adjust_board(views, state, tolerances, (known,))
+    return adjust_board(views, state, (known,))
 
 
 def rms_together(errors: FloatArray, views: Views) -> float:
@@ -316,15 +301,12 @@ class _Drawn:
 
 
 def _unfolded(
-    views: Views,
-    tolerances: BoardTolerances,
-    near: Camera,
-    pulls: tuple[float, ...] = PULLS,
+    views: Views, near: Camera, pulls: tuple[float, ...] = PULLS
 ) -> _Drawn | None:
     """Return the fit with the weakest regularisation that does not fold the image."""
     for pull in pulls:
         try:
-            drawn = _Drawn(fit_camera(views, tolerances, near, pull), pull)
+            drawn = _Drawn(fit_camera(views, near, pull), pull)
         except CalibrationError:  # no convergence with so weak a prior
             continue
         if not drawn.camera.folded_share:

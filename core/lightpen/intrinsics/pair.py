@@ -24,7 +24,7 @@ from lightpen.intrinsics.changes import USELESS
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.effects import without_field
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig, of_camera
@@ -35,6 +35,7 @@ MAX_VOTED = 60  # views that are compared with all
 ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view
 ALIKE_SHIFT = 0.15  # of its distance
 APART = 3.0  # times the noise of each camera alone
+SCALE_SIGMA = 1e-4  # of a board that was not measured, relative; no view tells it
 HELD = 1e20  # information of intrinsics that are not fitted again
 
 
@@ -68,21 +69,20 @@ class PairCalibration:
 
 def calibrate_pair(
     views: Views,
-    tolerances: BoardTolerances,
     names: tuple[str, str],
     cameras: tuple[Camera, ...] = (),
+    scale_sigma: float = SCALE_SIGMA,
 ) -> PairCalibration:
     """Calibrate the extrinsics of the second of two cameras.
 
+    ``scale_sigma`` is the relative standard uncertainty of all lengths of the board.
     ``cameras`` are as in their files; by default they are calibrated by the same views.
     Raises `CalibrationError` if too few views are of both, or they contradict each
     other.
     """
     alone: tuple[CameraCalibration, ...] = ()
     if not cameras:
-        alone = tuple(
-            calibrate_camera(views.of_camera(c), tolerances) for c in range(2)
-        )
+        alone = tuple(calibrate_camera(views.of_camera(c)) for c in range(2))
         cameras = tuple(each.camera for each in alone)
         views = _as_alone(views, alone)
     names_of_all = views.names
@@ -114,7 +114,7 @@ def calibrate_pair(
         offsets,
     )
     held = tuple(HELD * np.eye(len(camera.intrinsics)) for camera in cameras)
-    fitted = adjust_board(views, state, tolerances, held)
+    fitted = adjust_board(views, state, held)
     usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
     moved = _message_on_moved(fitted, usual)
     kept = without_outliers(views, fitted)
@@ -122,9 +122,9 @@ def calibrate_pair(
         which = np.isin(views.names, kept.names)
         poses = BoardPoses(*(each[which] for each in fitted.state.poses))
         views, state = kept, replace(state, poses=poses)
-        fitted = adjust_board(views, state, tolerances, held)
+        fitted = adjust_board(views, state, held)
     rotations, translations = fitted.state.rotations, fitted.state.translations
-    covariance = _covariance(fitted, tolerances)
+    covariance = _covariance(fitted, scale_sigma)
     remarks = [
         of_camera(name, remark)
         for name, each in zip(names, alone, strict=False)
@@ -146,7 +146,7 @@ def calibrate_pair(
     )
 
 
-def _covariance(fitted: BoardFit, tolerances: BoardTolerances) -> FloatArray:
+def _covariance(fitted: BoardFit, scale_sigma: float) -> FloatArray:
     """Return the covariance of the place of the second camera, (6, 6), rad and mm.
 
     What each view changes, its leverage corrected for, as in
@@ -172,7 +172,7 @@ def _covariance(fitted: BoardFit, tolerances: BoardTolerances) -> FloatArray:
             own = by_intrinsics[:, fitted.of_intrinsics(c)]
             covariance = covariance + own @ camera.covariance @ own.T
     shift = fitted.state.translations[1]
-    covariance[3:, 3:] += tolerances.scale**2 * np.outer(shift, shift)
+    covariance[3:, 3:] += scale_sigma**2 * np.outer(shift, shift)
     return np.asarray(0.5 * (covariance + covariance.T))
 
 

@@ -9,13 +9,11 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
-from lightpen.intrinsics.coverage import cover
 from lightpen.intrinsics.distortion import choice_record
 from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
-from lightpen.intrinsics.views import BoardTolerances
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
@@ -92,7 +90,6 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
         f"{'Projection':<{TITLE}}standard uncertainty {uncertain.center:.4f} px in the "
         f"middle, {uncertain.typical:.4f} px over the image, {uncertain.worst:.4f} px "
         "at worst",
-        *_coverage_lines(calibration),
         _board_line(fitted),
         *_remark_lines(calibration.remarks),
     ]
@@ -100,7 +97,7 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
 
 
 def intrinsics_record(
-    calibration: CameraCalibration, unseen: Sequence[str], tolerances: BoardTolerances
+    calibration: CameraCalibration, unseen: Sequence[str]
 ) -> dict[str, Any]:
     """Return the calibration as a record; ``unseen`` names images without the board."""
     camera, fitted = calibration.camera, calibration.adjustment
@@ -108,13 +105,11 @@ def intrinsics_record(
     assert camera.covariance is not None
     uncertain = map_uncertainty(camera, camera.covariance)
     regions = measure_regions(fitted, camera)
-    coverage = cover(views, fitted.state.poses)
     next_view = choose_next_view(fitted, views.board)
     field = calibration.effects.field
     return {
         "kind": "intrinsics",
         "board": views.board.name,
-        "board_assumed": _tolerances_record(tolerances),
         **_camera_record(camera),
         "rms_px": fitted.rms,
         "noise_px": fitted.sigma,
@@ -137,20 +132,12 @@ def intrinsics_record(
             "mean_px": regions.means,
         },
         "board_found": _board_record(fitted),
-        "coverage": {
-            "points": coverage.cells,
-            "share": coverage.share,
-            "tilted_right_down_left_up": coverage.tilted,
-            "missing": coverage.missing,
-        },
         "next_view": {"outline_px": next_view.outline, "gain": next_view.gain},
         "views": [
             {
                 "name": name,
                 "rms_px": fitted.view_rms[v, 0],
                 "held_out_rms_px": calibration.effects.held_out[v],
-                "tilt_deg": float(np.degrees(coverage.tilts[v])),
-                "size_px": coverage.sizes[v],
                 "points": np.flatnonzero(views.seen[v, 0]),
                 "pixels": views.pixels[v, 0][views.seen[v, 0]],
             }
@@ -197,14 +184,13 @@ def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
 
 
 def pair_record(
-    calibration: PairCalibration, observed: ObservedBoard, tolerances: BoardTolerances
+    calibration: PairCalibration, observed: ObservedBoard
 ) -> dict[str, Any]:
     """Return the calibration of two cameras as a record."""
     rig, fitted = calibration.rig, calibration.adjustment
     return {
         "kind": "extrinsics",
         "board": calibration.views.board.name,
-        "board_assumed": _tolerances_record(tolerances),
         "cameras": [
             {"name": name, **_camera_record(camera)}
             for name, camera in zip(rig.names, rig.cameras, strict=True)
@@ -238,16 +224,6 @@ def _left_out_lines(names: tuple[str, ...], why: str) -> list[str]:
     return [f"  left out   {', '.join(names)}: {why}"] if names else []
 
 
-def _coverage_lines(calibration: CameraCalibration) -> list[str]:
-    coverage = cover(calibration.views, calibration.adjustment.state.poses)
-    least, most = np.degrees([coverage.tilts.min(), coverage.tilts.max()])
-    return [
-        f"{'Coverage':<{TITLE}}{coverage.share:.0%} of the image, tilts {least:.0f} to "
-        f"{most:.0f} degrees",
-        *(f"  missing    {each}" for each in coverage.missing),
-    ]
-
-
 def _board_line(fitted: BoardFit) -> str:
     stretch, shear, *bends = fitted.state.shape.tolist()
     return (
@@ -274,14 +250,6 @@ def _camera_record(camera: Camera) -> dict[str, Any]:
         u = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
         record["expanded_uncertainty"] = dict(zip(names, u.tolist(), strict=False))
     return record
-
-
-def _tolerances_record(tolerances: BoardTolerances) -> dict[str, float]:
-    return {
-        "flatness_mm": tolerances.flatness,
-        "squareness": tolerances.squareness,
-        "scale": tolerances.scale,
-    }
 
 
 def _board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:

@@ -79,23 +79,6 @@ def moved_in_image(camera: Camera, difference: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(moves).sum(axis=-1))))
 
 
-def apart_in_image(one: Camera, other: Camera, seen: FloatArray) -> float:
-    """Return how far two cameras image a direction apart over the image, px rms.
-
-    At the pixels ``seen`` (K, 2) they see the same, but for a turn.
-    """
-    grid = _pixels(one).reshape(-1, 2)
-    at = np.concatenate([seen, grid])
-    with np.errstate(all="ignore"):
-        points = np.insert(one.unproject(at), 2, 1.0, axis=1)
-        moves = other.pixels(points[:, :2]) - at
-    by_point = one.project_with_jacobian(points).jacobian
-    turns, n = -by_point @ skew(points), len(seen)
-    turn = np.linalg.lstsq(turns[:n].reshape(-1, 3), moves[:n].ravel(), rcond=None)[0]
-    left = (moves - turns @ turn)[n:][one.sees(grid)]
-    return float(np.sqrt(np.mean(np.square(left).sum(axis=-1))))
-
-
 def _pixels(camera: Camera) -> FloatArray:
     grid = np.meshgrid(
         np.linspace(0, camera.width - 1, COLUMNS),

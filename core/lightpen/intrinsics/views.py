@@ -1,4 +1,4 @@
-"""Views of a board by cameras, and the tolerances of the board."""
+"""Views of a board by cameras."""
 
 from dataclasses import dataclass
 
@@ -13,16 +13,6 @@ SHOWN = 6  # names in a message
 def listed_names(names: tuple[str, ...]) -> str:
     """Return the first names of views as text."""
     return ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
-
-
-@dataclass(frozen=True)
-class BoardTolerances:
-    """Standard uncertainties of a board's geometry, priors of the adjustment."""
-
-    flatness: float = 0.1  # bend of the corners out of the plane, mm
-    # Aspect ratio and right angle, relative; printers stretch the paper.
-    squareness: float = 5e-4
-    scale: float = 1e-4  # relative; no view determines it
 
 
 @dataclass(frozen=True, eq=False)

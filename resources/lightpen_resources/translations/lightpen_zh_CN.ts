@@ -258,49 +258,6 @@
     </message>
 </context>
 <context>
-    <name>BoardProgress</name>
-    <message>
-        <source>X</source>
-        <translation>水平</translation>
-    </message>
-    <message>
-        <source>Y</source>
-        <translation>垂直</translation>
-    </message>
-    <message>
-        <source>Size</source>
-        <translation>大小</translation>
-    </message>
-    <message>
-        <source>Skew</source>
-        <translation>倾斜</translation>
-    </message>
-    <message>
-        <source>at the left and right edges</source>
-        <translation>位于左右边缘</translation>
-    </message>
-    <message>
-        <source>at the top and bottom edges</source>
-        <translation>位于上下边缘</translation>
-    </message>
-    <message>
-        <source>closer to the camera</source>
-        <translation>更靠近相机</translation>
-    </message>
-    <message>
-        <source>tilted</source>
-        <translation>倾斜</translation>
-    </message>
-    <message>
-        <source>Add views {0}.</source>
-        <translation>请增加视图：{0}。</translation>
-    </message>
-    <message>
-        <source>Good: the views vary enough.</source>
-        <translation>良好：视图变化充分。</translation>
-    </message>
-</context>
-<context>
     <name>BoardWindow</name>
     <message>
         <source>Board images</source>
@@ -6343,6 +6300,10 @@ mm</translation>
         <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
     </message>
     <message>
+        <source>The board is bent by {bend:.2f} mm. The bend is taken into account; mount the board on a flat plate.</source>
+        <translation>标定板弯曲 {bend:.2f} mm。计算已计入该弯曲；请将标定板固定在平板上。</translation>
+    </message>
+    <message>
         <source>The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
         <translation>相机稳定：视野中固定的灯在光笔处偏移 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
@@ -6619,14 +6580,6 @@ mm</translation>
         <translation>球心</translation>
     </message>
     <message>
-        <source>bottom left</source>
-        <translation>左下</translation>
-    </message>
-    <message>
-        <source>bottom right</source>
-        <translation>右下</translation>
-    </message>
-    <message>
         <source>camera {number} of {name}</source>
         <translation>{name} 中的第 {number} 台相机</translation>
     </message>
@@ -6637,10 +6590,6 @@ mm</translation>
     <message>
         <source>diameter of the discs</source>
         <translation>发光面的直径</translation>
-    </message>
-    <message>
-        <source>downwards</source>
-        <translation>向下</translation>
     </message>
     <message>
         <source>file</source>
@@ -6801,18 +6750,6 @@ mm</translation>
     <message>
         <source>tip and U for Q-DAS (.dfq)</source>
         <translation>供 Q-DAS 使用的测球中心和 U (.dfq)</translation>
-    </message>
-    <message>
-        <source>top left</source>
-        <translation>左上</translation>
-    </message>
-    <message>
-        <source>top right</source>
-        <translation>右上</translation>
-    </message>
-    <message>
-        <source>upwards</source>
-        <translation>向上</translation>
     </message>
     <message>
         <source>x and y of the LED centres are exchanged</source>
@@ -7755,10 +7692,6 @@ mm</translation>
         <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
     </message>
     <message>
-        <source>All views are from the same distance. Add views with the board nearer.</source>
-        <translation>所有视图的距离都相同。请补充标定板更近的视图。</translation>
-    </message>
-    <message>
         <source>An LED file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.</source>
         <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，触测一段有证书的长度的两端，或在已知距离的第二个锥孔中摆动。</translation>
     </message>
@@ -7921,10 +7854,6 @@ mm</translation>
     <message>
         <source>Features in the part frame / mm, angles / degrees, k = 2</source>
         <translation>工件坐标系中的要素 / mm，角度 / 度，k = 2</translation>
-    </message>
-    <message>
-        <source>Fewer than {least} views have the board tilted {sides}. Add such views.</source>
-        <translation>标定板{sides}倾斜的视图少于 {least} 幅。请补充。</translation>
     </message>
     <message>
         <source>Fisheye model (Kannala-Brandt), cross-validated error {held_out:.4f} px; {others}.</source>
@@ -8227,10 +8156,6 @@ mm</translation>
         <translation>未给出 {name} 的测点。请以 {name}=IMAGES 或同名文件夹给出。</translation>
     </message>
     <message>
-        <source>No view covers these image corners: {corners}. Add such views.</source>
-        <translation>没有视图覆盖图像的这些角：{corners}。请补充。</translation>
-    </message>
-    <message>
         <source>None of the {n_images} images shows the board {board}. The whole board must be in the image, in focus, with a bright border; check its type and number of points.</source>
         <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
     </message>
@@ -8405,10 +8330,6 @@ mm</translation>
     <message>
         <source>The board does not match {board}: lengths along the rows are {stretch:+.2%} longer than along the columns, and right angles deviate by {shear:+.2f}°. It may have been scaled in printing. Print it at true scale, or measure it again.</source>
         <translation>标定板与 {board} 不符：沿行的长度比沿列长 {stretch:+.2%}，直角偏差 {shear:+.2f}°。打印时可能被缩放。请按实际尺寸打印，或重新测量。</translation>
-    </message>
-    <message>
-        <source>The board is bent by {bend:.2f} mm; {stated:.2f} mm was assumed. The bend is taken into account; mount the board on a flat plate.</source>
-        <translation>标定板弯曲 {bend:.2f} mm，假定值为 {stated:.2f} mm。计算中已考虑，但请将其固定在平板上。</translation>
     </message>
     <message>
         <source>The board measures {measured:g} mm where {stated:g} mm are stated. No printer errs by that much: check both lengths and their unit (mm). If the board was printed at another size, state the squares as they are.</source>

@@ -12,7 +12,7 @@ from lightpen.intrinsics.adjustment import fit_board_poses
 from lightpen.intrinsics.distortion import fit_camera
 from lightpen.intrinsics.effects import MixedFit, _inverse, fit_effects
 from lightpen.intrinsics.start import start_board_poses, start_camera
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
 
@@ -22,7 +22,7 @@ NOISE = 0.03  # px, of `make_views`
 
 def fitted(views: Views) -> MixedFit:
     near = start_camera(views, 5)
-    return fit_effects(views, fit_camera(views, BoardTolerances(), near))
+    return fit_effects(views, fit_camera(views, near))
 
 
 def uneven(views: Views, camera: Camera, sigma: float, seed: int = 5) -> Views:
@@ -33,7 +33,7 @@ def uneven(views: Views, camera: Camera, sigma: float, seed: int = 5) -> Views:
 
 def moved(views: Views, camera: Camera, off: FloatArray) -> Views:
     """Return the views of a board with points that are off by that, (N, 2), mm."""
-    state = fit_camera(views, BoardTolerances(), camera).state
+    state = fit_camera(views, camera).state
     points = views.board.points.copy()
     points[:, :2] += off
     poses = state.poses
@@ -75,7 +75,7 @@ def test_noise_alone_leaves_the_covariance_nearly_as_it_is(
     make_views: MakeViews, plain: MixedFit
 ) -> None:
     near = start_camera(make_views(n_views=20), 5)
-    by_noise = fit_camera(make_views(n_views=20), BoardTolerances(), near)
+    by_noise = fit_camera(make_views(n_views=20), near)
     at = by_noise.of_intrinsics(0)
     ratio = np.sqrt(np.diag(plain.adjustment.covariance / by_noise.covariance)[at])
 
@@ -88,7 +88,7 @@ def test_uneven_squares_are_found_and_make_the_camera_better(
 ) -> None:
     views = uneven(make_views(n_views=20), camera, 0.05)
     found = fitted(views)
-    by_noise = fit_camera(views, BoardTolerances(), camera)
+    by_noise = fit_camera(views, camera)
 
     assert found.components.in_plane == pytest.approx(0.05, rel=0.25)
     assert found.components.noise == pytest.approx(NOISE, rel=0.05)

@@ -13,7 +13,7 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.observation_files import Centers
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import calibrate_camera
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
 from lightpen.simulator.boards import simulate_board_poses
@@ -45,7 +45,7 @@ def test_the_field_that_boards_measured_makes_the_tip_more_certain(
     names = tuple(map(str, range(N_VIEWS)))
     views = Views(board, names, pixels[:, None], (truth.image_size,))
     file = tmp_path / "camera.yaml"
-    write_camera(calibrate_camera(views, BoardTolerances()).camera, file)
+    write_camera(calibrate_camera(views).camera, file)
 
     swing = swing_poses(N_IMAGES, rng)
     centers = simulate_centers(

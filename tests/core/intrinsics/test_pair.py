@@ -10,7 +10,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.boards import simulate_board_poses
@@ -57,7 +57,7 @@ def both_see(
 
 @pytest.fixture(scope="module")
 def found(camera: Camera) -> PairCalibration:
-    return calibrate_pair(both_see(camera), BoardTolerances(), NAMES)
+    return calibrate_pair(both_see(camera), NAMES)
 
 
 def errors(found: PairCalibration) -> FloatArray:
@@ -79,8 +79,7 @@ def test_the_second_camera_stands_where_it_does(found: PairCalibration) -> None:
 
 @pytest.mark.slow
 def test_the_scale_of_the_board_is_part_of_the_baseline(camera: Camera) -> None:
-    vague = BoardTolerances(scale=0.01)
-    found = calibrate_pair(both_see(camera), vague, NAMES)
+    found = calibrate_pair(both_see(camera), NAMES, scale_sigma=0.01)
 
     assert found.baseline_sigma == pytest.approx(0.01 * found.baseline, rel=0.05)
 
@@ -93,9 +92,7 @@ def test_views_of_one_camera_alone_say_nothing_of_the_place(camera: Camera) -> N
     pixels = views.pixels.copy()
     pixels[9:, 0] = np.nan
     known = replace(camera, covariance=np.diag(np.full(9, 1e-12)))
-    found = calibrate_pair(
-        replace(views, pixels=pixels), BoardTolerances(), NAMES, (known, known)
-    )
+    found = calibrate_pair(replace(views, pixels=pixels), NAMES, (known, known))
 
     assert found.n_pairs == 9
     np.testing.assert_allclose(found.rig.rotations[1], turn, atol=1e-3)
@@ -107,7 +104,7 @@ def test_a_board_numbered_from_its_other_end_is_turned_round(camera: Camera) -> 
     views = both_see(camera)
     pixels = views.pixels.copy()
     pixels[::2, 1] = pixels[::2, 1, ::-1]
-    found = calibrate_pair(replace(views, pixels=pixels), BoardTolerances(), NAMES)
+    found = calibrate_pair(replace(views, pixels=pixels), NAMES)
 
     assert found.n_pairs == views.n_views
     assert np.abs(errors(found)).max() < 3.5
@@ -118,7 +115,7 @@ def test_a_pair_of_images_of_two_moments_is_left_out(camera: Camera) -> None:
     views = both_see(camera)
     pixels = views.pixels.copy()
     pixels[5, 1] = pixels[8, 1]
-    found = calibrate_pair(replace(views, pixels=pixels), BoardTolerances(), NAMES)
+    found = calibrate_pair(replace(views, pixels=pixels), NAMES)
 
     assert found.left_out == ("5.png",)
 
@@ -126,7 +123,7 @@ def test_a_pair_of_images_of_two_moments_is_left_out(camera: Camera) -> None:
 @pytest.mark.slow
 def test_cameras_whose_files_are_given_keep_to_them(camera: Camera) -> None:
     known = replace(camera, covariance=np.diag(np.full(9, 1e-12)))
-    found = calibrate_pair(both_see(camera), BoardTolerances(), NAMES, (known, known))
+    found = calibrate_pair(both_see(camera), NAMES, (known, known))
 
     assert not found.alone
     for own in found.rig.cameras:
@@ -142,14 +139,14 @@ def test_a_file_of_another_lens_is_refused_with_its_camera(
     other = replace(known, fx=zoom * camera.fx, distortion=distortion)
 
     with pytest.raises(CalibrationError, match="The intrinsics file of right"):
-        calibrate_pair(both_see(camera), BoardTolerances(), NAMES, (known, other))
+        calibrate_pair(both_see(camera), NAMES, (known, other))
 
 
 @pytest.mark.slow
 def test_a_board_that_moves_between_exposures_is_in_the_uncertainty_of_the_place(
     camera: Camera, found: PairCalibration
 ) -> None:
-    moved = calibrate_pair(both_see(camera, moved=0.2), BoardTolerances(), NAMES)
+    moved = calibrate_pair(both_see(camera, moved=0.2), NAMES)
 
     assert np.abs(errors(moved)).max() < 3.5
     assert moved.baseline_sigma > 2 * found.baseline_sigma
@@ -167,6 +164,4 @@ def test_too_few_views_of_both_are_refused(camera: Camera) -> None:
     known = replace(camera, covariance=np.diag(np.full(9, 1e-12)))
 
     with pytest.raises(CalibrationError, match="in 2 views"):
-        calibrate_pair(
-            replace(views, pixels=pixels), BoardTolerances(), NAMES, (known, known)
-        )
+        calibrate_pair(replace(views, pixels=pixels), NAMES, (known, known))

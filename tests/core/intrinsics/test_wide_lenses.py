@@ -23,7 +23,7 @@ from lightpen.intrinsics.distortion import (
 from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.rigid import rotation_from_vector
 
@@ -88,7 +88,7 @@ def held_before(
 
 @pytest.fixture(scope="module")
 def found() -> CameraCalibration:
-    return calibrate_camera(held_before(WIDE, 24, 1), BoardTolerances())
+    return calibrate_camera(held_before(WIDE, 24, 1))
 
 
 @pytest.mark.slow
@@ -111,7 +111,7 @@ def test_the_truth_of_a_fisheye_lies_within_the_intervals(
 
 def test_circles_before_a_fisheye_are_seen_as_ellipses_about_their_centroids() -> None:
     views = held_before(WIDE, 14, seed=2, word="circles:8x6:25:15")
-    fitted = fit_camera(views, BoardTolerances(), WIDE)
+    fitted = fit_camera(views, WIDE)
 
     off = fitted.state.cameras[0].intrinsics - WIDE.intrinsics
     assert np.all(np.abs(off) < 3.5 * np.sqrt(np.diag(fitted.covariance)[: len(off)]))
@@ -119,7 +119,7 @@ def test_circles_before_a_fisheye_are_seen_as_ellipses_about_their_centroids() -
 
 @pytest.mark.slow
 def test_a_round_image_is_uncertain_only_where_it_shows_something() -> None:
-    found = calibrate_camera(held_before(ROUND, 24, 2), BoardTolerances())
+    found = calibrate_camera(held_before(ROUND, 24, 2))
     assert found.camera.covariance is not None
     uncertain = map_uncertainty(found.camera, found.camera.covariance)
 
@@ -184,7 +184,7 @@ def rational() -> Views:
 def test_a_lens_that_corners_leave_open_is_not_taken_for_a_changed_camera(
     rational: Views,
 ) -> None:
-    found = calibrate_camera(rational, BoardTolerances())
+    found = calibrate_camera(rational)
     codes = {each.code for each in found.remarks}
     assert codes <= {"intrinsics.uncertain", "intrinsics.drawn-in"}
     assert found.held_out_rms < 1.2 * NOISE * 2**0.5
@@ -194,7 +194,7 @@ def test_a_lens_that_corners_leave_open_is_not_taken_for_a_changed_camera(
 def test_what_is_drawn_towards_0_is_as_uncertain_as_it_is_off(seed: int) -> None:
     views = held_before(RATIONAL, 24, seed, least=0.08)
 
-    found = calibrate_camera(views, BoardTolerances())
+    found = calibrate_camera(views)
 
     assert "intrinsics.drawn-in" in {each.code for each in found.remarks}
     assert found.camera.covariance is not None
@@ -207,7 +207,7 @@ def test_a_plain_lens_is_kept_though_a_fisheye_was_begun_with(
 ) -> None:
     views, fisheye = make_views(), convert_lens(camera, FISHEYE)
     assert fisheye is not None
-    begun = fit_camera(views, BoardTolerances(), fisheye)
-    choice, _ = choose_distortion(views, BoardTolerances(), begun, lambda _: None)
+    begun = fit_camera(views, fisheye)
+    choice, _ = choose_distortion(views, begun, lambda _: None)
 
     assert choice.n_coefficients == FEW

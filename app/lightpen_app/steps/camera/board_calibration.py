@@ -17,7 +17,7 @@ from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.observing import observe_board
 from lightpen.intrinsics.page import board_page
 from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
-from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.intrinsics.views import Views
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
@@ -193,7 +193,7 @@ def calibrate_by_views(
     views: Views, hashes: Mapping[str, str], report: Report
 ) -> ComputedCamera:
     """Calibrate the camera from captured views."""
-    found = calibrate_camera(views, BoardTolerances(), local_now().date(), report)
+    found = calibrate_camera(views, local_now().date(), report)
     return ComputedCamera(found, hashes)
 
 
@@ -206,7 +206,6 @@ def calibrate_by_folder(folder: str, board: Board, report: Report) -> ComputedCa
     observed = observe_board(images, board, lambda fraction: report(0.7 * fraction))
     found = calibrate_camera(
         observed.views,
-        BoardTolerances(),
         local_now().date(),
         lambda fraction: report(0.7 + 0.3 * fraction),
     )

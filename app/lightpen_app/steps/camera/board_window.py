@@ -12,9 +12,8 @@ from typing_extensions import override
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS, CameraCalibration
-from lightpen.intrinsics.coverage import cells_of
+from lightpen.intrinsics.capture import cells_of
 from lightpen.intrinsics.scale_check import ScaleCheck
-from lightpen.intrinsics.view_progress import ViewProgress, view_progress
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
@@ -30,7 +29,6 @@ from lightpen_app.steps.camera.board_capture import (
     sight_message,
 )
 from lightpen_app.steps.camera.board_form import BoardForm
-from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.widgets.board_view import BoardOverlay, BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import is_refusing
@@ -69,7 +67,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         # Widgets
         self._image = BoardView()
         self._remark = SignLabel()
-        self.board, self._progress = BoardForm(), BoardProgress()
+        self.board = BoardForm()
         self._measured_name = text_label(TextSize.BODY)
         self._measured = EnterEdit()
         self._print = PushButton()
@@ -94,7 +92,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         side = vertical_layout(panel, self.board, self._print, margins=None)
         fill(side, self._measured_name, self._measured)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
-        fill(side, self._progress, self._count, (self._outcome, 1), 1)
+        fill(side, self._count, (self._outcome, 1), 1)
         outcome = vertical_layout(self._outcome, self._facts)
         horizontal_layout(
             outcome, self._shows_residuals, self._shows_uncertainty, spacing=-1
@@ -293,9 +291,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             views = found.views
         n_views = 0 if views is None else views.n_views
         self._count.setText(self.tr("Views captured: {0}").format(n_views))
-        self._progress.set_value(
-            view_progress(views) if views is not None and n_views else ViewProgress()
-        )
         too_few = self.tr("At least {0} views are needed.").format(MIN_VIEWS)
         self._compute.set_why_not(too_few if state.n_kept < MIN_VIEWS else "")
         nothing = self.tr("Calibrate first.")

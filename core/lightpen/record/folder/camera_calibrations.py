@@ -23,7 +23,6 @@ from lightpen.formats.own_json import (
 )
 from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.report import intrinsics_record
-from lightpen.intrinsics.views import BoardTolerances
 from lightpen.messages import message
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
@@ -70,7 +69,7 @@ def keep_camera_trial(
     found, file = trial.found, trial.camera_file
     intrinsics = None
     if found is not None:
-        intrinsics = plain(intrinsics_record(found, (), BoardTolerances()))
+        intrinsics = plain(intrinsics_record(found, ()))
     record = {
         **record_heading(now),
         "outcome": trial.outcome.value,

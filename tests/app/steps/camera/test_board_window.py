@@ -34,7 +34,6 @@ from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.pooling import pooled
-from lightpen_app.steps.camera.board_progress import BoardProgress
 from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.widgets.board_view import BoardView
 from lightpen_app.widgets.path_field import EnterEdit
@@ -191,17 +190,14 @@ def test_a_file_is_offered_where_files_were_saved_last(
 
 
 @pytest.mark.slow
-def test_the_views_of_a_folder_are_counted_and_judged(
+def test_the_views_of_a_folder_are_counted(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
-    (progress,) = window.findChildren(BoardProgress)
-    assert progress.verdict().text.startswith("Add views at the left and right edges")
     window.read_folder(written(tmp_path, images))
     qtbot.waitUntil(lambda: views_listed(window) == 7)
 
     labels = [label.text() for label in window.findChildren(QLabel)]
     assert "Views captured: 7" in labels
-    assert progress.value().x > 0.3
 
 
 def test_images_without_a_board_are_refused_with_the_reason(
