@@ -50,6 +50,7 @@ DAMPING, HOPELESS = 1e-3, 1e6
 RIDGE, TINY = 1e-9, 1e-30
 ROBUST = 3.0  # standard deviations of a pixel at which its weight is half
 LEAST_NOISE = 0.7  # digital numbers
+LEAST_LIT = 0.1  # of the height: pixels that show whether the model fits
 DARK, LIT = 0.25, 0.5  # of the height: pixels that show the noise, and its growth
 MOST_GROWTH = 0.1  # digital numbers, as 8 bits of 2500 electrons have
 FEWEST_PIXELS = 12
@@ -63,6 +64,7 @@ NO_SLOPE = 1e-2  # digital numbers per px
 CENTER, HEIGHT, BASE, SLOPES, SHARPNESS = slice(0, 2), 2, 3, slice(4, 6), 9
 M11, M12, M22 = 6, 7, 8
 N_PARAMETERS = 10
+N_SHAPE = 7  # that lit pixels determine
 
 
 _Reals: TypeAlias = npt.NDArray[np.floating[Any]]  # of either precision
@@ -78,6 +80,8 @@ class DiscFits(NamedTuple):
     # (N,), whether each shape differs from the median more than shapes usually do.
     are_outliers: BoolArray
     noises: FloatArray  # (N,), standard deviation of a dark pixel, digital numbers
+    # (N,), mean square of the residuals over that by noise: 1 for even, blurred discs.
+    misfits: FloatArray
 
 
 class _Windows(NamedTuple):
@@ -138,7 +142,7 @@ def fit_discs(
     values[:, HEIGHT] = (pixels * near).sum(axis=1) / near.sum(axis=1)
     values[:, M11] = values[:, M22] = 1 / radii
     values[:, SHARPNESS] = ln_k
-    values, squares, pulls, noises = _fitted(windows, values)
+    values, squares, pulls, noises, misfits = _fitted(windows, values)
     field = np.zeros((len(light), 2, light[0].size))
     np.put_along_axis(field, chosen[:, None], pulls, axis=2)
     squares = squares * _correlated(field.reshape(-1, *light.shape[1:]))
@@ -149,13 +153,13 @@ def fit_discs(
     # Halos and lenses of their own give all LEDs shapes of their own; an edge or a
     # second light shows beyond their spread.
     are_outliers = misshapen >= np.maximum(MISSHAPEN, MANY_SPREADS * usual)
-    return DiscFits(values[:, CENTER], sigmas, np.asarray(are_outliers), noises)
+    return DiscFits(values[:, CENTER], sigmas, np.asarray(are_outliers), noises, misfits)
 
 
 def _fitted(
     windows: _Windows, values: FloatArray
-) -> tuple[FloatArray, FloatArray, _Reals, FloatArray]:
-    """Return values, variances of centres, pulls of pixels (N, 2, P), and noises."""
+) -> tuple[FloatArray, FloatArray, _Reals, FloatArray, FloatArray]:
+    """Return values, variances of centres, pulls (N, 2, P), noises and misfits."""
     slope_weight = 0.0
     variances = _variances(windows, _model(windows, values))
     for n_rounds in ROUNDS:
@@ -168,7 +172,16 @@ def _fitted(
     normal = _normal(model.jacobian, weights, slope_weight)
     squares = _diagonal(np.linalg.inv(normal))[:, CENTER].mean(axis=1)
     pulls = model.jacobian[:, CENTER] * (weights * model.residuals)[:, None]
-    return values, squares, pulls, np.sqrt(variances.min(axis=1))
+    noises = np.sqrt(variances.min(axis=1))
+    return values, squares, pulls, noises, _misfits(windows, model, variances)
+
+
+def _misfits(windows: _Windows, model: _Model, variances: _Reals) -> FloatArray:
+    """Return the mean squares of residuals over those by noise, (N,)."""
+    tops = np.minimum(model.light.max(axis=1, keepdims=True), windows.full)
+    lit = windows.used & ~windows.clipped & (model.light > LEAST_LIT * tops)
+    squares = np.where(lit, model.residuals**2 / variances, 0.0).sum(axis=1)
+    return np.asarray(squares / np.maximum(lit.sum(axis=1) - N_SHAPE, 1))
 
 
 def _iterated(

@@ -89,6 +89,11 @@ class DiscMoments(NamedTuple):
 
 def is_ellipse(moments: DiscMoments, relative_noise: Value) -> Value:
     """Return whether sampling, blur and noise explain the deviation from an ellipse."""
+    return ellipse_misfit(moments, relative_noise) < 1.0
+
+
+def ellipse_misfit(moments: DiscMoments, relative_noise: Value) -> Value:
+    """Return the deviation from an ellipse over what sampling, blur and noise make."""
     radius = moments.radius
     _, minor = moments.axes
     loss = ROUNDNESS_LOSS + ROUNDNESS_LOSS_BY_BLUR * (moments.edge_width / minor) ** 2
@@ -97,7 +102,7 @@ def is_ellipse(moments: DiscMoments, relative_noise: Value) -> Value:
         + SKEWNESS_BY_SAMPLING / radius
         + SKEWNESS_BY_NOISE * relative_noise / radius**1.5
     )
-    return (moments.roundness > 1.0 - loss) & (moments.skewness < skewness)
+    return np.maximum((1.0 - moments.roundness) / loss, moments.skewness / skewness)
 
 
 def moments_of_rim(rim: EdgeFit) -> DiscMoments:

@@ -44,6 +44,9 @@ LONGEST = 4.0  # times as long as wide, of a spot
 NEAR = 0.5  # radii, of a place that may be brighter than the middle of a region
 LARGER = 1.5  # times the usual radius of the spots that are measured together
 BRIGHTER = 1.05  # than the middle, of a place that is the LED's rather
+TINY_RADIUS = 4.0  # px, half-level, of an LED whose light shows more than its shape
+BOX = 1.5  # half-level radii, to the rim of a box whose mean is the background
+FAINT = 0.1  # of the height, below which light does not count
 RING = (2.0, 2.5)  # half-level radii, round a spot
 LIT_SHARE = 0.1  # of a ring, and
 DARK = 0.08  # of the light, round a spot that is alone
@@ -112,10 +115,13 @@ def measure_small(
     gaps = np.linalg.norm(fits.centers - narrow, axis=1)
     is_near = gaps < np.where(saturated, FARTHEST, FAR) * windows.radii
     found = np.where(is_near[:, None], fits.centers, narrow)
-    sigmas = np.sqrt((fits.sigmas**2 + np.median(fits.sigmas) ** 2) / 2)
+    moves = _towards_light(windows, found, float(np.median(fits.misfits)))
+    moves[~is_near | saturated | (windows.radii > TINY_RADIUS)] = 0.0
+    squares = (fits.sigmas**2 + np.median(fits.sigmas) ** 2) / 2
+    sigmas = np.sqrt(squares + np.mean(moves**2))
     sigmas = np.where(is_near, sigmas, windows.radii)
     return SmallSpots(
-        centers=np.asarray(windows.middles + found),
+        centers=np.asarray(windows.middles + found + moves),
         shapes=_shapes(windows, narrow),
         radii=windows.radii,
         peaks=windows.tops,
@@ -220,6 +226,26 @@ def _windowed(windows: _Windows, starts: FloatArray) -> FloatArray:
         at = at + 2 * (weighted * away).sum(axis=2) / amounts
         at = np.clip(at, starts - farthest, starts + farthest)
     return at
+
+
+def _towards_light(windows: _Windows, at: FloatArray, misfit: float) -> FloatArray:
+    """Return the steps (N, 2) from fitted discs to the centroids of light, px.
+
+    These are whole if the LEDs are no blurred discs at all, and nothing if they are:
+    the weight is the share of the squares of residuals that noise does not make.
+    """
+    away = np.abs(windows.places - np.rint(at)[:, :, None])
+    beside = np.maximum(away[:, 1, :, None], away[:, 0, None, :])
+    edges = np.ceil(BOX * windows.radii)[:, None, None]
+    rim, inside = beside == edges, beside <= edges
+    background = (windows.light * rim).sum(axis=(1, 2)) / rim.sum(axis=(1, 2))
+    light = windows.light - background[:, None, None]
+    least = FAINT * (windows.tops - background)
+    light = np.where(inside & (light > least[:, None, None]), light, 0.0)
+    along = np.stack([light.sum(axis=1), light.sum(axis=2)], axis=1)
+    amounts = np.maximum(along.sum(axis=2), 1e-9)
+    centroids = (along * windows.places).sum(axis=2) / amounts
+    return np.asarray((1 - 1 / max(misfit, 1.0)) * (centroids - at))
 
 
 def _are_alone(windows: _Windows, at: FloatArray) -> BoolArray:

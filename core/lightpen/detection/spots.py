@@ -24,7 +24,7 @@ from lightpen.detection.disc_search import (
 from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS
-from lightpen.detection.region_moments import GAUSSIAN_RISE, HIGH, LOW
+from lightpen.detection.region_moments import GAUSSIAN_RISE, HIGH, LOW, ellipse_misfit
 from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, widths_of_tiny
 from lightpen.formats.decoding import full_scale_of
 
@@ -45,6 +45,7 @@ HEAD = 0.4  # of the height of the brightest
 
 BELL_RADIUS = 6.0  # px; blur leaves less no even inside
 ALIKE_RADIUS = 8.0  # px, of a spot that is measured as many others are
+MANY_MISFITS = 3.0  # times the usual one, of the outline of an LED that is not whole
 LIT = 0.25  # of the spots with foreign light
 RAISED = 0.35  # height of the outline above which the foot of a disc is not its own
 MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
@@ -312,7 +313,13 @@ def _with_small(
     reach = found.radii[:, None]
     height, width = image.shape
     inside = (found.centers > reach - 0.5) & (found.centers < [width, height] - reach)
-    is_whole = inside.all(axis=1) & found.are_whole & ~found.alone
+    misfits = np.array(
+        [ellipse_misfit(disc.moments, noise / disc.levels.contrast) for disc in discs]
+    )
+    # LEDs that are no even discs all miss the ellipse; what is hidden misses it by more.
+    usual = np.median(misfits[fits]) if fits.sum() >= MIN_POSE_LEDS else 0.0
+    is_usual = misfits[small] < max(MANY_MISFITS * usual, 1.0)
+    is_whole = inside.all(axis=1) & found.are_whole & (is_usual | ~found.alone)
     kept &= ~np.where(is_whole, int(unwhole), 0)
     flaws = kept | np.where(found.are_whole, 0, int(SpotFlaw.MERGED))
     flaws |= np.where(found.saturated, int(SpotFlaw.SATURATED), 0)
