@@ -20,6 +20,7 @@ COLUMNS, ROWS = 7, 5
 MOST_TURN = 0.2  # rad, of the panel in the image
 HALO_PLACE = 0.5  # standard deviation, in widths from the LED
 HALO = (0.6, 1.4)  # standard deviations, least and most, in widths of an LED
+DIE = 0.2  # standard deviation of the light of a chip, in widths of an LED
 PLACE = (0.42, 0.55)  # of a reflection, in pitches below its LED
 REFLECTION = (0.35, 0.2)  # standard deviations, in widths of an LED
 
@@ -56,6 +57,8 @@ class Panel:
     variety : float
         Most by which one LED is narrower than another in a direction of its own, as
         lenses and soldering make them, share of the width.
+    die : float
+        Light of a chip beside the middle of its LED, over that of the LED.
     """
 
     width: float
@@ -70,6 +73,7 @@ class Panel:
     halos: tuple[float, float] = (0.0, 0.0)
     gamma: float = 1.0
     variety: float = 0.0
+    die: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +99,8 @@ def panel_image(panel: Panel, rng: np.random.Generator) -> PanelImage:
         _add_reflection(
             light, there, panel.width, gain * rng.uniform(*panel.reflections)
         )
+        if panel.die > 0:
+            _add_die(light, center, panel, gain, rng)
         if panel.halos[1] > 0:
             _add_halo(light, center, panel, gain, rng)
     size = (width, height)
@@ -162,6 +168,20 @@ def _add_reflection(
     window, x, y = _sub_pixels(light, center, 2 * width)
     across, down = (width * share for share in REFLECTION)
     light[window] += gain * np.exp(-0.5 * ((x / across) ** 2 + (y / down) ** 2))
+
+
+def _add_die(
+    light: npt.NDArray[np.float32],
+    center: FloatArray,
+    panel: Panel,
+    gain: float,
+    rng: np.random.Generator,
+) -> None:
+    angle = rng.uniform(0, 2 * np.pi)
+    there = center + panel.width / 2 * np.array([np.cos(angle), np.sin(angle)])
+    window, x, y = _sub_pixels(light, there, panel.width)
+    wide = DIE * panel.width
+    light[window] += panel.die * gain * np.exp(-0.5 * (x**2 + y**2) / wide**2)
 
 
 def _add_halo(

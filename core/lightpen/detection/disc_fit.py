@@ -153,7 +153,9 @@ def fit_discs(
     # Halos and lenses of their own give all LEDs shapes of their own; an edge or a
     # second light shows beyond their spread.
     are_outliers = misshapen >= np.maximum(MISSHAPEN, MANY_SPREADS * usual)
-    return DiscFits(values[:, CENTER], sigmas, np.asarray(are_outliers), noises, misfits)
+    return DiscFits(
+        values[:, CENTER], sigmas, np.asarray(are_outliers), noises, misfits
+    )
 
 
 def _fitted(

@@ -316,7 +316,7 @@ def _with_small(
     misfits = np.array(
         [ellipse_misfit(disc.moments, noise / disc.levels.contrast) for disc in discs]
     )
-    # LEDs that are no even discs all miss the ellipse; what is hidden misses it by more.
+    # LEDs that are no even discs all miss the ellipse; hidden ones miss it by more.
     usual = np.median(misfits[fits]) if fits.sum() >= MIN_POSE_LEDS else 0.0
     is_usual = misfits[small] < max(MANY_MISFITS * usual, 1.0)
     is_whole = inside.all(axis=1) & found.are_whole & (is_usual | ~found.alone)

@@ -84,6 +84,18 @@ def test_leds_that_all_differ_by_halo_and_lens_are_not_flagged_for_it() -> None:
     assert np.mean((unclipped & (SpotFlaw.MERGED | SpotFlaw.CUT)) > 0) <= 0.1
 
 
+@pytest.mark.parametrize("quality", [None, 60])
+def test_leds_in_the_dark_that_are_no_even_discs_are_not_flagged_for_it(
+    quality: int | None,
+) -> None:
+    # By the outline of an even disc four of five are.
+    panel = replace(
+        CLEAN, width=5.0, gains=(0.3, 0.6), pitch=6.0, psf=1.0, die=0.5, quality=quality
+    )
+    found = found_on(panel, 4)
+    assert np.mean((found.flaws & (SpotFlaw.MERGED | SpotFlaw.CUT)) > 0) <= 0.1
+
+
 @pytest.mark.parametrize(
     "gains", [(0.4, 3.0), pytest.param((2.0, 6.0), marks=pytest.mark.slow)]
 )
