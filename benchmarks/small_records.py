@@ -76,6 +76,14 @@ SMALL: Mapping[str, Any] = {
         "disc_diameter_mm": 10.0,
         "leds_mm": [ZERO],
         "covariance": 11 * [11 * [0.0]],
+        "scale": {
+            "growth": 0.0,
+            "file_sigma": 1e-5,
+            "thermal_sigma": 0.0,
+            "deviation": 0.0,
+            "variance": 1e-10,
+            "covariance": 11 * [0.0],
+        },
     },
     "weakest_direction": {
         "vector_pen": [0.0, 0.0, 1.0],

@@ -115,7 +115,8 @@ def _by_plan(given: argparse.Namespace) -> int:
     judged = judged_with(found.assessment, measured.lamp_drift)
     tables = PART.tables(found, conditions)
     rule = PART.rule_of(options, conditions.limits)
-    print(shown(found_text(tables, judged, measured.rejected, rule)))
+    remarks = conditions.instrument.remarks
+    print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
     entries = PART.entries(found, measured.instrument)
     record = measured.record(given, PART.kind, entries, judged, rule)
     for path, export in exports.items():

@@ -17,6 +17,7 @@ from lightpen.commands.console import (
     verdict_status,
 )
 from lightpen.commands.entering import add_entering, keep_record
+from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
@@ -24,8 +25,13 @@ from lightpen.formats.files import sha256
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.local_time import local_now
+from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.calibrations.recomputing import recompute
+from lightpen.record.calibrations.tip_bending import keep_bending
+from lightpen.record.library.library_changes import Author
+from lightpen.record.results.opening import data_folder_of
 from lightpen.verification.history.led_file import improve_pen
 from lightpen.verification.history.pen_health import (
     GROWN,
@@ -33,7 +39,7 @@ from lightpen.verification.history.pen_health import (
     examine_pen,
     require_one_pen,
 )
-from lightpen.verification.history.press_test import PRESS_TEST, press_test
+from lightpen.verification.history.press_test import PRESS_TEST, PressTest, press_test
 from lightpen.verification.history.recorded_tasks import read_scale
 from lightpen.verification.reports.records import (
     pen_health_entries,
@@ -148,12 +154,17 @@ def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
 def add_verify_press(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify press``."""
     parser.set_defaults(run=_verify_press)
-    add_file(parser, "usual", "USUAL.json", "calibration with usual pressure")
+    add_file(parser, "light", "LIGHT.json", "calibration with light pressure")
     parser.add_argument(
         "firm",
         type=Path,
         metavar="FIRM.json",
         help="calibration with firm pressure: same tip, cone, pen and camera",
+    )
+    parser.add_argument(
+        "--supervisor",
+        metavar="NAME",
+        help="supervisor who signs, if the data folder has a supervisor password",
     )
     add_exit_by_verdict(parser)
     add_json(parser)
@@ -162,14 +173,14 @@ def add_verify_press(parser: argparse.ArgumentParser) -> None:
 
 @printing
 def _verify_press(options: argparse.Namespace) -> int:
-    files = [options.usual, options.firm]
+    files = [options.light, options.firm]
     require_other_file(options.json, *files)
-    usual, firm = both = [read_calibration(path) for path in files]
+    light, firm = both = [read_calibration(path) for path in files]
     require_one_pen(both)
-    if usual.camera_hashes != firm.camera_hashes:
-        raise UsageError("press-test.another-camera", first=usual.name, other=firm.name)
-    if (usual.tip_pen == firm.tip_pen).all():
-        raise UsageError("repeatability.twice", one=usual.name, other=firm.name)
+    if light.camera_hashes != firm.camera_hashes:
+        raise UsageError("press-test.another-camera", first=light.name, other=firm.name)
+    if (light.tip_pen == firm.tip_pen).all():
+        raise UsageError("repeatability.twice", one=light.name, other=firm.name)
     found = press_test(*(recompute(path).calibration for path in files))
     print(shown(press_test_text(found)))
     record = verification_record(
@@ -179,5 +190,24 @@ def _verify_press(options: argparse.Namespace) -> int:
         {},
         {"files": [file_entry(file) for file in all_hashed(files)]},
     )
-    keep_record(options, record, usual)
+    keep_record(options, record, light)
+    _keep_bending(options, light, found)
     return verdict_status(options, found.assessment.grade)
+
+
+def _keep_bending(
+    options: argparse.Namespace, light: CalibrationFile, found: PressTest
+) -> None:
+    """Store the bending with the tip in the library of a data folder."""
+    data: Path | None = options.data or data_folder_of(light.path)
+    now, names = local_now(), light.names
+    bending = found.bending(now.date())
+    if bending is None or data is None or options.no_entry or not names.tip:
+        return
+    if light.origin is Origin.SIMULATED:
+        return
+    operator = options.operator or names.operator
+    signature = supervisor_signature(options.supervisor)
+    by = Author(names.station, operator, "press test", signature)
+    keep_bending(data, names.tip, bending, by, now)
+    print(shown(f"Stored with tip {names.tip}, due {bending.due}."))

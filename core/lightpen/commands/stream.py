@@ -34,6 +34,7 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.export_status import with_status
+from lightpen.record.calibrations.tip_bending import bending_of
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.recordings import FilesBeside, files_beside
 from lightpen.streaming.messages import StreamedTip, tip_metadata
@@ -165,7 +166,8 @@ def _listened(options: argparse.Namespace) -> _Listened:
         return _Listened(images, RegionOfInterest(camera, pen, mask), None)
     calibration = with_status(read_calibration(options.tip), local_now())
     viewers = viewers_of_camera(camera, camera_file)
-    instrument = instrument_of(calibration, viewers, pen, pen_file)
+    bending = bending_of(calibration)
+    instrument = instrument_of(calibration, viewers, pen, pen_file, bending=bending)
     tip = StreamedTip(
         Names(pen=calibration.names.pen, tip=calibration.names.tip),
         instrument,

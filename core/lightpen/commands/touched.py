@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 
 from lightpen.commands.arguments import add_bits, add_cameras_and_pen
-from lightpen.commands.console import lacking, progress, require_other_file, shown
+from lightpen.commands.console import (
+    centers_at,
+    lacking,
+    progress,
+    require_other_file,
+    shown,
+)
 from lightpen.commands.entering import limits_in_force
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.json_records import file_entry
-from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
 from lightpen.messages import Message
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.tip_bending import bending_of
 from lightpen.verification.history.recorded_tasks import read_drift
 from lightpen.verification.probing.current_tip import cone_before
 from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_entries
@@ -160,6 +166,7 @@ class MeasuredRuns:
             kind,
             {
                 "camera_serials": camera_serials(self.instrument),
+                "remarks": list(self.instrument.remarks),
                 **entries,
                 "rejected": rejected_entries(self.rejected),
                 "witness": lamp_drift_entries(self.lamp_drift),
@@ -216,7 +223,11 @@ def measure_runs(
     files = tuple(file for place in found for file in place.files)
     files += tuple(centers)
     require_other_file(options.json, *files)
-    instrument = instrument_of(calibration, viewers, pen, pen_file)
+    temperature_c: float | None = getattr(options, "pen_temperature", None)
+    bending = bending_of(calibration, getattr(options, "data", None))
+    instrument = instrument_of(
+        calibration, viewers, pen, pen_file, temperature_c, bending
+    )
     with progress("Finding LEDs") as report:
         seen = _seen(centers, found, instrument, report)
     runs = _runs_of(seen, instrument, options.frames)
@@ -272,7 +283,7 @@ def _seen(
         raise UsageError("cli.centers-of-rig")
     seen = []
     for path in centers:
-        own = read_centers(path, instrument.pen.n_leds)
+        own = centers_at(path, instrument.pen)
         view = observe_centers(own, instrument.camera, instrument.pen)
         seen.append(_SeenRun(path.name, (view,)))
     for i, place in enumerate(places, start=1):

@@ -214,7 +214,8 @@ def _concluded(
         n_own = measured.n_of_calibration
         judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
     rule = rule_in_words(measured.conditions.limits)
-    print(shown(found_text(tables, judged, measured.rejected, rule)))
+    remarks = measured.instrument.remarks
+    print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
     measured.print_lamp_drift(judged)
     entries = task.entries(found, measured.instrument)
     record = measured.record(given, task.kind, entries, judged, rule)

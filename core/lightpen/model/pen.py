@@ -101,7 +101,7 @@ def grown(pen: Pen, growth: float, about: FloatArray) -> Pen:
     """Return a pen scaled by a relative growth about a point (3,), mm: its tip."""
     return replace(
         pen,
-        leds=about + (1 + growth) * (pen.leds - about),
+        leds=pen.leds + growth * (pen.leds - about),
         diameter=(1 + growth) * pen.diameter,
     )
 

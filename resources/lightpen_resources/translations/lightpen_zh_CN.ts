@@ -3612,6 +3612,13 @@ needed</source>
     </message>
 </context>
 <context>
+    <name>PressTestControl</name>
+    <message>
+        <source>Press test</source>
+        <translation>压力试验</translation>
+    </message>
+</context>
+<context>
     <name>PrintReportWindow</name>
     <message>
         <source>Pages</source>
@@ -5784,6 +5791,18 @@ mm</translation>
         <translation>5 个畸变系数：更多系数不会更好地预测视图。交叉验证误差：{held_out:.4f} px。</translation>
     </message>
     <message>
+        <source>Bending: {assumed:.0f} µm assumed; a press test measures it.</source>
+        <translation>弯曲：假定为 {assumed:.0f} µm；压力试验可测出实际值。</translation>
+    </message>
+    <message>
+        <source>Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}, overdue since {due}; at least {assumed:.0f} µm count. Repeat the press test.</source>
+        <translation>弯曲：{bending:.0f} ± {uncertainty:.0f} µm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.0f} µm 计算。请重做压力试验。</translation>
+    </message>
+    <message>
+        <source>Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}.</source>
+        <translation>弯曲：{bending:.0f} ± {uncertainty:.0f} µm（{day} 的压力试验）。</translation>
+    </message>
+    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
     </message>
@@ -6012,6 +6031,10 @@ mm</translation>
         <translation>下一步：清洁测头和标准件，夹紧标准件和相机，然后重新验证。</translation>
     </message>
     <message>
+        <source>Next: continue with this stylus.</source>
+        <translation>下一步：继续使用此测杆。</translation>
+    </message>
+    <message>
         <source>Next: repeat the swing with the tip pressed in.</source>
         <translation>下一步：压紧测头，重新摆动。</translation>
     </message>
@@ -6022,6 +6045,10 @@ mm</translation>
     <message>
         <source>Next: seat the tip firmly, calibrate it again, and verify the new result.</source>
         <translation>下一步：装紧测头，重新标定，并验证新的结果。</translation>
+    </message>
+    <message>
+        <source>Next: tighten the stylus or use a shorter, stiffer one, and calibrate again with gentle pressure.</source>
+        <translation>下一步：拧紧测杆，或换用更短、更硬的测杆，然后以轻压重新标定。</translation>
     </message>
     <message>
         <source>No GenTL producer is installed: {variable} names no folder with a file {suffix}. Install the software of the camera, or open its file {suffix}.</source>
@@ -6140,6 +6167,18 @@ mm</translation>
         <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、球）；至少需要 {needed} 个。请再触测几个。</translation>
     </message>
     <message>
+        <source>Press test: U of the bending is {uncertainty:.4f} mm, too large to count.</source>
+        <translation>压力试验：弯曲的 U 为 {uncertainty:.4f} mm，过大，不予采用。</translation>
+    </message>
+    <message>
+        <source>Press test: bending {bending:.0f} ± {uncertainty:.0f} µm.</source>
+        <translation>压力试验：弯曲 {bending:.0f} ± {uncertainty:.0f} µm。</translation>
+    </message>
+    <message>
+        <source>Press test: bending {bending:.0f} ± {uncertainty:.0f} µm: the stylus, its thread or the seat gives way. U of what the tip measures includes this.</source>
+        <translation>压力试验：弯曲 {bending:.0f} ± {uncertainty:.0f} µm：测杆、其螺纹或锥座发生变形。用该测头测量的 U 已包含此项。</translation>
+    </message>
+    <message>
         <source>Press the tip into the cone and keep it there.</source>
         <translation>把测头压入锥孔并保持。</translation>
     </message>
@@ -6238,6 +6277,14 @@ mm</translation>
     <message>
         <source>Residuals {sigma:.2f} px; usual is {usual:.2f} px or less. {cause}</source>
         <translation>残差 {sigma:.2f} px；通常不超过 {usual:.2f} px。{cause}</translation>
+    </message>
+    <message>
+        <source>Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured, as temperature or thermal expansion of the pen are not stated. State both.</source>
+        <translation>光笔的比例：由于未给出光笔的温度或热膨胀系数，测量结果每米增加 {added:.2f} mm (U)。请给出这两项。</translation>
+    </message>
+    <message>
+        <source>Scale of the pen: adds {added:.2f} mm per metre (U) to what is measured.</source>
+        <translation>光笔的比例：测量结果每米增加 {added:.2f} mm (U)。</translation>
     </message>
     <message>
         <source>Simulated pen</source>
@@ -8396,34 +8443,6 @@ mm</translation>
         <translation>其畸变不是 OpenCV 或 Kannala-Brandt 的模型：请用标定板图像标定相机，可在此处，或采用其中一种模型。</translation>
     </message>
     <message>
-        <source>Next: clamp cone and camera, and repeat the press test.</source>
-        <translation>下一步：夹紧锥座和相机，重做压力试验。</translation>
-    </message>
-    <message>
-        <source>Next: continue with this stylus and cone.</source>
-        <translation>下一步：继续使用此测杆和锥座。</translation>
-    </message>
-    <message>
-        <source>Next: tighten the stylus or use a shorter, stiffer one, clamp the cone, and calibrate again with gentle pressure.</source>
-        <translation>下一步：拧紧测杆或换用更短、更硬的测杆，夹紧锥座，以轻压重新标定。</translation>
-    </message>
-    <message>
-        <source>Press test: no change found, but U is {uncertainty:.4f} mm along the pen.</source>
-        <translation>压力试验：未发现变化，但沿光笔方向 U 为 {uncertainty:.4f} mm。</translation>
-    </message>
-    <message>
-        <source>Press test: the cone or the camera moved by {distance:.4f} mm (U {uncertainty:.4f} mm) between the two swings.</source>
-        <translation>压力试验：两次摆动之间，锥座或相机移动了 {distance:.4f} mm（U {uncertainty:.4f} mm）。</translation>
-    </message>
-    <message>
-        <source>Press test: under firm pressure the tip moves by {change:+.4f} mm along the pen (U {uncertainty:.4f} mm): no significant change.</source>
-        <translation>压力试验：用力按压时测头沿光笔移动 {change:+.4f} mm（U {uncertainty:.4f} mm）：无显著变化。</translation>
-    </message>
-    <message>
-        <source>Press test: under firm pressure the tip moves by {change:.4f} mm along the pen (U {uncertainty:.4f} mm): the stylus, its thread or the seat gives way.</source>
-        <translation>压力试验：用力按压时测头沿光笔移动 {change:.4f} mm（U {uncertainty:.4f} mm）：测杆、其螺纹或锥座退让。</translation>
-    </message>
-    <message>
         <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.</source>
         <translation>相机移动了 {shift:.1f} px：视野中固定的灯在光笔处偏移 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测点的 U 已计入该偏移。</translation>
     </message>
@@ -9937,6 +9956,10 @@ mm</translation>
     <message>
         <source>expiry date {0}</source>
         <translation>有效期至 {0}</translation>
+    </message>
+    <message>
+        <source>bending and U {0} mm</source>
+        <translation>弯曲及 U {0} mm</translation>
     </message>
     <message>
         <source>max. change {0} mm</source>

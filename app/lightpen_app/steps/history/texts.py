@@ -55,6 +55,7 @@ _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
     "due": QT_TRANSLATE_NOOP("history", "expiry date {0}"),
     "ball_diameter_mm": QT_TRANSLATE_NOOP("history", "ball {0} mm"),
     "nominal_tip_mm": QT_TRANSLATE_NOOP("history", "nominal centre {0} mm"),
+    "bending": QT_TRANSLATE_NOOP("history", "bending and U {0} mm"),
     "max_change_mm": QT_TRANSLATE_NOOP("history", "max. change {0} mm"),
     "max_days": QT_TRANSLATE_NOOP("history", "calibration interval {0} days"),
     "max_swings": QT_TRANSLATE_NOOP("history", "max. {0} swings"),

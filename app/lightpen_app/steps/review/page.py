@@ -64,7 +64,10 @@ class ReviewPage(Page):
             self._selection, self._run, workbench.library, view.next_tips
         )
         self._acceptance = AcceptanceControl(self._selection, self._run, view)
-        self._press = PressTestControl(self._run, view, workbench.notifications)
+        self._press = PressTestControl(
+            *(self._run, view, workbench.library, workbench.notifications),
+            *(workbench.folder, workbench.around.now),
+        )
         self._along = ResultExport(self._run, place, view.tabs.pictures, self)
 
         # Layout

@@ -10,6 +10,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.self_check import SelfCheck
 from lightpen.estimation.reports.methods import reported
 from lightpen.estimation.reports.verdict import halves_agree
+from lightpen.model.bending import Bending
 from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.names import Names
@@ -65,8 +66,9 @@ class ResultPanel(Translated, QFrame):
         self._as_found = SignLabel()
         self._halves = SignLabel()
         self._self_check = SignLabel()
-        self._pressed = SignLabel()
-        self._pressed_value: PressTest | None = None
+        self._bending = SignLabel()
+        self._bending_value: Bending | None = None
+        self._pressed: PressTest | None = None  # of this session
         self._images = SignLabel()
         self._postures = text_label(TextSize.LEAD, Tone.QUIET)
         self._dial = PostureDial()
@@ -81,7 +83,7 @@ class ResultPanel(Translated, QFrame):
             self, self._heading, self._readout, spacing=GRID // 2, margins=2 * GRID
         )
         layout.addSpacing(GRID)
-        fill(layout, self._as_found, self._halves, self._self_check, self._pressed)
+        fill(layout, self._as_found, self._halves, self._self_check, self._bending)
         fill(layout, self._images)
         layout.addSpacing(GRID)
         fill(layout, self._postures, (self._dial, 100), 1)
@@ -105,26 +107,33 @@ class ResultPanel(Translated, QFrame):
         self._value = value
         self._refresh()
 
-    def set_pressed(self, found: "PressTest | None") -> None:
-        """Show another press test, or none."""
-        self._pressed_value = found
-        self._show_pressed()
+    def set_bending(self, bending: Bending, pressed: "PressTest | None") -> None:
+        """Show the bending that counts for the tip, or the press test just made."""
+        self._bending_value, self._pressed = bending, pressed
+        self._show_bending()
 
-    def _show_pressed(self) -> None:
-        found = self._pressed_value
-        self._pressed.setVisible(found is not None)
+    def _show_bending(self) -> None:
+        bending, found = self._bending_value, self._pressed
+        self._bending.setVisible(bending is not None and self._value is not None)
         if found is not None:
             text = " ".join(map(worded, found.words))
             mark = GRADE_MARKS[found.assessment.grade]
-            self._pressed.set_value(StatusMessage(text, *mark))
+            self._bending.set_value(StatusMessage(text, *mark))
+        elif bending is not None:
+            text, is_good = worded(bending.words), bending.measured is not None
+            self._bending.set_value(
+                StatusMessage.good(text)
+                if is_good and not bending.is_overdue
+                else StatusMessage(text, Sign.RING, Tone.PLAIN)
+            )
 
     def _retranslate(self) -> None:
         self._postures.setText(self.tr("Postures of the included images"))
-        self._show_pressed()
         self._refresh()
 
     def _refresh(self) -> None:
         outcome = self._value
+        self._show_bending()
         self._heading.setText(self._heading_text(outcome))
         if outcome is None:
             self._readout.set_value(None)

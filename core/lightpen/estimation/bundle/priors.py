@@ -5,7 +5,7 @@ report marks as such.
 """
 
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 
@@ -27,6 +27,11 @@ class Prior:
     assumed: bool  # whether the file states none
     # (k, k), of what it may be off beyond this covariance; None if it cannot.
     beyond: FloatArray | None = None
+
+    @property
+    def sigma(self) -> float:
+        """Standard uncertainty of a single unknown."""
+        return sqrt(float(self.covariance[0, 0]))
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
         cameras=tuple(prior_of_camera(camera, assumptions) for camera in rig.cameras),
         extrinsics=extrinsics,
         scale=_stated_or(assumptions.scale, pen.scale_sigma),
-        temperature=_temperature(pen, assumptions),
+        temperature=temperature_prior(pen, assumptions),
         diameter=_stated_or(assumptions.diameter * pen.diameter, pen.diameter_sigma),
         led_sigma=pen.led_sigma,
         form_error=assumptions.form_error,
@@ -135,7 +140,7 @@ def _warmth(pen: Pen, assumptions: Assumptions) -> float:
     )
 
 
-def _temperature(pen: Pen, assumptions: Assumptions) -> Prior:
+def temperature_prior(pen: Pen, assumptions: Assumptions) -> Prior:
     """Return the prior of the thermal expansion, relative, equation (10)."""
     is_measured = assumptions.temperature_c is not None
     warmth = _warmth(pen, assumptions)

@@ -34,6 +34,7 @@ Covariance: TypeAlias = Annotated[
     tuple[Row, Row, Row, Row, Row, Row], Meta(description="Of tip and cone, mm^2.")
 ]
 Expanded: TypeAlias = Annotated[Vector, Meta(description="U (k = 2) along each axis.")]
+NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
 Diameter: TypeAlias = Annotated[float, Meta(gt=0, le=1000)]
 Lamp: TypeAlias = tuple[Length | None, Length | None]
 
@@ -264,6 +265,21 @@ class OtherCameraRecord(Struct, frozen=True):
     cam_from_rig_translation_mm: Vector
 
 
+class PenScaleRecord(Struct, frozen=True):
+    """Scale s of the pen during the swing: that of the LED file and temperature."""
+
+    growth: Annotated[
+        float, Meta(description="Of pen and tip against the LED file, relative.")
+    ]
+    file_sigma: NotNegative
+    thermal_sigma: NotNegative
+    deviation: Annotated[float, Meta(description="Estimate of s by the swing.")]
+    variance: NotNegative
+    covariance: Annotated[
+        tuple[float, ...], Meta(description="Of all parameters of `covariance` with s.")
+    ]
+
+
 class InstrumentRecord(Struct, frozen=True, omit_defaults=True):
     """Cameras and pen as fitted, and the covariance of all with the tip."""
 
@@ -277,12 +293,14 @@ class InstrumentRecord(Struct, frozen=True, omit_defaults=True):
             "the first (rad, mm), disc diameter and LEDs, in this order."
         ),
     ]
+    scale: PenScaleRecord
     other_cameras: tuple[OtherCameraRecord, ...] = ()
 
     def __post_init__(self) -> None:
         size = 4 + len(self.intrinsics) + 3 * len(self.leds_mm)
         size += sum(6 + len(other.intrinsics) for other in self.other_cameras)
-        if {size} != {len(self.covariance), *map(len, self.covariance)}:
+        rows = (*self.covariance, self.scale.covariance)
+        if {size} != {len(self.covariance), *map(len, rows)}:
             raise ValueError("The covariance is of another instrument.")
 
 

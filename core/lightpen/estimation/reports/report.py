@@ -30,6 +30,7 @@ from lightpen.estimation.reports.calibration_record import (
     LedRecord,
     MethodRecord,
     OtherCameraRecord,
+    PenScaleRecord,
     RigRecord,
     SecondConeRecord,
     SelfCheckRecord,
@@ -284,6 +285,7 @@ def _instrument(instrument: Instrument) -> InstrumentRecord:
         disc_diameter_mm=plain(instrument.pen.diameter),
         leds_mm=plain(instrument.pen.leds),
         covariance=plain(instrument.covariance),
+        scale=PenScaleRecord(*plain(tuple(instrument.scale))),
         other_cameras=tuple(
             OtherCameraRecord(
                 intrinsics=plain(camera.intrinsics),

@@ -3,9 +3,12 @@
 Errors that the calibration leaves are common to every point that is measured
 afterwards, and correlated: an error of the focal length comes with one of the LEDs and
 one of the tip. So the covariance covers all parameters jointly.
+
+That is the state of the swing. `lightpen.estimation.uncertainty.use` adds what acts
+when the tip measures.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,9 +23,11 @@ from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )
+from lightpen.messages import Message
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.model.rig import Rig
 
 
@@ -52,6 +57,26 @@ def parameters_of(rig: Rig, pen: Pen) -> Parameters:
     return Parameters(tip, tuple(cameras), extrinsics, diameter, leds)
 
 
+class PenScale(NamedTuple):
+    """Relative scale s of a pen during the swing that calibrated its tip.
+
+    With the scale of the LED file, of which ``file_sigma`` is the standard uncertainty.
+    """
+
+    growth: float  # of the pen about its tip against the LED file
+    file_sigma: float
+    thermal_sigma: float  # standard uncertainty of the growth by temperature
+    deviation: float  # estimate of s by the swing, 0 if it does not determine it
+    variance: float  # of s by the swing
+    covariance: FloatArray  # (q,), of all parameters with s
+
+    @property
+    def lasting(self) -> float:
+        """Fraction of s that belongs to the LED file, and not to temperature."""
+        total = self.file_sigma**2 + self.thermal_sigma**2
+        return self.file_sigma**2 / total if total > 0 else 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Instrument:
     """A camera, or several of a rig, and a pen with its tip."""
@@ -62,6 +87,10 @@ class Instrument:
     # (q, q), of tip, cameras, diameter and LEDs, as `parameters` has them.
     covariance: FloatArray
     sigma: float  # noise of one image coordinate during the calibration, px
+    scale: PenScale
+    # Standard uncertainty of the bending of a touch across the pen, mm
+    bending: float = 0.0
+    remarks: tuple[Message, ...] = ()  # on scale and bending, for the user
 
     @property
     def camera(self) -> Camera:
@@ -73,9 +102,14 @@ class Instrument:
         """Indices of each kind of parameter in the covariance."""
         return parameters_of(self.rig, self.pen)
 
+    @property
+    def seated(self) -> "Instrument":
+        """The same with its tip in a cone, where the stylus bends as in the swing."""
+        return with_bending(self, 0.0)
+
 
 def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
-    """Return the instrument as adjusted by a swing."""
+    """Return the instrument as adjusted by a swing, at the scale of the pen in it."""
     bundle, state = adjustment.bundle, adjustment.bundle.state
     spread = _with_budget_noise(bundle, budget)
     for at, prior in zip(
@@ -88,13 +122,45 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
     if of_turn is not None and state.rig.n_cameras == 1:
         spread = spread + effect_of_normals(bundle).covariance(of_turn)
     mixing = instrument_mixing(bundle)
+    by_scale = spread[:, bundle.layout.scale.start]
+    priors = bundle.unknowns.priors
     return Instrument(
         rig=state.rig,
         pen=state.pen,
         tip_pen=bundle.tip_pen,
         covariance=mixing @ spread @ mixing.T,
         sigma=bundle.sigma,
+        scale=PenScale(
+            growth=bundle.scale,
+            file_sigma=priors.scale.sigma,
+            thermal_sigma=priors.temperature.sigma,
+            deviation=bundle.scale - priors.growth,
+            variance=float(by_scale[bundle.layout.scale.start]),
+            covariance=mixing @ by_scale,
+        ),
     )
+
+
+def with_bending(instrument: Instrument, bending: float) -> Instrument:
+    """Return the instrument with another bending of the touch, mm.
+
+    The bending of the swing, which is another, moved the tip along the pen.
+    """
+    at, covariance = instrument.parameters.tip, instrument.covariance.copy()
+    change = bending**2 - instrument.bending**2
+    covariance[at, at] += change * np.outer(UPRIGHT_AXIS, UPRIGHT_AXIS)
+    return replace(instrument, covariance=covariance, bending=bending)
+
+
+def scale_direction(instrument: Instrument) -> FloatArray:
+    """Return the derivative of the parameters by the scale of the pen, (q,).
+
+    The pen grows about its tip, which keeps the scale of the LED file.
+    """
+    at = instrument.parameters
+    by_scale = np.zeros(at.number)
+    by_scale[at.leds] = (instrument.pen.leds - instrument.tip_pen).ravel()
+    return by_scale
 
 
 def instrument_of_files(
@@ -111,15 +177,28 @@ def instrument_of_files(
     covariance[at.tip, at.tip] = tip_covariance
     _put_cameras(covariance, at, priors)
     covariance[at.diameter, at.diameter] = priors.diameter.covariance
-    scaling = (pen.leds - tip_pen).ravel()
     basis = led_basis(pen.leds)
     covariance[at.leds, at.leds] = (
         (pen.led_sigma or 0.0) ** 2 * basis @ basis.T
         if pen.led_covariance is None
         else pen.led_covariance
     )
-    covariance[at.leds, at.leds] += priors.scale.covariance * np.outer(scaling, scaling)
-    return Instrument(rig, pen, tip_pen, covariance, sigma)
+    scale = PenScale(
+        growth=0.0,
+        file_sigma=priors.scale.sigma,
+        thermal_sigma=0.0,
+        deviation=0.0,
+        variance=priors.scale.sigma**2,
+        covariance=np.zeros(at.number),
+    )
+    files = Instrument(rig, pen, tip_pen, covariance, sigma, scale)
+    by_scale = scale_direction(files)
+    crossed = scale.variance * by_scale
+    return replace(
+        files,
+        covariance=covariance + np.outer(by_scale, crossed),
+        scale=scale._replace(covariance=crossed),
+    )
 
 
 def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
@@ -131,8 +210,12 @@ def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
         moved[getattr(at, kind), place] = np.eye(place.stop - place.start)
     covariance = moved @ instrument.covariance @ moved.T
     _put_cameras(covariance, at, priors_of(rig, instrument.pen, USUAL))
-    return Instrument(
-        rig, instrument.pen, instrument.tip_pen, covariance, instrument.sigma
+    by_scale = moved @ instrument.scale.covariance
+    return replace(
+        instrument,
+        rig=rig,
+        covariance=covariance,
+        scale=instrument.scale._replace(covariance=by_scale),
     )
 
 

@@ -31,6 +31,7 @@ from lightpen.formats.own_json import (
 )
 from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
 from lightpen.messages import Message, message
+from lightpen.model.bending import Bending, MeasuredBending, bending_on
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen.model.names import same_name
 from lightpen.record.library.entered_files import entered_files
@@ -149,6 +150,7 @@ class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
     max_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)] | None = None
     max_swings: Annotated[int, Meta(ge=1, le=MOST_SWINGS)] | None = None
     picture: Picture | None = None
+    bending: MeasuredBending | None = None  # by its last press test
 
     @property
     def nominal_tip(self) -> FloatArray | None:
@@ -228,6 +230,11 @@ class Library:
         listed = self.tip(tip)
         return usual if listed is None else listed.rule(usual)
 
+    def bending_of(self, tip: str, day: date) -> Bending:
+        """Return the bending of a tip on a day: by its press test, or assumed."""
+        listed = self.tips.get(tip)
+        return bending_on(day, None if listed is None else listed.bending)
+
     def pen_of_leds(self, sha256: str) -> ListedPen | None:
         """Return the pen with which an LED file of this hash is stored."""
         for pen in self.pens.values():
@@ -257,7 +264,9 @@ def item_entries(item: AnyItem) -> dict[str, Plain]:
     for name, value in to_builtins(item).items():
         if name == "type" or value is None:
             continue
-        if isinstance(value, dict):  # a file
+        if name == "bending":
+            value = f"{value['bending_mm']!r} {value['expanded_uncertainty_mm']!r}"
+        elif isinstance(value, dict):  # a file
             value = value.get("place") or f"{value['path']} {value['sha256']}"
         is_vector = isinstance(value, list | tuple)
         entries[name] = " ".join(map(repr, value)) if is_vector else value

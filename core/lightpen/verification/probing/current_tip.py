@@ -10,8 +10,10 @@ from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile, hashed
 from lightpen.messages import printable
+from lightpen.model.bending import ASSUMED_BENDING, Bending
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.tip_bending import bending_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import Preparation
@@ -40,6 +42,7 @@ class CurrentTip:
     pen_file: InputFile
     temperature_c: float | None = None  # of the pen on that day
     humidity_percent: float | None = None  # of the room on that day
+    bending: Bending = ASSUMED_BENDING
 
     @property
     def region(self) -> RegionOfInterest:
@@ -82,11 +85,15 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
             "verification.no-tip", tip=printable(names.tip), pen=printable(names.pen)
         )
     calibration = read_calibration(file)
-    instrument = instrument_of(calibration, viewers, pen_file.pen, pen_file.path)
+    today = preparation.assumptions_today
+    bending = bending_of(calibration)
+    instrument = instrument_of(
+        *(calibration, viewers, pen_file.pen, pen_file.path),
+        *(today.temperature_c, bending),
+    )
     nominal_tip = preparation.nominal_tip
     for known in (pen_file.pen.nominal_tip, calibration.nominal_tip):
         nominal_tip = known if nominal_tip is None else nominal_tip
-    today = preparation.assumptions_today
     return CurrentTip(
         names=names,
         origin=origin,
@@ -100,6 +107,7 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         pen_file=hashed(pen_file.path),
         temperature_c=today.temperature_c,
         humidity_percent=today.humidity_percent,
+        bending=bending,
     )
 
 
@@ -113,7 +121,10 @@ def tip_at(tip: CurrentTip, place: ImageLocation) -> CurrentTip:
         return tip
     return replace(
         tip,
-        instrument=instrument_of(tip.calibration, viewers, pen, pen_file),
+        instrument=instrument_of(
+            *(tip.calibration, viewers, pen, pen_file),
+            *(tip.temperature_c, tip.bending),
+        ),
         cone_cam=cone_before(tip.calibration, viewers),
         viewers=viewers,
         pen_file=hashed(pen_file),

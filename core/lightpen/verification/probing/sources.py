@@ -18,12 +18,15 @@ from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.calibration_record import InstrumentRecord
 from lightpen.estimation.uncertainty.instrument import (
     Instrument,
+    PenScale,
     instrument_of_files,
     with_rig,
 )
+from lightpen.estimation.uncertainty.use import in_use
 from lightpen.formats.files import sha256
 from lightpen.formats.pairing import pair_images
 from lightpen.messages import Message, message, printable
+from lightpen.model.bending import ASSUMED_BENDING, Bending
 from lightpen.model.camera import Camera
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
@@ -71,13 +74,29 @@ def lamp_drift_of(
 
 
 def instrument_of(
-    calibration: CalibrationFile, viewers: PenCameras, pen: Pen, pen_file: Path
+    calibration: CalibrationFile,
+    viewers: PenCameras,
+    pen: Pen,
+    pen_file: Path,
+    temperature_c: float | None = None,
+    bending: Bending = ASSUMED_BENDING,
 ) -> Instrument:
-    """Return the instrument as adjusted by a calibration of the same pen.
+    """Return the instrument of a calibration of the same pen, as it measures.
 
     With other cameras than in the calibration, tip and LEDs are taken from the swing
-    and the cameras from their files.
+    and the cameras from their files. ``temperature_c`` is that of the pen while it
+    measures, None if not known.
     """
+    assumed = calibration.calibration.assumptions
+    conditions = replace(assumed, temperature_c=temperature_c)
+    found = _calibrated_instrument(calibration, viewers, pen, pen_file)
+    return in_use(found, pen, conditions, bending)
+
+
+def _calibrated_instrument(
+    calibration: CalibrationFile, viewers: PenCameras, pen: Pen, pen_file: Path
+) -> Instrument:
+    """Return the instrument as adjusted by a calibration of the same pen."""
     record = calibration.calibration
     if sha256(pen_file) != calibration.pen_sha256 or pen.n_leds != len(record.leds):
         raise UsageError(
@@ -103,6 +122,14 @@ def instrument_of(
         tip_pen=calibration.tip_pen,
         covariance=np.array(fitted.covariance),
         sigma=record.sigma_px,
+        scale=PenScale(
+            growth=fitted.scale.growth,
+            file_sigma=fitted.scale.file_sigma,
+            thermal_sigma=fitted.scale.thermal_sigma,
+            deviation=fitted.scale.deviation,
+            variance=fitted.scale.variance,
+            covariance=np.array(fitted.scale.covariance),
+        ),
     )
     is_same = viewers.hashes == calibration.camera_hashes
     return instrument if is_same else with_rig(instrument, viewers.rig)

@@ -36,10 +36,12 @@ def found_text(
     assessment: VerificationAssessment,
     rejected: Sequence[RejectedFrame],
     rule: Message,
+    remarks: Sequence[Message] = (),
 ) -> str:
-    """Return the result of a task as text."""
+    """Return the result of a task as text, with remarks on the instrument."""
     lines = [line for table in tables for line in _table(table)]
-    return "\n".join([*lines, *_left_out(rejected), "", *_verdict(assessment, rule)])
+    lines += [*map(str, remarks), *_left_out(rejected)]
+    return "\n".join([*lines, "", *_verdict(assessment, rule)])
 
 
 def touches_text(
@@ -55,7 +57,8 @@ def touches_text(
         rows.append(ResultRow(touch.label, values))
     columns = (*"uvw", *(message("drift.axis", axis=axis) for axis in "uvw"))
     table = ResultTable(message("table.points"), columns, tuple(rows))
-    return "\n".join([*_table(table), "U has k = 2.", *_left_out(rejected)])
+    lines = [*_table(table), "U has k = 2.", *map(str, instrument.remarks)]
+    return "\n".join([*lines, *_left_out(rejected)])
 
 
 def _table(table: ResultTable) -> list[str]:
@@ -168,8 +171,8 @@ def pen_health_text(found: PenHealth) -> str:
 
 def press_test_text(found: PressTest) -> str:
     """Return the change by firm pressure as text."""
-    names = ("Tip x", "Tip y (along pen)", "Tip z", "Cone u", "Cone v", "Cone w")
-    lines = [f"{'Firm less usual, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
+    names = ("Tip x", "Tip y (along pen)", "Tip z")
+    lines = [f"{'Firm less light, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
     for name, *values in zip(names, found.change, found.uncertainty, strict=True):
         lines.append(f"{name:<{TITLE}}" + "".join(f"{x:{COLUMN}.4f}" for x in values))
     return "\n".join([*lines, "", *_verdict(found.assessment, BY_SIMPLE_ACCEPTANCE)])

@@ -80,6 +80,7 @@ def task_record(
             "tip": names.tip,
             "origin": images.origin,
             "camera_serials": camera_serials(tip.instrument),
+            "remarks": list(tip.instrument.remarks),
             **conditions_entries(tip.temperature_c, tip.humidity_percent),
             **task.entries(found, tip.instrument),
             "rejected": rejected_entries(images.rejected),

@@ -86,12 +86,15 @@ def measure_drift(
     """Measure how a drift reference moves over two visits or more, in order."""
     if len(visits) < MIN_VISITS:
         raise CalibrationError("drift.too-few")
-    first, *others = [mean_point(touches) for _, touches in visits]
+    instrument = conditions.instrument.seated
+    first, *others = [
+        mean_point([touch.seated for touch in touches]) for _, touches in visits
+    ]
     moves = np.array([each.point_cam - first.point_cam for each in (first, *others)])
     covariances = np.zeros((len(visits), 3, 3))
     for i, each in enumerate(others, start=1):
         row = each.sensitivity - first.sensitivity
-        shared = row @ conditions.instrument.covariance @ row.T
+        shared = row @ instrument.covariance @ row.T
         covariances[i] = shared + each.noise + first.noise
     variances = np.diagonal(covariances, axis1=1, axis2=2)
     names = tuple(name for name, _ in visits)

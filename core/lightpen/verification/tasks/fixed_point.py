@@ -124,8 +124,8 @@ def measure_fixed_point(
 
     Raises `CalibrationError` if there are too few points at one place.
     """
-    instrument, cone_cam = conditions.instrument, conditions.cone_cam
-    touches = [point for _, points in runs for point in points]
+    instrument, cone_cam = conditions.instrument.seated, conditions.cone_cam
+    touches = [point.seated for _, points in runs for point in points]
     kept, left_out = _at_one_place(touches)
     calibrated = scatter_of(kept)
     covariance = joint_covariance(kept, instrument)
@@ -278,8 +278,8 @@ def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
         "expected_std_mm": found.expected_deviation,
         "moved_mm": found.moved,
         **tip_entries(found.tip),
-        "touches": point_entries(found.touches, instrument),
-        "left_out": point_entries(found.left_out, instrument),
+        "touches": point_entries(found.touches, instrument.seated),
+        "left_out": point_entries(found.left_out, instrument.seated),
     }
 
 

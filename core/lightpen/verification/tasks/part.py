@@ -7,6 +7,7 @@ features.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -112,7 +113,7 @@ class Part(Found):
                 continue
             row = result.quantity.by_inputs[0]
             budget = {
-                name: COVERAGE_FACTOR * float(np.sqrt(row[:-1] @ C @ row[:-1]))
+                name: COVERAGE_FACTOR * sqrt(max(float(row[:-1] @ C @ row[:-1]), 0.0))
                 for name, C in covariances.items()
             }
             budget["ball"] = abs(float(row[-1])) * ball

@@ -1,8 +1,8 @@
 """A touch: one point measured with the pen held still.
 
 Each image puts the tip at ``X = R tip_pen + t``. The mean over the images of a touch is
-its point. Two things make it uncertain: the noise of the images and of the seat, which
-are its own, and what is not known of tip, LEDs and camera, which all touches share. The
+its point. Two things make it uncertain: noise of images, seat and bending, which is
+its own, and what is not known of tip, LEDs and camera, which all touches share. The
 latter is kept as the derivative of the point by these parameters, so that it drops out
 of a difference of two points as far as it moves both alike.
 
@@ -78,6 +78,14 @@ class ProbedPoint:
     rms: float  # root mean square residual of an LED, px
     rejected: tuple[RejectedFrame, ...] = ()
     approach_cam: FloatArray | None = None
+    bending: FloatArray | None = None  # (3, 3), its part of the noise, mm^2
+
+    @property
+    def seated(self) -> "ProbedPoint":
+        """The same in a cone, in which the stylus bends as it did in its swing."""
+        if self.bending is None:
+            return self
+        return replace(self, noise=self.noise - self.bending, bending=None)
 
     @property
     def label(self) -> str:
@@ -131,17 +139,21 @@ def measure_touches(
     points = poses.rotations @ instrument.tip_pen + poses.translations
     noises = tip_covariances(poses.rotations, poses.covariances, instrument.tip_pen)
     noises *= (sigma / poses.sigma) ** 2
+    along = poses.rotations @ UPRIGHT_AXIS
+    across = np.eye(3) - along[:, :, None] * along[:, None, :]
     sensitivities = point_sensitivities(instrument, poses)
     touches, start = [], 0
     for still in held:
         own = slice(start, start + len(still.frames))
         start = own.stop
         agreeing = _agreeing(points[own], noises[own])
+        bending = instrument.bending**2 * across[own][agreeing].mean(axis=0)
         touches.append(
             ProbedPoint(
                 point_cam=points[own][agreeing].mean(axis=0),
                 noise=_mean_noise(points[own][agreeing], noises[own][agreeing])
-                + SEATING**2 * np.eye(3),
+                + SEATING**2 * np.eye(3)
+                + bending,
                 sensitivity=sensitivities[own][agreeing].mean(axis=0),
                 rotation=nearest_rotation(poses.rotations[own][agreeing].mean(axis=0)),
                 names=tuple(still.frames[i].name for i in agreeing),
@@ -153,6 +165,7 @@ def measure_touches(
                     if i not in agreeing
                 ),
                 approach_cam=still.approach_cam,
+                bending=bending,
             )
         )
     return tuple(touches)

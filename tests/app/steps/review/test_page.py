@@ -1383,10 +1383,18 @@ def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     assert first.solution is not None
     firm = solve_again(first.solution, {2: str(Reason.TAKEN_OUT)})
     panel = the(page, ResultPanel)
-    assert not any("Press test" in each for each in texts_of(panel))
+    assert any("4 µm assumed" in each for each in texts_of(panel))
 
-    run.post(replace(first, pressed=firm), ())
-    qtbot.waitUntil(lambda: any("no significant" in each for each in texts_of(panel)))
+    run.post(replace(first, pressed=firm, origin=Origin.LIVE), ())
+    qtbot.waitUntil(lambda: any("Press test:" in each for each in texts_of(panel)))
+    tip, library = first.names.tip, workbench.library
+    qtbot.waitUntil(lambda: tip in library.library.tips)
+    kept = library.library.tips[tip].bending
+    assert kept is not None
+    assert kept.due > kept.measured
+    run.post(replace(first, origin=Origin.LIVE), ())
+    qtbot.waitUntil(lambda: any("by press test of" in t for t in texts_of(panel)))
+    run.post(first, ())
     shown = panel.value()
     assert shown is not None
     assert shown.solution is first.solution

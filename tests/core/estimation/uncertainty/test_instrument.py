@@ -105,6 +105,7 @@ def test_an_instrument_of_files_is_as_uncertain_as_they_state() -> None:
     for place, part in zip(kinds, parts, strict=True):
         assert part is not None
         np.testing.assert_allclose(found.covariance[place, place], part)
+    for place in (*at.cameras, at.extrinsics, at.diameter):
         others = np.delete(found.covariance[place], np.r_[place], axis=1)
         assert not others.any()
     assert (found.sigma, found.tip_pen.tolist()) == (0.02, PAPER_TIP.tolist())

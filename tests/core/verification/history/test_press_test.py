@@ -1,17 +1,20 @@
 """The press test: a stylus that gives way is found, and a stiff one is left alone."""
 
 from dataclasses import replace
+from datetime import date, timedelta
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.station import GOOD, _drawn_pen, drawn_rig
+from msgspec.structs import replace as replace_struct
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.observation_files import Centers
+from lightpen.model.bending import ASSUMED, bending_on
 from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
     paper_camera,
@@ -22,6 +25,7 @@ from lightpen.simulator.swings import (
 from lightpen.verification.history.press_test import press_test
 
 N_IMAGES, NOISE, SEAT = 60, 0.03, 0.002  # px, mm
+DAY = date(2025, 11, 3)
 GIVES_WAY = 0.02  # mm by the sine of the lean
 SEEDS = (0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3)))
 
@@ -63,9 +67,7 @@ def test_a_stylus_that_gives_way_is_found_along_the_pen(seed: int) -> None:
 
     assert found.assessment.grade is Grade.CHECK
     assert found.assessment.reason.code == "press-test.gives-way"
-    assert abs(found.along - GIVES_WAY) < 1.5 * found.uncertainty[1]
-    # Its cone seems to move, too, but that belongs to the move of the tip.
-    assert (np.abs(found.change[3:]) < 1.5 * found.uncertainty[3:]).all()
+    assert abs(found.change[1] - GIVES_WAY) < 1.5 * found.uncertainty[1]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -82,14 +84,35 @@ def test_the_swings_exchanged_change_the_sign() -> None:
 
     there, back = press_test(usual, firm), press_test(firm, usual)
 
-    np.testing.assert_allclose(back.change[:3], -there.change[:3], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(back.change, -there.change, rtol=1e-6, atol=1e-9)
 
 
-def test_a_cone_that_was_moved_is_distinguished_from_a_stylus() -> None:
+def test_a_cone_that_was_moved_between_the_swings_is_no_bending() -> None:
     found = press_test(swung(0, 1), swung(0, 4, cone=0.05))
 
-    assert found.assessment.reason.code == "press-test.cone-moved"
-    assert found.change[3] == pytest.approx(0.05, abs=0.01)
+    assert found.assessment.grade is Grade.STEADY
+
+
+def test_bending_replaces_the_assumed_one_until_its_due_date() -> None:
+    found = press_test(swung(0, 1), swung(0, 2, GIVES_WAY))
+    measured = found.bending(DAY)
+    assert measured is not None
+
+    assert measured.due == date(2026, 11, 3)
+    expected = np.hypot(found.change[1], found.uncertainty[1] / 2)
+    assert bending_on(DAY, measured).sigma == pytest.approx(expected)
+    assert "by press test of 2025-11-03" in str(bending_on(DAY, measured).words)
+    assert bending_on(DAY, None).sigma == ASSUMED
+    stiff = replace_struct(measured, bending_mm=0.0, expanded_uncertainty_mm=0.001)
+    assert bending_on(DAY, stiff).sigma == pytest.approx(0.0005)
+    assert bending_on(measured.due + timedelta(days=1), stiff).sigma == ASSUMED
+
+
+def test_a_coarse_test_measures_no_bending() -> None:
+    found = press_test(swung(0, 1), swung(0, 5, seat=0.1))
+
+    assert found.assessment.reason.code == "press-test.coarse"
+    assert found.bending(DAY) is None
 
 
 def test_instruments_that_disagree_count_by_half_their_difference() -> None:
@@ -105,10 +128,10 @@ def test_instruments_that_disagree_count_by_half_their_difference() -> None:
     )
     by_both = press_test(usual, replace(firm, instrument=other))
 
-    changes = np.array([by_one.change, by_other.change])[:, :3]
-    np.testing.assert_allclose(by_both.change[:3], changes.mean(axis=0))
+    changes = np.array([by_one.change, by_other.change])
+    np.testing.assert_allclose(by_both.change, changes.mean(axis=0))
     half = np.ptp(changes, axis=0) / 2
     assert half.max() > 0.005
     np.testing.assert_allclose(
-        by_both.uncertainty[:3], np.hypot(by_one.uncertainty[:3], 2 * half)
+        by_both.uncertainty, np.hypot(by_one.uncertainty, 2 * half)
     )
