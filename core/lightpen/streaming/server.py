@@ -226,6 +226,8 @@ class PoseStream:
                         self._hand_out(selector)
                     elif key.fileobj is listener:
                         _admit(listener, selector)
+                    elif _is_dismissed(key.data):
+                        continue  # for a newer client of this round
                     elif not _served(key.data, ready):
                         _dismiss(key.data, selector)
                 now_s = time.monotonic()
@@ -308,6 +310,10 @@ def _has_slot(selector: selectors.BaseSelector) -> bool:
 def _dismiss(client: _Client, selector: selectors.BaseSelector) -> None:
     selector.unregister(client.connection)
     client.connection.close()
+
+
+def _is_dismissed(client: _Client) -> bool:
+    return client.connection.fileno() < 0
 
 
 def _dismiss_all(selector: selectors.BaseSelector) -> None:

@@ -24,7 +24,6 @@ from lightpen_app.look.theme import (
     Tone,
     apply_theme,
     colors_for,
-    contrast,
     font,
     letters_for,
     scale_for,
@@ -77,6 +76,27 @@ XYZ_FROM_RGB = np.array(
     ]
 )
 WHITE = XYZ_FROM_RGB.sum(axis=1)
+
+
+def contrast(one: str, other: str) -> float:
+    """Return the contrast of two colours, 1 to 21, as WCAG 2.2 defines it."""
+    brighter, darker = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (brighter + 0.05) / (darker + 0.05)
+
+
+def _luminance(color: str) -> float:
+    """Relative luminance of sRGB, 0 to 1."""
+    return sum(
+        weight * _linear(int(color[at : at + 2], 16) / 255)
+        for weight, at in ((0.2126, 1), (0.7152, 3), (0.0722, 5))
+    )
+
+
+def _linear(value: float) -> float:
+    """Return the light of an sRGB value; both 0 to 1."""
+    return (
+        value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
+    )
 
 
 def poor_pairs(colors: Colors, pairs: list[tuple[str, str]], least: float) -> list[str]:
