@@ -8,6 +8,7 @@ readers get thousands of files that were damaged in worse ways, many with a righ
 checksum; they may end in the program's own errors alone.
 """
 
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -29,6 +30,7 @@ from lightpen.errors import LightpenError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.sources import SourceEnvironment, sample_files
 from lightpen.model.origin import Origin
+from lightpen.record.library.signing.keys import KEYS
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import HEADER
@@ -54,6 +56,10 @@ from lightpen_app.work.stations import Station
 SEED = 11
 N_FLIPS, N_MUTATIONS = 2000, 5000
 N_IMAGES = 6
+
+# The keys of what a benchmark writes are not the user's.
+_ACCOUNT = tempfile.TemporaryDirectory(prefix="lightpen-keys-")
+os.environ.setdefault(KEYS, _ACCOUNT.name)
 NAMES = Names("Bench", "Bench", "LP-04", "T-10", "C-1", 10.0)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 IMAGE = np.random.default_rng(1).integers(0, 9, (512, 612), dtype=np.uint8)

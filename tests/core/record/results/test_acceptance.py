@@ -24,6 +24,7 @@ from lightpen.formats.stored_messages import StoredMessage
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.library.library_changes import Author, add_item, retire_item
+from lightpen.record.library.signing.station import STATION_FILE
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import set_limits, set_password
 from lightpen.record.library.tip_library import (
@@ -68,8 +69,8 @@ from lightpen.record.swings.reading import (open_record, recorded_names)
 from lightpen.record.swings.solving import solve_record
 
 STEPS = {
-    *("accept", "revoke", "store", "_add", "create_whole", "part_of", "_name_anew"),
-    *("sync_folder",),
+    *("accept", "revoke", "store", "create_whole", "part_of", "_name_anew"),
+    *("sync_folder", "add_numbered", "write_counted", "owe"),
     *("_conclude", "_own_journal", "_write_line", "close"),
 }
 
@@ -612,6 +613,7 @@ def test_killed_while_it_is_taken_back_the_tip_is_in_force_or_the_one_before(
         number += 1
         data = tmp_path / str(number)
         shutil.copytree(case.data / "results", data / "results")
+        shutil.copy(case.data / STATION_FILE, data)
         shutil.copytree(case.folder, data / RECORDS / "swing")
         status = elsewhere("die taking back", number, data)
         found = FolderArchive(data).in_force(case.names.pen, case.names.tip)
