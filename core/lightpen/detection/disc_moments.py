@@ -78,7 +78,7 @@ class Disc(NamedTuple):
     and noise explain how it differs from an ellipse; a sliver of 1 px off a disc of
     42 px, which shifts the centre by 0.13 px, is beyond that. `others` are further
     regions in the box that was requested. `is_even` shows that its light is as even as
-    its outline supposes. `rim` is the start of the fit by which `with_rims` measures an
+    its outline supposes, `is_balanced` that it is not brighter on one side. `rim` is the start of the fit by which `with_rims` measures an
     unevenly lit disc; `filled` returns the moments of a ring with its dark middle
     filled, if that makes it whole.
     """
@@ -89,6 +89,7 @@ class Disc(NamedTuple):
     box: PixelBox
     is_whole: bool
     is_even: bool = True
+    is_balanced: bool = True
     leaves_image: bool = False
     leaves_window: bool = False
     others: tuple[PixelBox, ...] = ()
@@ -161,7 +162,7 @@ def _measure_window(
     _, inner = cv2.threshold(cv2.erode(soft, BESIDE), 254, 1, cv2.THRESH_BINARY)
     background = round(levels.background)
     light = np.maximum(window, background) - background
-    moments, is_whole, is_even = assessed(
+    moments, is_whole, is_even, is_balanced = assessed(
         moments,
         cv2.moments(inner),
         cv2.moments(cv2.copyTo(window, inner)),
@@ -179,6 +180,7 @@ def _measure_window(
         region,
         is_whole=bool(is_whole) and not reached,
         is_even=bool(is_whole & is_even) and not reached,
+        is_balanced=bool(is_balanced),
         leaves_image=any(reached),
         leaves_window=not all(reached),
         others=tuple(others),
@@ -200,6 +202,9 @@ def with_start(
     if not disc.is_whole and _has_dark_middle(disc.moments, soft, frame):
         relative_noise = noise / disc.levels.contrast
         filled = partial(_filled, disc.moments, soft, frame, ramp, relative_noise)
+        # The outline of a ring that is as bright all round needs no fit of its rim.
+        if disc.is_balanced and (moments := filled()):
+            return disc._replace(moments=moments, is_whole=True)
     return disc._replace(rim=_rim_start(soft, frame), filled=filled)
 
 
@@ -268,8 +273,8 @@ def assessed(
     frame: PixelBox,
     levels: Levels,
     relative_noise: Value,
-) -> tuple[DiscMoments, Value, Value]:
-    """Return moments without shading; whether discs are whole, and evenly lit.
+) -> tuple[DiscMoments, Value, Value, Value]:
+    """Return moments without shading; whether discs are whole, even and balanced.
 
     An LED is less bright seen from the side, so one side of a leaning disc is brighter
     than the other. If the brightness rises by the share g from the centre to the rim,
@@ -304,7 +309,8 @@ def assessed(
         moments.rim_width >= FLAT * radius
     )
     is_whole = is_ellipse(moments, relative_noise)
-    return moments, is_whole, is_even & (off < allowed * radius)
+    is_balanced = off < allowed * radius
+    return moments, is_whole, is_even & is_balanced, is_balanced
 
 
 def _has_dark_middle(moments: DiscMoments, soft: MatLike, frame: PixelBox) -> bool:

@@ -76,7 +76,7 @@ def measure_alone(
     left, top, ramp = corners[:, 0], corners[:, 1], (high - low) / contrast
     moments = moments_by_sums(sums, squares, left, top, ramp)
     frames = PixelBox(left, top, left + side, top + side)
-    moments, are_whole, are_even = assessed(
+    moments, are_whole, are_even, are_balanced = assessed(
         *(moments, inside, weighted, lit, frames, Levels(*levels.T), noise / contrast)
     )
     fit = are_alone & moments.are_enough & (contrast >= MIN_SIGMAS * noise)
@@ -90,6 +90,7 @@ def measure_alone(
             PixelBox(*regions[k].tolist()).moved(x, y),
             is_whole=bool(are_whole[k]),
             is_even=bool(are_whole[k] & are_even[k]),
+            is_balanced=bool(are_balanced[k]),
         )
         frame = PixelBox(x, y, x + side, y + side)
         disc = with_start(disc, soft[k], frame, float(ramp[k]), noise)

@@ -98,6 +98,21 @@ def test_leds_as_they_are_have_their_centers_and_are_whole(
     assert np.sqrt(np.mean(np.square(errors))) < 0.02
 
 
+def test_a_ring_that_is_as_bright_all_round_is_measured_as_exactly_as_an_even_disc() -> (
+    None
+):
+    errors: dict[str, list[FloatArray]] = {"even": [], "ring": []}
+    for leds, of_these in errors.items():
+        for one in shown(leds, 10.0, 0.8):
+            spots = detect_spots(one.image)
+            for center in one.discs.centers:
+                which = nearest(spots, center)
+                assert which is not None
+                of_these.append(spots.centers[which] - center)
+    even, ring = (np.sqrt(np.mean(np.square(e))) for e in errors.values())
+    assert ring < 1.2 * even  # by its rim alone 1.9 times
+
+
 @pytest.mark.parametrize("leds", ["hot-spot", "dome"])
 @pytest.mark.parametrize("blur", [0.8, 2.0])
 def test_the_area_is_that_of_the_rim_however_blurred(leds: str, blur: float) -> None:
