@@ -78,9 +78,9 @@ class Disc(NamedTuple):
     and noise explain how it differs from an ellipse; a sliver of 1 px off a disc of
     42 px, which shifts the centre by 0.13 px, is beyond that. `others` are further
     regions in the box that was requested. `is_even` shows that its light is as even as
-    its outline supposes, `is_balanced` that it is not brighter on one side. `rim` is the start of the fit by which `with_rims` measures an
-    unevenly lit disc; `filled` returns the moments of a ring with its dark middle
-    filled, if that makes it whole.
+    its outline supposes, `is_balanced` that no side is brighter. `rim` is the start of
+    the fit by which `with_rims` measures an unevenly lit disc; `filled` returns the
+    moments of a ring with its dark middle filled, if that makes it whole.
     """
 
     moments: DiscMoments

@@ -98,9 +98,7 @@ def test_leds_as_they_are_have_their_centers_and_are_whole(
     assert np.sqrt(np.mean(np.square(errors))) < 0.02
 
 
-def test_a_ring_that_is_as_bright_all_round_is_measured_as_exactly_as_an_even_disc() -> (
-    None
-):
+def test_a_ring_as_bright_all_round_is_measured_as_exactly_as_a_disc() -> None:
     errors: dict[str, list[FloatArray]] = {"even": [], "ring": []}
     for leds, of_these in errors.items():
         for one in shown(leds, 10.0, 0.8):
