@@ -225,15 +225,19 @@ def find_rotated(
     turned, now, offsets = none, fitted, fitted.state.offsets
     try:
         for n_done in range(MAX_ROUNDS):
-            ratio = _ratios(views, turned, now, n_done >= N_DRAWN)
+            ratio = _ratios(views, turned, now, n_done > N_DRAWN)
             # At first the camera is between those of both; what is wrong draws it.
             suspect = SUSPECT * float(np.median(ratio)) if n_done < N_DRAWN else 1.0
             before, turned = turned, turned ^ (ratio < max(suspect, 1.0))
-            if np.array_equal(before, turned) and n_done != N_DRAWN - 1:
+            if n_done == N_DRAWN and not _are_clear(ratio, before, 1.0):
+                return none
+            if np.array_equal(before, turned) and n_done > N_DRAWN:
                 break
+            if not turned.any():
+                return none
             camera = now.state.cameras[0]
             now = fit_camera(_turned(views, turned), camera, offsets=offsets)
-        if not turned.any() or turned.all() or np.median(ratio[turned]) < ROTATED:
+        if not _are_clear(ratio, turned, ROTATED):
             return none
         errors = held_out_errors(views, fit_camera(views, camera, offsets=offsets))
         less = held_out_errors(_turned(views, turned), now)
@@ -241,8 +245,15 @@ def find_rotated(
         return none
     better = float(np.sqrt(np.mean(errors**2) / np.mean(less**2)))
     least = BETTER if change is None else max(BETTER, NEARLY * change.ratio)
-    is_rotated = better > least and np.median(ratio[~turned]) > UPRIGHT
-    return min(turned, ~turned, key=np.count_nonzero) if is_rotated else none
+    return min(turned, ~turned, key=np.count_nonzero) if better > least else none
+
+
+def _are_clear(ratio: FloatArray, turned: BoolArray, least: float) -> bool:
+    """Return whether some views, and not all, fit much better when turned round."""
+    if not turned.any() or turned.all():
+        return False
+    others = min(least, UPRIGHT)
+    return bool(np.median(ratio[turned]) > least and np.median(ratio[~turned]) > others)
 
 
 def _ratios(
