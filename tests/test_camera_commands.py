@@ -191,7 +191,9 @@ def test_images_that_are_binned_use_a_camera_file_that_is_written(
     off = np.subtract(record["tip_pen_mm"], pen["tip_in_leds_csv_frame_bestfit"])
     assert np.all(np.abs(off) < record["expanded_uncertainty_mm"])
     assert main(given) != 0
-    assert "1224 x 1024 px" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "1224 x 1024 px" in said.err
+    assert "--binning 2" in said.err
 
 
 def test_binning_needs_a_camera_file(capsys: pytest.CaptureFixture[str]) -> None:

@@ -67,6 +67,7 @@ ADVICE = {
     "pen.too-small": "Name them so: --units m.",
     "pen.not-in-frame": "That is done by: lightpen pen RAW.csv OUT.csv.",
     "pen.neither-framed-nor-handed": "That is done by: lightpen pen RAW.csv OUT.csv.",
+    "images.other-size": "Binned or cropped: --binning 2, --roi 0 0 640 480.",
     "images.ambiguous": "They are given by --centers FILE.csv.",
 }
 
