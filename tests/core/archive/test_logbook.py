@@ -21,6 +21,7 @@ from lightpen.errors import ArchiveError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.origin import Origin
 from lightpen.record.library.entered_files import ARCHIVE
+from lightpen.record.library.signing.account import OwedFile, owe, owed_files
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.interrupted import discard_damaged, discard_swing
@@ -93,6 +94,22 @@ def test_an_accepted_tip_is_entered_with_all_that_it_was_made_from(
     (written,) = entries_of(logbook.database, logbook.chain)
     (record,) = records_of(logbook.database, [written]).values()
     assert '"tip_pen_mm": [0.0, 2.0, 3.0]' in record
+
+
+@pytest.mark.parametrize("is_entered", [False, True])
+def test_a_note_of_a_file_that_was_never_written_is_forgotten(
+    data: Path, logbook: Logbook, *, is_entered: bool
+) -> None:
+    stale = OwedFile("results/000001.json", "0" * 64)
+    if not is_entered:
+        owe(logbook.chain, stale)
+    FolderArchive(data).store(result(data))
+    if is_entered:
+        assert logbook.enter_owed() == ()
+        owe(logbook.chain, stale)
+
+    assert logbook.enter_owed() == ()
+    assert (len(entered(logbook)), owed_files(logbook.chain)) == (1, ())
 
 
 def test_results_of_earlier_versions_are_taken_over_once_and_stay(data: Path) -> None:

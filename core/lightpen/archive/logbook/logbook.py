@@ -46,7 +46,7 @@ from lightpen.archive.logbook.shared_library import newer_elsewhere, take_over
 from lightpen.archive.replication.replication import Replicator
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import AcceptanceError, ArchiveError, FileError, UsageError
-from lightpen.formats.files import FOLDER, unreadable
+from lightpen.formats.files import FOLDER, sha256, unreadable
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
@@ -240,9 +240,22 @@ class Logbook:
                 renew_station_key(self._data, self.chain, None, local_now())
 
     def _owed(self) -> Iterator[OwedFile]:
-        """Yield the files to be entered that are there."""
-        for owed in owed_files(self.chain):
-            if (self._data / owed.place).exists():
+        """Yield the files to be entered that are there; forget those never written.
+
+        A program that is killed after its note leaves the place to another file.
+        """
+        notes = owed_files(self.chain)
+        for owed in notes:
+            file = self._data / owed.place
+            if not file.exists():
+                continue
+            digest = sha256(file)
+            others = [each.sha256 for each in notes if each.place == owed.place]
+            entered = entered_files(self._data).files.get(owed.place)
+            others += [] if entered is None else [entered.sha256]
+            if digest != owed.sha256 and digest in others:
+                forget_owed(self.chain, owed)
+            else:
                 yield owed
 
     def _abandoned(self) -> Iterator[Path]:
