@@ -278,6 +278,18 @@ def test_two_stage_can_be_the_method(
     )
 
 
+def test_a_part_of_the_images_can_be_used(
+    clean: Path, clean_centers: Path, record: Record
+) -> None:
+    given = ("--centers", str(clean_centers), "--from", "3", "--until", "40")
+    fields = record(clean, *given)
+
+    outside = [frame["reason"] == "outside the part" for frame in fields["frames"]]
+    assert not any(outside[2:40])
+    assert all(outside[:2] + outside[40:])
+    assert fields["images"]["used"] <= 38
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "tip", ["-1.3182 -90.4095 -23.8548", "-1 -90. -23", "-1.3182e0 -9.04095e1 -2e1"]

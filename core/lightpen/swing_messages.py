@@ -36,6 +36,7 @@ class Code(StrEnum):
     UNKNOWN = "verdict.unknown"
     UNCERTAIN = "verdict.uncertain"
     TWO_STAGE_OFF = "verdict.two-stage-off"
+    STEP = "verdict.step"
     HALVES_DIFFER = "verdict.halves-differ"
     MANY_DROPPED = "verdict.many-dropped"
     MANY_EXCLUDED = "verdict.many-excluded"

@@ -73,6 +73,7 @@ _SHORTS: dict[Code, str] = {
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.CHANGE_BEYOND_LIMIT: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "No comparison possible"),
+    Code.STEP: QT_TRANSLATE_NOOP("phrases", "Moved during the swing"),
     Code.TWO_STAGE_OFF: QT_TRANSLATE_NOOP("phrases", "Two-stage tip uncertain"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD_UNCHECKED: QT_TRANSLATE_NOOP("phrases", "Within limits"),

@@ -36,6 +36,7 @@ MESSAGES = {
     "reason.ambiguous": "ambiguous",
     "reason.misfit": "LEDs do not fit",
     "reason.slipped": "tip slipped",
+    "reason.outside": "outside the part that is used",
     "reason.taken-out": "excluded manually",
     "reason.other-moment": "not simultaneous",
     "reason.copy": "same as another image",

@@ -86,6 +86,7 @@ MESSAGES = {
     "next-step.capture-more": "Next: capture more images. The images of this swing are retained.",
     "next-step.repeat": "Next: repeat the swing with the tip pressed in.",
     "next-step.report-joint": "Next: report the joint fit of the same images.",
+    "next-step.use-part": "Next: tighten or clamp what moved, then repeat the swing; or use the longer part.",
     "next-step.check-files": "Next: check the intrinsics file and the LED file, then repeat the swing.",
     "next-step.check-camera": "Next: check the intrinsics file, then repeat the swing.",
     "next-step.check-leds": "Next: check the LED file, then repeat the swing.",

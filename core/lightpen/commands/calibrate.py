@@ -28,9 +28,11 @@ from lightpen.commands.console import (
 )
 from lightpen.detection.observations import (
     Observations,
+    leave_out,
     observe_centers,
     observe_images,
 )
+from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_centers, observe_rig_images
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
@@ -61,7 +63,7 @@ from lightpen.record.swings.reading import (
     recorded_limits,
     unacknowledged_images,
 )
-from lightpen.record.swings.solving import record_inputs, solve_record
+from lightpen.record.swings.solving import record_inputs, solve_again, solve_record
 
 MAX_NAMED = 3  # images; of more the first is named
 RIG_NEEDED = message("cli.rig-needed")
@@ -115,7 +117,7 @@ def _calibrate(options: argparse.Namespace) -> None:
 
 
 def _from_json(options: argparse.Namespace) -> _Calibrated:
-    _require_none_given(options, options.from_record)
+    _require_none_given(options, options.from_record, "from", "until")
     found = recompute(options.from_record)
     return _Calibrated(
         found.calibration,
@@ -126,7 +128,9 @@ def _from_json(options: argparse.Namespace) -> _Calibrated:
     )
 
 
-def _require_none_given(options: argparse.Namespace, record: Path) -> None:
+def _require_none_given(
+    options: argparse.Namespace, record: Path, *others: str
+) -> None:
     """Reject options that duplicate the content of a record."""
     own = (
         "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
@@ -136,7 +140,7 @@ def _require_none_given(options: argparse.Namespace, record: Path) -> None:
     values = vars(options)
     given = [
         f"--{name}"
-        for name in own.split()
+        for name in (*own.split(), *others)
         if values[name.replace("-", "_")] is not None
     ]
     if given:
@@ -153,6 +157,11 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
     _note_unacknowledged(unacknowledged_images(record))
     with progress("Finding LEDs") as report:
         solution = solve_record(record, report)
+    outside = _outside(options, len(solution.numbers))
+    if outside:
+        numbers = solution.numbers.tolist()
+        reasons = {numbers[i]: str(Reason.OUTSIDE) for i in outside}
+        solution = solve_again(solution, {**solution.excluded, **reasons})
     return _Calibrated(
         solution.calibration,
         solution.source.pen.nominal_tip,
@@ -215,7 +224,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         _observe, options, camera, pen, is_centers=options.centers is not None
     )
     observations, files = observe(given)
-    observations = _timed(observations, options)
+    observations = _timed(_part_of(observations, options), options)
     second = None
     if separation is not None:
         others, more_files = observe([options.second_cone])
@@ -236,6 +245,18 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
             led_diameter=options.led_diameter,
         ),
     )
+
+
+def _outside(options: argparse.Namespace, n_images: int) -> list[int]:
+    """Return the indices of the images before ``--from`` and after ``--until``."""
+    given = vars(options)
+    first, last = int(given["from"] or 1), int(given["until"] or n_images)
+    return [i for i in range(n_images) if not first <= i + 1 <= last]
+
+
+def _part_of(seen: Observations, options: argparse.Namespace) -> Observations:
+    outside = _outside(options, len(seen.names))
+    return leave_out(seen, dict.fromkeys(outside, Reason.OUTSIDE))
 
 
 def _timed(seen: Observations, options: argparse.Namespace) -> Observations:
@@ -291,7 +312,7 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         calibrate_rig(
             rig,
             pen,
-            [_timed(each, options) for each in observations],
+            [_timed(_part_of(each, options), options) for each in observations],
             assumptions_of(options),
         ),
         pen.nominal_tip,

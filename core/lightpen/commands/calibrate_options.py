@@ -109,6 +109,14 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         choices=METHODS,
         help="estimator of the reported tip (joint; of a record, its own)",
     )
+    number = number_from(1, 10**6, "number", "")
+    for name, which in (("from", "first"), ("until", "last")):
+        parser.add_argument(
+            f"--{name}",
+            type=number,
+            metavar="N",
+            help=f"number of the {which} image to be used, from 1",
+        )
     parser.add_argument(
         "--nominal-tip",
         type=finite,

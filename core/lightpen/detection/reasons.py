@@ -27,6 +27,7 @@ class Reason(StrEnum):
     MISFIT = "LEDs do not fit"
     SLIPPED = "tip slipped"
     TAKEN_OUT = "taken out"  # by the user
+    OUTSIDE = "outside the part"  # of the swing that is used
     OTHER_MOMENT = "not of the same moment"  # as that of another camera
     COPY = "same as another image"
     ABSENT = "no image"  # of one camera at a moment that another saw
@@ -64,6 +65,7 @@ _WORDS = {
     Reason.MISFIT: message("reason.misfit"),
     Reason.SLIPPED: message("reason.slipped"),
     Reason.TAKEN_OUT: message("reason.taken-out"),
+    Reason.OUTSIDE: message("reason.outside"),
     Reason.OTHER_MOMENT: message("reason.other-moment"),
     Reason.COPY: message("reason.copy"),
     Reason.ABSENT: message("reason.absent"),

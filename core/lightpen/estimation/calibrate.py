@@ -27,6 +27,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.adjustment import Adjustment, adjust
 from lightpen.estimation.bundle.bundle import Bundle
+from lightpen.estimation.bundle.change_point import Step, step_of_poses
 from lightpen.estimation.bundle.consistency_findings import Contradiction
 from lightpen.estimation.bundle.disc_diameter import read_diameter
 from lightpen.estimation.bundle.field_findings import FoundField, found_fields
@@ -144,6 +145,7 @@ class Calibration:
     coverage: Coverage
     lags: tuple[TimeLag | None, ...] = ()  # of each camera of a rig but the first
     second: SecondCone | None = None
+    step: Step | None = None  # between two images; its ``first`` counts all images
     method: Method = "joint"  # of the reported tip
 
     @property
@@ -489,12 +491,27 @@ def _calibration_of(
         ),
         coverage=measure_coverage(joint.rotations),
         lags=start.lags,
+        step=_step_of(adjustment.step, start, single.posed[0], refined[0]),
         second=(
             None
             if adjusted.second is None
             else second_cone(adjustment, adjusted.second)
         ),
     )
+
+
+def _step_of(
+    step: Step | None, start: _Start, part: PosedImages, poses: Poses
+) -> Step | None:
+    """Return a step with its index among all images, a large one by the poses."""
+    reasons = start.reasons[part.posed, 0]
+    chosen = np.flatnonzero((reasons == Reason.NONE) | (reasons == Reason.SLIPPED))
+    large = step_of_poses(poses.of(chosen), reasons[chosen] == Reason.SLIPPED)
+    if large is not None:
+        return replace(large, first=int(part.posed[chosen][large.first]))
+    if step is None:
+        return None
+    return replace(step, first=int(start.moments[step.first]))
 
 
 def _paper_poses(

@@ -456,6 +456,17 @@ class SwingWorkflow:
         """Exclude images and compute the tip again."""
         self._want({**self._wanted, **dict.fromkeys(numbers, str(Reason.TAKEN_OUT))})
 
+    def use_part(self) -> None:
+        """Compute again with the longer part of a swing with a step."""
+        solution = self._status.solution
+        step = None if solution is None else solution.calibration.step
+        if solution is None or step is None:
+            return
+        begin, end = step.longer_part(len(solution.numbers))
+        outside = (*solution.numbers[: begin - 1], *solution.numbers[end:])
+        reasons = dict.fromkeys(map(int, outside), str(Reason.OUTSIDE))
+        self._want({**self._wanted, **reasons})
+
     def include(self, numbers: Iterable[int]) -> None:
         """Include images again and compute the tip again."""
         back = set(numbers)

@@ -3991,6 +3991,10 @@ needed</source>
         <translation>测头已接受。</translation>
     </message>
     <message>
+        <source>Use longer part</source>
+        <translation>用较长部分</translation>
+    </message>
+    <message>
         <source>Report joint fit</source>
         <translation>报告联合拟合</translation>
     </message>
@@ -5803,6 +5807,10 @@ mm</translation>
         <translation>弯曲：{bending:.0f} ± {uncertainty:.0f} µm（{day} 的压力试验）。</translation>
     </message>
     <message>
+        <source>Cone or camera moved</source>
+        <translation>锥孔或相机移动了</translation>
+    </message>
+    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
     </message>
@@ -6045,6 +6053,10 @@ mm</translation>
     <message>
         <source>Next: seat the tip firmly, calibrate it again, and verify the new result.</source>
         <translation>下一步：装紧测头，重新标定，并验证新的结果。</translation>
+    </message>
+    <message>
+        <source>Next: tighten or clamp what moved, then repeat the swing; or use the longer part.</source>
+        <translation>下一步：紧固或夹紧移动的部件后重新摆动；或使用较长部分。</translation>
     </message>
     <message>
         <source>Next: tighten the stylus or use a shorter, stiffer one, and calibrate again with gentle pressure.</source>
@@ -6507,6 +6519,10 @@ mm</translation>
         <translation>不能接受该测头。{why}</translation>
     </message>
     <message>
+        <source>The tip moved in the pen</source>
+        <translation>测头在光笔中移动了</translation>
+    </message>
+    <message>
         <source>The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.</source>
         <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
     </message>
@@ -6683,6 +6699,10 @@ mm</translation>
         <translation>无图像</translation>
     </message>
     <message>
+        <source>outside the part that is used</source>
+        <translation>不在所用部分之内</translation>
+    </message>
+    <message>
         <source>plan</source>
         <translation>方案</translation>
     </message>
@@ -6821,6 +6841,10 @@ mm</translation>
     <message>
         <source>{entry} in {name} is {number:g}; a whole number of 0 or more is needed. Correct it.</source>
         <translation>{name} 中的 {entry} 为 {number:g}；需要 0 或更大的整数。请更正。</translation>
+    </message>
+    <message>
+        <source>{kind} by {size:.3f} mm before image {image}. Images {begin} to {end} alone are the longer part.</source>
+        <translation>{kind} {size:.3f} mm，发生在图像 {image} 之前。较长部分为图像 {begin} 至 {end}。</translation>
     </message>
     <message>
         <source>{kind}, {side}</source>
@@ -11032,6 +11056,10 @@ mm</translation>
     <message>
         <source>No comparison possible</source>
         <translation>无法比较</translation>
+    </message>
+    <message>
+        <source>Moved during the swing</source>
+        <translation>摆动中移动</translation>
     </message>
     <message>
         <source>Two-stage tip uncertain</source>

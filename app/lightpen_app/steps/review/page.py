@@ -136,6 +136,8 @@ class ReviewPage(Page):
                 self._runner.ask(lambda workflow: workflow.accept())
             case NextStep.CAPTURE_MORE if not status.is_recording:
                 self._capture_more()
+            case NextStep.USE_PART:
+                self._runner.ask(lambda workflow: workflow.use_part())
             case NextStep.REPORT_JOINT:
                 self._report_by("joint")
             case NextStep.SEE_TO_CAUSE:

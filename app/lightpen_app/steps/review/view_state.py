@@ -157,6 +157,8 @@ def review_action(
             return MainAction(text, why_not, at_screen=True)
         case NextStep.CAPTURE_MORE if not status.is_recording:
             return MainAction(translate("ReviewPage", "Capture more"), why_not)
+        case NextStep.USE_PART:
+            return MainAction(translate("ReviewPage", "Use longer part"), why_not)
         case NextStep.REPORT_JOINT:
             return MainAction(translate("ReviewPage", "Report joint fit"), why_not)
         case NextStep.SEE_TO_CAUSE:

@@ -14,6 +14,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.change_point import Step, find_step
 from lightpen.estimation.bundle.consistency_findings import (
     ContradictedInputs,
     Contradiction,
@@ -49,6 +50,7 @@ class Adjustment:
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
     fields: tuple[SearchedField, ...]  # those that are not fitted
+    step: Step | None  # between two images; the fit does not contain it
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +111,13 @@ def adjust(
         )
         correlation = measure_correlation(bundle, pixels)
     fields = search_fields(bundle, pixels)
+    # Fixed lamps show a motion of the camera, which is then corrected.
+    step = find_step(bundle, pixels) if shifts is None else None
     if correlation.components is not None:
         bundle = replace(bundle, budget_components=correlation.components)
-    return Adjustment(bundle, fitted.priors, fitted.contradictions, correlation, fields)
+    return Adjustment(
+        bundle, fitted.priors, fitted.contradictions, correlation, fields, step
+    )
 
 
 def _fit_consistent(

@@ -305,6 +305,22 @@ def with_fields(
     return unknowns, _solve(unknowns, now, bundle.weight_sigma, with_components=True)
 
 
+def at_rest(bundle: Bundle, pixels: FloatArray) -> tuple[Solved, FloatArray]:
+    """Return the linear solution about a fit without drift and seat, but with jitter.
+
+    And its step from the fit, (p,); ``pixels`` (N, C, L, 2) as fitted, px.
+    """
+    now = _begun(bundle.unknowns, bundle, pixels)
+    components = NO_COMPONENTS._replace(
+        leds=bundle.components.leds,
+        jitter=bundle.components.jitter,
+        fields=bundle.components.fields,
+    )
+    now = now._replace(components=components)
+    solved = _solve(bundle.unknowns, now, bundle.weight_sigma, with_components=False)
+    return solved, solved.values - now.values
+
+
 def _started(
     unknowns: Unknowns,
     start: BundleState,

@@ -32,6 +32,7 @@ from lightpen.swing_messages import (
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 FAR_MOVED = 3.0  # times the limit of U: corrected motion of cone or camera
+STEP_MATTERS = 0.5  # times U: a step that moves the tip by a part of it
 MANY_REJECTED = 0.1  # of the LED centres
 MANY_DROPPED = 0.2  # of the images that show the pen
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
@@ -58,6 +59,7 @@ class NextStep(StrEnum):
     CAPTURE_MORE = "capture more"
     REPEAT = "repeat"
     REPORT_JOINT = "report joint fit"
+    USE_PART = "use longer part"
     CHECK_FILES = "check files"
     CHECK_CAMERA = "check camera file"
     CHECK_LEDS = "check LED file"
@@ -77,6 +79,7 @@ _TOLD = {
     NextStep.CAPTURE_MORE: message("next-step.capture-more"),
     NextStep.REPEAT: message("next-step.repeat"),
     NextStep.REPORT_JOINT: message("next-step.report-joint"),
+    NextStep.USE_PART: message("next-step.use-part"),
     NextStep.CHECK_FILES: message("next-step.check-files"),
     NextStep.CHECK_CAMERA: message("next-step.check-camera"),
     NextStep.CHECK_LEDS: message("next-step.check-leds"),
@@ -132,6 +135,7 @@ _NEXT_STEPS = {
     Code.GOOD_UNCHECKED: NextStep.ACCEPT,
     Code.UNCERTAIN: NextStep.CAPTURE_MORE,
     Code.TWO_STAGE_OFF: NextStep.REPORT_JOINT,
+    Code.STEP: NextStep.USE_PART,
     Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
     Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
     Code.HALVES_DIFFER: NextStep.REPEAT,
@@ -254,6 +258,9 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     long a camera ran before and after, and a swing that is captured does not keep it.
     """
     uncertainty = reported(calibration).budget.weakest_uncertainty
+    step = calibration.step
+    if step is not None and step.size > STEP_MATTERS * uncertainty:
+        return Verdict(Grade.REPEAT, step.told(len(calibration.used)))
     if uncertainty > FAR_OFF * limits.max_uncertainty:
         return Verdict(Grade.REPEAT, _why_uncertain(calibration, limits))
     for finding in _findings(calibration, limits):

@@ -234,4 +234,5 @@ def _turned_to_fit(
 
 
 def _reason(text: str) -> Reason:
-    return Reason.SLIPPED if text == Reason.SLIPPED else Reason.TAKEN_OUT
+    known = (Reason.SLIPPED, Reason.OUTSIDE)
+    return Reason(text) if text in known else Reason.TAKEN_OUT
