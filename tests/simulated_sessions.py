@@ -41,6 +41,7 @@ from lightpen.verification.tasks.artefact import measure_artefacts
 from lightpen.verification.tasks.drift import measure_drift
 from lightpen.verification.tasks.fixed_point import (
     FIXED_POINT,
+    USUAL_FRAMES,
     USUAL_TOUCHES,
     FixedPointOptions,
     measure_fixed_point,
@@ -204,7 +205,7 @@ def fixed_point_session(
     station: SimulatedStation,
     rng: np.random.Generator,
     n: int = USUAL_TOUCHES,
-    n_frames: int = N_FRAMES,
+    n_frames: int = USUAL_FRAMES,
 ) -> Found:
     """Verify by a cone, as the program asks for it."""
     goals = [FIXED_POINT.hand(FixedPointOptions(n), 0, step) for step in range(n)]

@@ -44,7 +44,7 @@ LENGTH = Artefact(ArtefactKind.LENGTH, 150.0, 0.001)
 ARTEFACTS = artefact_plan("Ring and bar", [RING, LENGTH], {FeatureKind.CIRCLE: 10})
 CHOICES = VerificationChoices(
     (FIXED_POINT.kind, PART.kind),
-    (FixedPointOptions(n_touches=4), PartOptions(ARTEFACTS)),
+    (FixedPointOptions(4, n_frames=3), PartOptions(ARTEFACTS)),
     n_frames=3,
 )
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)

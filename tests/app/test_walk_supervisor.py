@@ -21,7 +21,7 @@ STRICT = "0.0010"
 CHOSEN = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     verification=VerificationChoices(
-        options=(FixedPointOptions(n_touches=5),), n_frames=2
+        options=(FixedPointOptions(5, n_frames=3),), n_frames=2
     ),
 )
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 STATION = "Hall 2"
 RULE = "Decision rule: simple acceptance (JCGM 106, 8.2)."
 TASKS_BEFORE_PEN = len(TASKS)
-FIVE = (FixedPointOptions(n_touches=5),)  # fewer do not verify a tip
+FIVE = (FixedPointOptions(5, n_frames=3),)  # fewer do not verify a tip
 TOUCHES = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     verification=VerificationChoices(options=FIVE, n_frames=2),
@@ -84,7 +84,7 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
 
     assert walker.n_inputs == n_inputs
     assert walker.says("PASS")
-    assert walker.says("Fixed point: PASS")
+    assert walker.says("Tip check: PASS")
     assert [each["verification"] for each in records(walker)] == [
         FIXED_POINT.kind,
         CONCLUSION,

@@ -246,7 +246,7 @@ class VerificationWorkflow:
             return
         if self._keeping.has_read(DRIFT):
             setup = with_drift(setup, state.found_by(DRIFT))
-        rules = read_rules(is_still, setup.choices.n_frames)
+        rules = read_rules(is_still, setup.choices.frames_of(task))
         work = partial(read_runs, task, place, tip, setup, rules)
         images = ReadImages(task.kind, place, is_still)
         self._start(

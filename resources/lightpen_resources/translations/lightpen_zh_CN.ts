@@ -5731,10 +5731,6 @@ mm</translation>
         <translation>请采集更多图像。</translation>
     </message>
     <message>
-        <source>Change the pen tilt</source>
-        <translation>改变光笔倾斜</translation>
-    </message>
-    <message>
         <source>Changes of other stations to the tip library that a supervisor has not signed yet: {n}.</source>
         <translation>其他工位对测头库的更改中，主管尚未签署的有 {n} 项。</translation>
     </message>
@@ -5823,16 +5819,8 @@ mm</translation>
         <translation>误差</translation>
     </message>
     <message>
-        <source>Expected std. deviation</source>
-        <translation>预期标准差</translation>
-    </message>
-    <message>
         <source>File name too long</source>
         <translation>文件名过长</translation>
-    </message>
-    <message>
-        <source>Fixed point</source>
-        <translation>固定点</translation>
     </message>
     <message>
         <source>Fixed point: std. deviation along the line of sight</source>
@@ -6211,10 +6199,6 @@ mm</translation>
         <translation>在其他任务之间触测锥孔</translation>
     </message>
     <message>
-        <source>Probe the cone in new postures</source>
-        <translation>以新的姿态触测锥孔</translation>
-    </message>
-    <message>
         <source>Probe the cone upright</source>
         <translation>光笔竖直，触测锥孔</translation>
     </message>
@@ -6561,6 +6545,10 @@ mm</translation>
     <message>
         <source>Tip (text)</source>
         <translation>测球中心（文本）</translation>
+    </message>
+    <message>
+        <source>Tip check</source>
+        <translation>测头检查</translation>
     </message>
     <message>
         <source>Tip comparison / mm</source>
@@ -8247,10 +8235,6 @@ mm</translation>
         <translation>服务器上：{finding}</translation>
     </message>
     <message>
-        <source>Point std. deviation: u {u:.4f}, v {v:.4f}, w {w:.4f} mm over all postures.</source>
-        <translation>各姿态下该点的标准差：u {u:.4f}、v {v:.4f}、w {w:.4f} mm。</translation>
-    </message>
-    <message>
         <source>Point {number}</source>
         <translation>测点 {number}</translation>
     </message>
@@ -8459,12 +8443,28 @@ mm</translation>
         <translation>到相机的链路丢失图像：{n_sent} 幅中有 {n_incomplete} 幅不完整，{n_missed} 幅未到达。请降低帧率，使用更小的区域或更大的数据包，或检查线缆和交换机。</translation>
     </message>
     <message>
+        <source>(max - min) / 2</source>
+        <translation>（最大 - 最小）/ 2</translation>
+    </message>
+    <message>
+        <source>(max - min) / 2 of the point over all postures: u {u:.4f}, v {v:.4f}, w {w:.4f} mm.</source>
+        <translation>各姿态下该点的（最大 - 最小）/ 2：u {u:.4f}，v {v:.4f}，w {w:.4f} mm。</translation>
+    </message>
+    <message>
         <source>It is a whole project: save the calibration of the one camera by Tools, Camera Calibration, Save, as XML.</source>
         <translation>它是整个项目：请通过 Tools、Camera Calibration、Save 将这一台相机的标定保存为 XML。</translation>
     </message>
     <message>
         <source>Its distortion is not that of OpenCV or of Kannala and Brandt: calibrate the camera from the images of its board, here or with one of these models.</source>
         <translation>其畸变不是 OpenCV 或 Kannala-Brandt 的模型：请用标定板图像标定相机，可在此处，或采用其中一种模型。</translation>
+    </message>
+    <message>
+        <source>Lean the pen as the dial shows</source>
+        <translation>按姿态盘所示倾斜光笔</translation>
+    </message>
+    <message>
+        <source>Lean the pen in the cone to all sides</source>
+        <translation>在锥孔中向各方向倾斜光笔</translation>
     </message>
     <message>
         <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.</source>

@@ -439,7 +439,7 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
 
 
 WITH_LAMP = VerificationChoices(
-    (FIXED_POINT.kind,), (FixedPointOptions(n_touches=3),), n_frames=8
+    (FIXED_POINT.kind,), (FixedPointOptions(3, n_frames=8),), n_frames=8
 )
 
 

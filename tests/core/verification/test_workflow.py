@@ -206,11 +206,11 @@ def test_a_verification_with_other_choices(
     trace.come()  # the same
     trace.pick_up()
     trace.touch(*leant(4)[:2])
-    act.choose(trace.prepared, CHOICES.with_options(FixedPointOptions(n_touches=3)))
+    act.choose(trace.prepared, CHOICES.with_options(FixedPointOptions(3, n_frames=3)))
     trace.touch(leant(4)[2])
     trace.pick_up()
     trace.touch(*round_a_ring(11, 31.751)[:3])
-    faster = replace(CHOICES.with_options(FixedPointOptions(n_touches=3)), n_frames=2)
+    faster = replace(CHOICES.with_options(FixedPointOptions(3, n_frames=3)), n_frames=2)
     act.choose(trace.prepared, faster)
     trace.pick_up()
     trace.touch(*round_a_ring(11, 31.751)[:10], BAR[0])

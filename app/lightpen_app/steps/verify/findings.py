@@ -59,10 +59,15 @@ def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> Di
     if not (points or state.task(setup) is task):
         return DialValue()
     pen = setup.instrument.pen
-    return dial_of(
+    dial = dial_of(
         [posture_of(pen, point.rotation) for point in points],
         live_posture(setup, state),
     )
+    if state.task(setup) is not task:
+        return dial
+    options = setup.choices.options_of(task)
+    goal = task.hand(options, len(progress.runs), len(progress.points))
+    return replace(dial, target=Posture(goal.tilt, goal.direction, 0.0))
 
 
 def _dial() -> PostureDial:

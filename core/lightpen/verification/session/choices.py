@@ -38,6 +38,10 @@ class VerificationChoices:
         own = (each for each in self.options if isinstance(each, task.options))
         return next(own, task.options())
 
+    def frames_of(self, task: AnyTask) -> int:
+        """Return the number of images of a point of a task."""
+        return task.n_frames(self.options_of(task)) or self.n_frames
+
     def with_options(self, options: AnyOptions) -> "VerificationChoices":
         """Return a copy with other options of a task."""
         chosen = {type(each): each for each in (*self.options, options)}

@@ -247,7 +247,8 @@ def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> Probing
     """Return the probing rules of the next point of a task."""
     options = setup.choices.options_of(task)
     turn, distance = task.newness(options)
-    rules = ProbingRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
+    n_frames = setup.choices.frames_of(task)
+    rules = ProbingRules(n_frames, min_turn=turn, min_distance=distance)
     is_sliding = bool(state.touches) and state.touching.is_sliding
     if is_sliding and task.scans(options, len(state.runs)):
         return replace(rules, n_frames=1, n_settling=0)

@@ -93,7 +93,9 @@ def resume_verification(
     n_all = len(under_way.read) + len(under_way.runs)
     done: list[CompletedTask] = []
     for n, images in enumerate(under_way.read, start=1):
-        rules = read_rules(images.is_still, under_way.choices.n_frames)
+        rules = read_rules(
+            images.is_still, under_way.choices.frames_of(task_of(images.task))
+        )
         drifted = with_drift(setup, state.found_by(DRIFT))  # which was read before
         read = read_runs(
             task_of(images.task), images.place, tip, drifted, rules, lambda _: None
@@ -106,7 +108,7 @@ def resume_verification(
         record = open_record(root / TOUCHES / run.folder)
         task = task_of(run.task)
         scans = task.scans(under_way.choices.options_of(task), len(state.runs))
-        held = _held_in(record, under_way.choices.n_frames, scans=scans)
+        held = _held_in(record, under_way.choices.frames_of(task), scans=scans)
         lamps = lamps.then(_lamps_in(record, setup))
         drifted = with_drift(setup, lamps.lamp_drift(cameras, setup.choices.limits))
         if record.verdict == CONCLUDED:

@@ -1,4 +1,4 @@
-"""A fixed point measured again and again in new postures: the paper's Table 2.
+"""The tip check: a fixed point in new postures, the paper's Table 2.
 
 A tip that is right stays where it is, however the pen is held; one that is off by d in
 the pen's frame moves by ``R_i d``. So where the points scatter, the postures
@@ -19,7 +19,8 @@ from lightpen.estimation.pivot.pivot import in_deviations
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.expanded_uncertainty import COVERAGE, COVERAGE_FACTOR
+from lightpen.model.information import symmetric_root
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.quantiles import chi_quantile, chi_square_quantile
 from lightpen.verification.tasks.assessment import (
@@ -58,11 +59,12 @@ from lightpen.verification.tasks.tip_evidence import (
     tip_entries,
 )
 
-USUAL_TOUCHES = 15
+USUAL_TOUCHES, USUAL_FRAMES = 6, 15  # find a tip that is wrong by 0.02 mm
 MIN_TOUCHES, MAX_TOUCHES = 3, 50
 NEW_POSTURE = float(np.radians(8.0))
 ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
-TILTS = 0.5, 0.25  # rad, of the simulated operator
+TILT = 0.55  # rad, to lean the pen by, once round the cone
+N_DRAWS = 2000
 MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less verifies nothing
 ASTRAY = 8.0  # times the median distance from the middle
 LIFTED = 0.2  # mm; nearer points scatter, farther ones may be of a lifted pen
@@ -91,6 +93,11 @@ class Scatter:
         """Largest minus smallest of each coordinate, (3,)."""
         return np.asarray(np.ptp(self.points, axis=0))
 
+    @property
+    def half_range(self) -> FloatArray:
+        """Half the largest minus the smallest of each coordinate, (3,)."""
+        return self.range / 2
+
 
 @dataclass(frozen=True, eq=False)
 class FixedPoint(Found):
@@ -102,6 +109,7 @@ class FixedPoint(Found):
     nominal: Scatter | None  # with the nominal tip, if known
     uncertainty: FloatArray  # (3,), U (k = 2) of the mean, mm
     expected_deviation: FloatArray  # (3,), of a touch by its covariance, mm
+    half_range_uncertainty: FloatArray  # (3,): 95 % of the half ranges by noise, mm
     tip: TipEvidence
     moved: FloatArray | None  # (3,), mean less the calibration's cone, mm
 
@@ -112,9 +120,10 @@ class FixedPoint(Found):
 
 
 class FixedPointOptions(TaskOptions, frozen=True, tag="fixed point"):
-    """Number of touches of the cone."""
+    """Number of touches of the cone, and of the images of each."""
 
     n_touches: Annotated[int, Meta(ge=MIN_TOUCHES, le=MAX_TOUCHES)] = USUAL_TOUCHES
+    n_frames: Annotated[int, Meta(ge=1, le=100)] = USUAL_FRAMES
 
 
 def measure_fixed_point(
@@ -141,6 +150,7 @@ def measure_fixed_point(
         nominal=nominal_scatter(kept, instrument, conditions.nominal_tip),
         uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
         expected_deviation=expected,
+        half_range_uncertainty=_half_range_by_noise(covariance),
         tip=points_evidence(kept, instrument, conditions.drift),
         moved=None if cone_cam is None else calibrated.mean - cone_cam,
         assessment=accepted(_steady(calibrated)),
@@ -148,8 +158,17 @@ def measure_fixed_point(
     return replace(found, assessment=_assessment(found, conditions.limits))
 
 
+def _half_range_by_noise(covariance: FloatArray) -> FloatArray:
+    """Return the half range that a point at rest shows with 95 % probability, mm."""
+    rng = np.random.default_rng(0)
+    drawn = rng.standard_normal((N_DRAWS, len(covariance)))
+    drawn = (drawn @ symmetric_root(covariance)).reshape(N_DRAWS, -1, 3)
+    half = np.ptp(drawn, axis=1) / 2
+    return np.asarray(np.quantile(half, COVERAGE, axis=0))
+
+
 def _steady(scatter: Scatter) -> Message:
-    u, v, w = scatter.deviation.tolist()
+    u, v, w = scatter.half_range.tolist()
     return message("fixed-point.steady", u=u, v=v, w=w)
 
 
@@ -276,6 +295,8 @@ def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
         "nominal": None if found.nominal is None else _scatter_entries(found.nominal),
         "expanded_uncertainty_mm": found.uncertainty,
         "expected_std_mm": found.expected_deviation,
+        "half_range_mm": found.calibrated.half_range,
+        "half_range_expanded_uncertainty_mm": found.half_range_uncertainty,
         "moved_mm": found.moved,
         **tip_entries(found.tip),
         "touches": point_entries(found.touches, instrument.seated),
@@ -294,7 +315,10 @@ def _scatter_entries(scatter: Scatter) -> dict[str, Any]:
 
 def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...]:
     own = [
-        ResultRow(message("fixed-point.expected"), found.expected_deviation.tolist()),
+        ResultRow(
+            message("fixed-point.half-range"), found.calibrated.half_range.tolist()
+        ),
+        ResultRow(message("table.uncertainty"), found.half_range_uncertainty.tolist()),
         ResultRow(message("table.mean-uncertainty"), found.uncertainty.tolist()),
     ]
     if found.moved is not None:
@@ -376,9 +400,10 @@ FIXED_POINT = VerificationTask(
     tables=_tables,
     figures_so_far=_figures_so_far,
     hand=lambda options, run, step: HandGoal(
-        tilt=TILTS[step % 2], direction=2 * pi * step / options.n_touches
+        tilt=TILT, direction=2 * pi * step / options.n_touches
     ),
     n_points=lambda options: options.n_touches,
+    n_frames=lambda options: options.n_frames,
     instruction=lambda options, progress: message("session.touch-cone"),
     screen=_screen,
     newness=lambda options: (NEW_POSTURE, ANY),

@@ -152,6 +152,8 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     # Turn, rad, or distance, mm, that makes a point new; both 0 once lifted
     newness: Callable[[OptionsT], tuple[float, float]]
     n_points: Callable[[OptionsT], int]  # of a run
+    # Images of a point; None for as many as are chosen for all tasks
+    n_frames: Callable[[OptionsT], int | None] = lambda _: None
     options: type[OptionsT]
     other_run: Message | None = None  # what to do for the first point of another
     n_runs: Callable[[OptionsT], int] = lambda _: 1

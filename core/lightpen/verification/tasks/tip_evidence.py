@@ -41,7 +41,7 @@ from lightpen.verification.tasks.assessment import (
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
 
-BY_CHANCE = 0.015  # probability that a correct tip looks wrong
+BY_CHANCE = 0.01  # probability that a correct tip looks wrong
 MISSED = 0.05  # probability that an error of the stated size is missed
 TIP_SIGMA = 3.0  # mm, by which another tip may differ
 LARGEST = 1.0  # mm; least detectable error above which there is no evidence

@@ -243,7 +243,7 @@ def test_a_task_ended_early_has_what_its_touches_give(session: Session) -> None:
 
 
 def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
-    session.choose(FIXED_POINT, options=FixedPointOptions(n_touches=6))
+    session.choose(FIXED_POINT, options=FixedPointOptions(6, n_frames=3))
     instrument = session.setup.instrument
     bent = instrument.tip_pen + np.array([0.3, 0.0, 0.0])
     session.holder = Holder(instrument.rig, instrument.pen, bent)
@@ -369,7 +369,7 @@ def test_what_waits_for_a_visit_waits_with_other_choices_until_none_is_needed(
     setup, choices = witnessed.setup, witnessed.setup.choices
 
     _, waiting = with_other_choices(
-        setup, witnessed.state, choices.with_options(FixedPointOptions(n_touches=5))
+        setup, witnessed.state, choices.with_options(FixedPointOptions(5, n_frames=3))
     )
     _, done = with_other_choices(
         setup, witnessed.state, replace(choices, kinds=(FIXED_POINT.kind, PART.kind))

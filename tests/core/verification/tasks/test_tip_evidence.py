@@ -88,7 +88,7 @@ def test_points_in_one_posture_leave_the_tip_as_unknown_as_before(
 
 def test_an_error_is_detectable_that_is_missed_once_in_twenty_times() -> None:
     sigma = 0.01
-    gate = chi2.isf(0.015, 3)
+    gate = chi2.isf(0.01, 3)
     found = _detectable(np.diag([sigma, 0.5 * sigma, 0.1 * sigma]) ** 2)
 
     assert ncx2.sf(gate, 3, (found / sigma) ** 2) == pytest.approx(0.95, abs=1e-6)
@@ -116,7 +116,7 @@ def test_a_change_is_more_than_chance_beyond_its_quantile(
 
     usual = moved(0.01)
     squared = usual.change @ np.linalg.solve(usual.covariance, usual.change)
-    found = moved(0.01 * by * np.sqrt(chi2.isf(0.015, 3) / squared))
+    found = moved(0.01 * by * np.sqrt(chi2.isf(0.01, 3) / squared))
 
     assert found.is_significant == is_significant
     entries = tip_entries(found)
