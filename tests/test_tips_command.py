@@ -58,7 +58,17 @@ def test_certificates_are_kept_and_only_references_have_a_value(
 ) -> None:
     where = ("--data", tmp_path / "data")
     dated = ("--certificate", "K-17", "--certified", "2026-03-01")
-    lightpen("tips", "add", "reference", "R-1", *where, *dated, "--value", "31.7512")
+    lightpen(
+        "tips",
+        "add",
+        "reference",
+        "R-1",
+        *where,
+        *dated,
+        "--value",
+        "31.7512",
+        *("--shape", "ring", "--value-uncertainty", "0.0005"),
+    )
     lightpen("tips", "add", "camera", "CAM-7", *where, *dated)
     refused = lightpen("tips", "change", "camera", "CAM-7", *where, "--value", "3")
     lightpen("tips", "change", "camera", "CAM-7", *where, "--certified", "none")
@@ -70,6 +80,7 @@ def test_certificates_are_kept_and_only_references_have_a_value(
         "2026-03-01",
         31.7512,
     )
+    assert (reference["shape"], reference["uncertainty_mm"]) == ("ring", 0.0005)
 
 
 def test_a_library_without_anything_is_named(lightpen: Run, tmp_path: Path) -> None:

@@ -12,12 +12,15 @@ from lightpen.commands.arguments import (
     DataFolder,
     add_data,
     finite,
+    not_negative,
     whole_number,
 )
 
 T = TypeVar("T")
 
 KINDS = ("pen", "tip", "cone", "camera", "reference")
+SHAPES = ("ring", "length", "sphere", "plate")  # see `ArtefactKind`
+SIDES = ("centre", "inside", "outside")
 NOTHING = "none"  # instead of a value, clears it
 
 
@@ -88,6 +91,29 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
         type=_or_nothing(finite),
         metavar="MM",
         help="certified value; reports find the reference by it",
+    )
+    of_references.add_argument(
+        "--shape",
+        choices=SHAPES,
+        help="of a radius, length, diameter or flatness: the step Measure then offers "
+        "its plan",
+    )
+    of_references.add_argument(
+        "--value-uncertainty",
+        type=not_negative,
+        metavar="MM",
+        help="U (k = 2) of the certified value",
+    )
+    of_references.add_argument(
+        "--side",
+        choices=SIDES,
+        help="where the ball touches (centre: in a groove or cones)",
+    )
+    of_references.add_argument(
+        "--expansion",
+        type=not_negative,
+        metavar="PPM/K",
+        help="coefficient of thermal expansion",
     )
     of_tips = action.add_argument_group(
         "tips", f"'{NOTHING}' instead of a value clears the field"

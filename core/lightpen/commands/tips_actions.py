@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ from lightpen.commands.console import Command, printing, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import ArchiveError, UsageError
 from lightpen.local_time import local_now
+from lightpen.measuring.artefacts import ArtefactKind
+from lightpen.measuring.plan import Side
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.library_changes import (
@@ -40,6 +42,13 @@ from lightpen.record.library.tip_library import (
     read_library,
 )
 
+OF_REFERENCES: dict[str, tuple[str, Callable[[Any], Any]]] = {  # options and types
+    "certified_mm": ("value", float),
+    "shape": ("shape", ArtefactKind),
+    "uncertainty_mm": ("value_uncertainty", float),
+    "side": ("side", Side),
+    "expansion_ppm": ("expansion", float),
+}
 OF_TIPS = {  # options, by their entry of a tip
     "ball_diameter_mm": "ball_diameter",
     "nominal_tip_mm": "nominal",
@@ -131,10 +140,14 @@ def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
         value = getattr(options, name)
         if value is not None:
             item = structs.replace(item, **{name: _or_none(value)})
-    if options.value is not None:
-        if not isinstance(item, ListedReference):
-            raise UsageError("library.only-references", id=item.id)
-        item = structs.replace(item, certified_mm=_or_none(options.value))
+    of_reference = {
+        entry: None if value is FORGOTTEN else of_type(value)
+        for entry, (option, of_type) in OF_REFERENCES.items()
+        if (value := getattr(options, option)) is not None
+    }
+    if of_reference and not isinstance(item, ListedReference):
+        raise UsageError("library.only-references", id=item.id)
+    item = structs.replace(item, **of_reference)
     entries = dict(_entries_of_tip(options))
     if entries and not isinstance(item, ListedTip):
         raise UsageError("library.only-tips", id=item.id)

@@ -1959,6 +1959,18 @@
         <translation>证书值</translation>
     </message>
     <message>
+        <source>Shape</source>
+        <translation>形状</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the value</source>
+        <translation>该值的 U（k = 2）</translation>
+    </message>
+    <message>
+        <source>Contact</source>
+        <translation>接触</translation>
+    </message>
+    <message>
         <source>Max. change since last calibration</source>
         <translation>距上次标定的最大变化</translation>
     </message>
@@ -3480,6 +3492,10 @@
         <translation>使用模拟平板</translation>
     </message>
     <message>
+        <source>Artefact of the library</source>
+        <translation>库中的标准件</translation>
+    </message>
+    <message>
         <source>Feature</source>
         <translation>要素</translation>
     </message>
@@ -3530,6 +3546,10 @@
     <message>
         <source>Part</source>
         <translation>工件</translation>
+    </message>
+    <message>
+        <source>Artefact...</source>
+        <translation>标准件...</translation>
     </message>
     <message>
         <source>Save the measuring plan</source>

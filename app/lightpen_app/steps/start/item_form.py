@@ -9,6 +9,9 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QLineEdit, QWidget
 
 from lightpen.local_time import local_now
+from lightpen.measuring.artefacts import KIND_WORDS, ArtefactKind
+from lightpen.measuring.plan import Side
+from lightpen.measuring.report import SIDES
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
 from lightpen.record.library.library_changes import read_kept_picture, read_picture
 from lightpen.record.library.tip_library import (
@@ -21,10 +24,12 @@ from lightpen.record.library.tip_library import (
     ListedTip,
 )
 from lightpen_app.look.layouts import GridPlace, grid_layout
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.fields import PointField
 from lightpen_app.steps.start.tip_picture import ReadPicture, TipPicture
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
@@ -55,6 +60,12 @@ class ItemForm(Translated, QWidget):
         self._due, self._certified = DateField(to_come), DateField()
         self._certificate = QLineEdit(maxLength=LONGEST_ID)
         self._value = NumberField("mm", (0.0, LARGEST_REFERENCE), 4)
+        self._shape, self._side = ChoiceField(), ChoiceField()
+        for shape in (None, *ArtefactKind):
+            self._shape.addItem("", shape)
+        for side in SIDES:
+            self._side.addItem("", side)
+        self._uncertainty = NumberField("mm", (0.0, 1.0), 4)
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
         self._change = NumberField("mm", (0.0, LARGEST_CHANGE), 4)
         self._days = NumberField("", (0, MOST_DAYS), 0)
@@ -67,7 +78,8 @@ class ItemForm(Translated, QWidget):
         self._note = QLineEdit(maxLength=LONGEST_NOTE)
         own = (self._ball, self._change, self._days, self._swings)
         of_all = (self._id, self._due, self._certificate, self._certified)
-        fields = (*of_all, self._value, *own, self._picture, self._note)
+        of_reference = self._value, self._shape, self._uncertainty, self._side
+        fields = (*of_all, *of_reference, *own, self._picture, self._note)
         self._labels: dict[QWidget, QLabel] = {
             field: field_label(field) for field in (*fields, self._nominal)
         }
@@ -83,8 +95,10 @@ class ItemForm(Translated, QWidget):
         self._add(grid, self._certificate, at=(1, 0))
         self._add(grid, self._certified, at=(1, 1))
         self._reference_only = QWidget()
-        self._add(grid_layout(self._reference_only), self._value, at=(0, 0))
-        grid.addWidget(self._reference_only, 1, 2)
+        row = grid_layout(self._reference_only, spacing=(2 * GRID, GRID // 2))
+        for column, of_it in enumerate(of_reference):
+            self._add(row, of_it, at=(0, column))
+        grid.addWidget(self._reference_only, 3, 0, 1, 4)
         grid.addWidget(self._tip_only, 2, 0, 1, 4)
         inner = grid_layout(self._tip_only, spacing=(2 * GRID, GRID // 2))
         for column, field in enumerate(own):
@@ -120,7 +134,15 @@ class ItemForm(Translated, QWidget):
         )
         if isinstance(item, ListedReference):
             self._value.settle()
-            return structs.replace(item, certified_mm=self._value.value() or None)
+            self._uncertainty.settle()
+            shape, side = self._shape.currentData(), self._side.currentData()
+            return structs.replace(
+                item,
+                certified_mm=self._value.value() or None,
+                shape=None if shape is None else ArtefactKind(shape),
+                uncertainty_mm=self._uncertainty.value(),
+                side=Side(side),
+            )
         if not isinstance(item, ListedTip):
             return item
         nominal = self._nominal.value()
@@ -148,6 +170,9 @@ class ItemForm(Translated, QWidget):
         self._reference_only.setVisible(isinstance(item, ListedReference))
         if isinstance(item, ListedReference):
             self._value.set_value(item.certified_mm or 0.0)
+            self._shape.setCurrentIndex(self._shape.findData(item.shape))
+            self._uncertainty.set_value(item.uncertainty_mm)
+            self._side.setCurrentIndex(self._side.findData(item.side))
         self._note.setText(item.note)
         self._picture.set_value("")
         self._show_picture()
@@ -201,6 +226,9 @@ class ItemForm(Translated, QWidget):
             self._certificate: self.tr("Certificate number"),
             self._certified: self.tr("Date of the certificate"),
             self._value: self.tr("Certified value"),
+            self._shape: self.tr("Shape"),
+            self._uncertainty: self.tr("U (k = 2) of the value"),
+            self._side: self.tr("Contact"),
             self._ball: self.tr("Ball diameter"),
             self._change: self.tr("Max. change since last calibration"),
             self._days: self.tr("Calibration interval (days)"),
@@ -219,8 +247,13 @@ class ItemForm(Translated, QWidget):
                 date(local_now().year + 1, 8, 14)
             ),
         )
-        for field in (self._ball, self._value):
+        for field in (self._ball, self._value, self._uncertainty):
             field.set_empty_text(nothing)
+        self._shape.setItemText(0, nothing)
+        for index, shape in enumerate(ArtefactKind, start=1):
+            self._shape.setItemText(index, worded(KIND_WORDS[shape]))
+        for index, side in enumerate(SIDES):
+            self._side.setItemText(index, worded(SIDES[side]))
         self._change.set_empty_text(self.tr("No limit"))
         set_tooltip(
             self._change,

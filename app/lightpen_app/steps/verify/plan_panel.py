@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.file_format import FileFormat
+from lightpen.measuring.artefacts import artefact_plan
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import MeasuredPart, taught_plan
 from lightpen.measuring.plan import Plan, PlannedFeature, free_plan
@@ -49,6 +50,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         # Widgets
         self._name = text_label(TextSize.BODY, Tone.QUIET)
         self._open, self._free, self._plate = (PushButton() for _ in range(3))
+        self._artefact = ChoiceField()
         self._kind_label = text_label(TextSize.SMALL, Tone.QUIET)
         self._kind = ChoiceField()
         self._kind_label.setBuddy(self._kind)
@@ -58,7 +60,8 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._moved, self._save_plan, self._export = (PushButton() for _ in range(3))
 
         # Layout
-        cells = (self._open, self._free, self._plate, (self._name, 1))
+        buttons = self._open, self._artefact, self._free, self._plate
+        cells = (*buttons, (self._name, 1))
         of_feature = self._kind_label, self._kind, self._scan
         of_part = self._moved, self._save_plan, self._export
         self._rows = horizontal_layout(self)
@@ -70,6 +73,8 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._open.clicked.connect(self._on_open_clicked)
         self._free.clicked.connect(self._on_free_clicked)
         self._plate.clicked.connect(self._on_plate_clicked)
+        self._artefact.activated.connect(self._on_artefact_chosen)
+        workbench.library.changed.connect(self._list_artefacts)
         self._kind.activated.connect(self._on_kind_chosen)
         self._scan.clicked.connect(self._on_scan_clicked)
         self._moved.clicked.connect(self._on_moved_clicked)
@@ -140,6 +145,8 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
             ),
         )
         self._plate.setText(self.tr("Use simulated plate"))
+        self._artefact.setAccessibleName(self.tr("Artefact of the library"))
+        self._list_artefacts()
         self._kind_label.setText(self.tr("Feature"))
         self._kind.setAccessibleName(self.tr("Kind of the feature that is probed"))
         self._kind.setItemText(0, self.tr("Recognise"))
@@ -187,6 +194,21 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
     def _on_free_clicked(self) -> None:
         self.choose(free_plan(self.tr("Part")))
+
+    def _list_artefacts(self) -> None:
+        """Offer the references of the library that have a plan."""
+        self._artefact.clear()
+        self._artefact.addItem(self.tr("Artefact..."))
+        listed = self._workbench.library.statuses.library.references
+        for name, item in listed.items():
+            if item.artefact is not None and not item.is_retired:
+                self._artefact.addItem(name, item.artefact)
+        self._artefact.setVisible(self._artefact.count() > 1)
+
+    def _on_artefact_chosen(self) -> None:
+        artefact = self._artefact.currentData()
+        if artefact is not None:
+            self.choose(artefact_plan(self._artefact.currentText(), [artefact]))
 
     def _on_plate_clicked(self) -> None:
         self.choose(plate_plan())

@@ -8,7 +8,6 @@ from lightpen.record.library.tip_library import AnyItem, ItemKind, Library
 from lightpen.record.swings.names import Names
 
 SAME = 1e-6  # mm, between the certified values of library and verification
-CERTIFIED, IN_MM = "certified_", "_mm"  # of the names of such values in its record
 
 
 @dataclass(frozen=True)
@@ -48,12 +47,9 @@ def traced_items(
 def certified_values(record: Mapping[str, Any]) -> tuple[float, ...]:
     """Return the certified values in the record of a verification, mm."""
     return tuple(
-        value
-        for name, value in record.items()
-        if name.startswith(CERTIFIED)
-        and name.endswith(IN_MM)
-        and "uncertainty" not in name
-        and isinstance(value, float)
+        each["nominal"]
+        for each in record.get("characteristics", ())
+        if each.get("certified_expanded_uncertainty") is not None and each["nominal"]
     )
 
 

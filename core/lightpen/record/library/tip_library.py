@@ -30,6 +30,8 @@ from lightpen.formats.own_json import (
     require_usual,
 )
 from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
+from lightpen.measuring.artefacts import Artefact, ArtefactKind
+from lightpen.measuring.plan import Side
 from lightpen.messages import Message, message
 from lightpen.model.bending import Bending, MeasuredBending, bending_on
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
@@ -47,6 +49,7 @@ LARGEST_CHANGE = 10.0  # mm
 LARGEST_REFERENCE = 10_000.0  # mm
 LARGEST_EXPANSION = 1e-3  # 1/K
 
+Size: TypeAlias = Annotated[float, Meta(ge=0, le=LARGEST_REFERENCE)]
 Id: TypeAlias = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
 
 
@@ -134,7 +137,24 @@ class ListedReference(Item, frozen=True, kw_only=True, tag="reference"):
 
     kind: ClassVar[ItemKind] = ItemKind.REFERENCE
 
-    certified_mm: Annotated[float, Meta(ge=0, le=LARGEST_REFERENCE)] | None = None
+    certified_mm: Size | None = None
+    shape: ArtefactKind | None = None  # None if it is not measured by its plan
+    uncertainty_mm: Size = 0.0  # U (k = 2) of the certificate
+    side: Side = Side.CENTRE  # that the ball touches
+    expansion_ppm: Annotated[float, Meta(ge=0, le=1e6 * LARGEST_EXPANSION)] = 0.0
+
+    @property
+    def artefact(self) -> Artefact | None:
+        """The artefact that a plan measures; None without shape or value."""
+        if self.shape is None or not self.certified_mm:
+            return None
+        return Artefact(
+            self.shape,
+            self.certified_mm,
+            self.uncertainty_mm,
+            self.side,
+            expansion=self.expansion_ppm,
+        )
 
 
 class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):

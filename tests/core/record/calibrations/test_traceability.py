@@ -3,6 +3,9 @@
 from datetime import UTC, date, datetime
 from pathlib import Path
 
+from msgspec import structs
+
+from lightpen.measuring.artefacts import Artefact, ArtefactKind
 from lightpen.record.calibrations.traceability import certified_values, traced_items
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.tip_library import (
@@ -34,14 +37,24 @@ def test_items_are_kept_with_their_certificates(tmp_path: Path) -> None:
     assert library.cameras["CAM-7"].certificate == "K-18"
 
 
+def test_a_reference_with_its_shape_is_an_artefact_to_measure() -> None:
+    ring = structs.replace(RING, shape=ArtefactKind.RING, uncertainty_mm=0.0005)
+
+    assert RING.artefact is None
+    assert ring.artefact == Artefact(ArtefactKind.RING, 31.7512, 0.0005)
+
+
 def test_a_reference_is_found_by_its_certified_value_unless_retired(
     tmp_path: Path,
 ) -> None:
     record = {
-        "certified_radius_mm": 31.7512,
-        "certified_expanded_uncertainty_mm": 0.0005,
-        "mean_radius_mm": 31.7519,
+        "characteristics": [
+            {"nominal": 31.7512, "certified_expanded_uncertainty": 0.0005},
+            {"nominal": 0.0, "certified_expanded_uncertainty": 0.0},
+            {"nominal": 20.0, "certified_expanded_uncertainty": None},
+        ]
     }
+    assert certified_values(record) == (31.7512,)
     add_item(tmp_path, RING, BY, NOON)
     library = read_library(tmp_path)
     names, values = Names(pen="LP-04", tip="T-10"), certified_values(record)
