@@ -90,7 +90,7 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
         CONCLUSION,
     ]
     assert {each["origin"] for each in records(walker)} == {"simulated"}
-    assert walker.main_button().text() == "Back to Start"
+    assert walker.main_button().text() == "Measure a part"
     assert walker.steps()["Verify"] == "now"
 
 

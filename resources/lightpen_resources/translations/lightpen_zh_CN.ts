@@ -5544,6 +5544,10 @@ mm</translation>
         <translation>无图像</translation>
     </message>
     <message>
+        <source>Measure a part</source>
+        <translation>测量工件</translation>
+    </message>
+    <message>
         <source>Paused</source>
         <translation>已暂停</translation>
     </message>

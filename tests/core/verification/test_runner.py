@@ -51,10 +51,12 @@ from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptio
 from lightpen.verification.tasks.part import PART
 
 EVE = Signature("Eve", "correct horse")
+SIX_POINTS = CHOICES.with_options(FixedPointOptions(6, n_frames=3))  # as many find it
 
 
 def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) -> None:
-    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+    at_it.come(SIX_POINTS)
+    at_it.touch(*leant(6), *round_a_ring(11, 31.751)[:10], *BAR)
 
     assert at_it.status.is_done
     assert at_it.ear.events.count(SessionEventKind.FINISHED) == 1
@@ -179,7 +181,7 @@ def test_a_result_that_was_changed_is_refused(verifier: Verifier) -> None:
     )
     verifier.come()
 
-    assert verifier.refusal() == "results.damaged"
+    assert verifier.refusal() == "entered.changed-before"
 
 
 def test_a_tip_of_another_pen_is_refused(verifier: Verifier) -> None:
@@ -563,7 +565,8 @@ def test_a_lamp_is_watched_on_after_an_interruption(
 def test_a_tip_that_keeps_the_limits_is_accepted_with_all_its_records(
     at_it: Verifier,
 ) -> None:
-    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10])
+    at_it.come(SIX_POINTS)
+    at_it.touch(*leant(6), *round_a_ring(11, 31.751)[:10])
     assert at_it.conclusions == []
     at_it.touch(*BAR)
     (conclusion,) = at_it.conclusions

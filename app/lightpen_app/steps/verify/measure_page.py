@@ -32,6 +32,10 @@ class MeasurePresenter(VerifyPresenter):
         return replace(super().view(), can_be_accepted=False)
 
     @override
+    def next_step(self) -> str:
+        return "start"
+
+    @override
     def operator_value(self) -> OperatorValue:
         value, status = super().operator_value(), self._status
         if status.setup is None or status.state is None or value.fraction is None:

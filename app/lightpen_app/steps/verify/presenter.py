@@ -86,6 +86,11 @@ class VerifyPresenter(QObject):
             is_doubtful=found is not None and not found.is_accepted,
         )
 
+    def next_step(self) -> str:
+        """Return the key of the step after this one."""
+        found = self._status.assessment
+        return "measure" if found is not None and found.is_accepted else "start"
+
     def operator_value(self) -> OperatorValue:
         """Return the content of page and operator view."""
         status, instruction, banner = self._status, self._instruction(), self._banner()
@@ -159,7 +164,9 @@ class VerifyPresenter(QObject):
     def _action(self) -> MainAction:
         status = self._status
         if status.is_done:
-            return MainAction(self.tr("Back to Start"))
+            is_fine = self.next_step() == "measure"
+            goes_on = self.tr("Measure a part") if is_fine else self.tr("Back to Start")
+            return MainAction(goes_on)
         has_points = status.state is not None and bool(status.state.touches)
         why_not = "" if has_points else self.tr("No point is recorded yet.")
         return MainAction(self.tr("Finish early"), why_not, is_early=True)

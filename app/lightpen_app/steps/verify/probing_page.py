@@ -125,7 +125,7 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def run_main_action(self) -> None:
         if self._run.status.is_done:
-            self.step_requested.emit("start")
+            self.step_requested.emit(self._presenter.next_step())
         else:
             self._runner.ask(lambda workflow: workflow.end_task())
 

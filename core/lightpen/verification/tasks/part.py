@@ -7,6 +7,7 @@ features.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import sqrt
 from typing import Any
 
@@ -56,6 +57,7 @@ from lightpen.verification.tasks.task import (
     ANY,
     Conditions,
     Found,
+    Points,
     ResultRow,
     ResultTable,
     Runs,
@@ -339,12 +341,41 @@ def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
     return tuple(ResultRow(each.name, each.values, 4, each.remark) for each in rows)
 
 
+@lru_cache(maxsize=4)
+def _finished(
+    options: PartOptions,
+    runs: tuple[Points, ...],
+    instrument: Instrument,
+    limits: VerificationLimits,
+    ball_diameter: float | None,
+) -> tuple[ResultTable, ...]:
+    """Return value, U and verdict of the features that are done."""
+    conditions = Conditions(instrument, limits, ball_diameter)
+    numbered = [(f"#{i}", points) for i, points in enumerate(runs, start=1)]
+    try:
+        part = measure_by_plan(numbered, conditions, options).part
+    except CalibrationError:  # a normal or datum is still to be probed
+        return ()
+    columns = (
+        message("part.actual"),
+        message("table.uncertainty"),
+        message("part.decision"),
+    )
+    rows = tuple(
+        ResultRow(each.name, (each.values[2], each.values[4]), 4, each.remark)
+        for each in characteristic_rows(part)
+    )
+    return (ResultTable(message("part.characteristics"), columns, rows),)
+
+
 def _figures_so_far(
     options: PartOptions, progress: TaskProgress, conditions: Conditions
 ) -> tuple[ResultTable, ...]:
     now = feature_so_far(options, progress, conditions)
     if now is None:
         return ()
+    by = conditions.instrument, conditions.limits, conditions.ball_diameter
+    done = _finished(options, progress.runs, *by) if progress.runs else ()
     kind = message("part.unknown-kind") if now.kind is None else NAMES[now.kind]
     title = message("part.touches", name=now.planned.name, kind=kind)
     rows = tuple(
@@ -357,7 +388,7 @@ def _figures_so_far(
         )
     )
     columns = (*"uvw", message("part.deviation")) if rows else ()
-    return (ResultTable(title, columns, rows),)
+    return (*done, ResultTable(title, columns, rows))
 
 
 def _fraction(options: PartOptions, progress: TaskProgress) -> float:

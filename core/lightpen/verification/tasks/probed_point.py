@@ -179,22 +179,6 @@ def with_tip(
     return replace(touch, point_cam=touch.point_cam + moved)
 
 
-def on_surface(
-    touch: ProbedPoint, ball_radius: float, direction_cam: FloatArray | None = None
-) -> ProbedPoint:
-    """Return a touch moved from the centre of its ball to the surface that it touched.
-
-    A ball radius, mm, below 0 moves it against the direction (3,) from the ball to the
-    surface; if not given, that is the approach, or along the axis of the pen where none
-    is known.
-    """
-    if direction_cam is None:
-        direction_cam = touch.approach_cam
-    if direction_cam is None:
-        direction_cam = -touch.rotation @ UPRIGHT_AXIS
-    return replace(touch, point_cam=touch.point_cam + ball_radius * direction_cam)
-
-
 def joint_covariance(
     points: Sequence[ProbedPoint | MeanPoint], instrument: Instrument
 ) -> FloatArray:

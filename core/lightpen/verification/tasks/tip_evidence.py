@@ -1,10 +1,9 @@
-"""Error of the tip by the points of a task, and the error that they would detect.
+"""Error of the tip by points in one cone, and the error that they would detect.
 
 A point that is computed with a tip that is off by ``-d`` in the pen lies off by
-``-R d``. Let ``r`` be the residuals of the points from an artefact, linear in the
-points and in the ``k`` unknowns ``a`` of the artefact:
+``-R d``. Let ``r`` be the points less their mean, and ``a`` the error of the mean:
 
-    r = J e - J R d + B a,    cov(e) = covariance of all points with what they share
+    r = e - R d + a,    cov(e) = covariance of all points with what they share
 
 Generalised least squares gives d with its covariance C, which contains the uncertainty
 of the calibrated tip. ``d^T C^-1 d`` is chi-square with three degrees of freedom if the
@@ -84,40 +83,26 @@ class TipEvidence:
         return self.detectable <= limits.tip
 
 
-def tip_evidence(
-    points: Sequence[ProbedPoint],
-    instrument: Instrument,
-    residuals: FloatArray,
-    by_points: FloatArray,
-    by_artefact: FloatArray,
-    artefact_covariance: FloatArray | None = None,
+def points_evidence(
+    points: Sequence[ProbedPoint], instrument: Instrument, drift: FloatArray
 ) -> TipEvidence:
-    """Return the evidence of residuals of points on the tip.
+    """Return the evidence of points in one cone on the tip.
 
-    Parameters
-    ----------
-    residuals : (m,) array
-        mm.
-    by_points : (m, 3 N) array
-        Their derivative by the N points.
-    by_artefact : (m, k) array
-        Their derivative by the unknowns of the artefact.
-    artefact_covariance : (m, m) array, optional
-        Of the residuals, by what is certified of the artefact, mm^2.
+    ``drift`` (3,) is the standard uncertainty of a point by a camera that moved, mm.
     """
-    turns = np.concatenate([point.rotation for point in points])
-    A = -by_points @ turns
-    spread = by_points @ joint_covariance(points, instrument) @ by_points.T
-    if artefact_covariance is not None:
-        spread = spread + artefact_covariance
+    n = len(points)
+    places = np.array([point.point_cam for point in points])
+    residuals = (places - places.mean(axis=0)).ravel()
+    A = -np.concatenate([point.rotation for point in points])
+    spread = joint_covariance(points, instrument) + np.diag(np.tile(drift**2, n))
+    by_cone = np.tile(np.eye(3), (n, 1))
     W = np.linalg.inv(spread)
-    WB = W @ by_artefact
-    W = W - WB @ np.linalg.solve(by_artefact.T @ WB, WB.T)
-    prior = np.eye(3) / TIP_SIGMA**2
-    covariance = np.linalg.inv(A.T @ W @ A + prior)
+    WB = W @ by_cone
+    W = W - WB @ np.linalg.solve(by_cone.T @ WB, WB.T)
+    covariance = np.linalg.inv(A.T @ W @ A + np.eye(3) / TIP_SIGMA**2)
     change = covariance @ (A.T @ W @ residuals)
     left = residuals - A @ change
-    n_free = max(len(residuals) - by_artefact.shape[1] - 3, 1)
+    n_free = max(len(residuals) - 6, 1)
     excess = float(left @ W @ left) / n_free
     if excess > chi_square_quantile(n_free, BY_CHANCE) / n_free:
         covariance = covariance * excess
@@ -184,25 +169,6 @@ def not_the_tip(found: TipEvidence, limits: VerificationLimits) -> Message:
     return message("tip.no-power", limit=limits.tip)
 
 
-def points_evidence(
-    points: Sequence[ProbedPoint], instrument: Instrument, drift: FloatArray
-) -> TipEvidence:
-    """Return the evidence of points in one cone on the tip.
-
-    ``drift`` (3,) is the standard uncertainty of a point by a camera that moved, mm.
-    """
-    n = len(points)
-    places = np.array([point.point_cam for point in points])
-    return tip_evidence(
-        points,
-        instrument,
-        (places - places.mean(axis=0)).ravel(),
-        np.eye(3 * n),
-        np.tile(np.eye(3), (n, 1)),
-        np.diag(np.tile(drift**2, n)),
-    )
-
-
 def tip_entries(found: TipEvidence) -> dict[str, Any]:
     """Return the entries of the evidence of points on the tip in a record."""
     return {
@@ -213,10 +179,3 @@ def tip_entries(found: TipEvidence) -> dict[str, Any]:
             found.detectable if found.detectable < inf else None
         ),
     }
-
-
-def block_diagonal(blocks: Sequence[FloatArray]) -> FloatArray:
-    """Return a matrix with blocks along its diagonal."""
-    from scipy.linalg import block_diag
-
-    return np.asarray(block_diag(*blocks))

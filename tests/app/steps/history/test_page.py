@@ -246,7 +246,7 @@ def test_a_pass_that_was_not_accepted_and_the_tasks_of_a_verification_are_told_a
         *((Kind.REFUSED, grade, {}) for grade in (Grade.PASS, Grade.REPEAT)),
         *(
             (Kind.VERIFICATION, Grade.PASS, {"verified": task})
-            for task in ("conclusion", "circle", "fixed point")
+            for task in ("conclusion", "part", "fixed point")
         ),
     ]
     for n, (kind, grade, settings) in enumerate(entries):
@@ -263,7 +263,7 @@ def test_a_pass_that_was_not_accepted_and_the_tasks_of_a_verification_are_told_a
     desk.open()
 
     assert desk.column(WHAT) == [
-        *("Fixed point", "Ring", "Verification", "Rejected", "Repeated")
+        *("Tip check", "Part", "Verification", "Rejected", "Repeated")
     ]
 
 

@@ -229,6 +229,24 @@ def test_features_are_recognised_while_they_are_probed(instrument: Instrument) -
     assert kinds == [FeatureKind.PLANE, FeatureKind.SPHERE]
 
 
+def test_a_feature_that_is_done_shows_its_results_at_once(
+    instrument: Instrument,
+) -> None:
+    plan = plate_plan().limited_to({"dome", "hole 1"})
+    at_it = station(instrument, plan)
+    own = plan.features[0].name
+    at_it.probe(plan.features[0].n_touches)
+    progress = at_it.state.progress(at_it.setup, PART)
+
+    done, now = PART.figures_so_far(at_it.options, progress, at_it.setup.conditions)
+
+    names = [each.words for each in plan.characteristics if each.of == (own,)]
+    assert names
+    assert [row.name for row in done.rows] == names
+    assert all(row.remark for row in done.rows)  # the decision
+    assert now.title.code == "part.touches"
+
+
 def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> None:
     at_it = station(instrument, plate_plan())
     at_it.probe(5)  # one short of the plane

@@ -26,7 +26,6 @@ from lightpen.verification.tasks.probed_point import (
     joint_covariance,
     mean_point,
     measure_touches,
-    on_surface,
     point_sensitivities,
     with_tip,
 )
@@ -154,17 +153,6 @@ def test_what_touches_share_drops_out_of_their_difference(
     np.testing.assert_allclose(
         mean_point(touches).noise, (touches[0].noise + touches[1].noise) / 4
     )
-
-
-def test_a_ball_is_compensated_along_approach_or_axis(touching: Touching) -> None:
-    (touch,) = touching(PAPER_CONE[None], tilt=0.0)
-    down = np.array([0.0, 1.0, 0.0])
-
-    by_axis = on_surface(touch, 2.0)
-    by_approach = on_surface(replace(touch, approach_cam=np.array([1.0, 0, 0])), 2.0)
-
-    np.testing.assert_allclose(by_axis.point_cam - touch.point_cam, 2 * down, atol=0.01)
-    np.testing.assert_allclose(by_approach.point_cam - touch.point_cam, [2, 0, 0])
 
 
 def test_another_tip_moves_the_point_with_the_pen(

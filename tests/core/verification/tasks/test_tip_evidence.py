@@ -17,11 +17,9 @@ from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covarian
 from lightpen.verification.tasks.tip_evidence import (
     TipEvidence,
     _detectable,
-    block_diagonal,
     judged_tip,
     points_evidence,
     tip_entries,
-    tip_evidence,
 )
 
 LIMITS = VerificationLimits()
@@ -52,26 +50,26 @@ def test_what_the_points_do_not_determine_makes_no_other_tip() -> None:
     assert judged.grade is Grade.CHECK  # 0.012 of a limit of 0.040
 
 
-def test_residuals_too_large_for_their_noise_make_the_tip_as_uncertain(
+def test_points_that_scatter_too_much_make_the_tip_as_uncertain(
     instrument: Instrument, touching: Callable[..., tuple[ProbedPoint, ...]]
 ) -> None:
     points = touching(np.tile(PAPER_CONE, (5, 1)))
-    by_points = block_diagonal([np.array([[0.6, 0.0, 0.8]])] * 5)
-    by_artefact = np.ones((5, 1))  # one coordinate more than there are unknowns
-    residuals = np.array([0.1, -0.2, 0.2, 0.1, -0.1])
+    offs = 0.2 * np.random.default_rng(1).standard_normal((5, 3))
 
-    sound, worn = (
-        tip_evidence(points, instrument, each, by_points, by_artefact).covariance
-        for each in (0 * residuals, residuals)
-    )
+    def found(by: float) -> TipEvidence:
+        placed = [
+            replace(each, point_cam=PAPER_CONE + by * off)
+            for each, off in zip(points, offs, strict=True)
+        ]
+        return points_evidence(placed, instrument, np.zeros(3))
 
-    root = np.linalg.cholesky(
-        by_points @ joint_covariance(points, instrument) @ by_points.T
-    )
-    by_tip = -by_points @ np.concatenate([point.rotation for point in points])
-    design = np.linalg.solve(root, np.hstack([by_tip, by_artefact]))
-    _, (chi_square,), *_ = np.linalg.lstsq(design, np.linalg.solve(root, residuals))
-    np.testing.assert_allclose(worn, chi_square * sound, rtol=1e-2)  # by the prior
+    root = np.linalg.cholesky(joint_covariance(points, instrument))
+    by_tip = -np.concatenate([point.rotation for point in points])
+    design = np.linalg.solve(root, np.hstack([by_tip, np.tile(np.eye(3), (5, 1))]))
+    residuals = np.linalg.solve(root, (offs - offs.mean(axis=0)).ravel())
+    _, (chi_square,), *_ = np.linalg.lstsq(design, residuals)
+    expected = chi_square / 9 * found(0.0).covariance
+    np.testing.assert_allclose(found(1.0).covariance, expected, rtol=1e-2)  # by prior
 
 
 def test_points_in_one_posture_leave_the_tip_as_unknown_as_before(
