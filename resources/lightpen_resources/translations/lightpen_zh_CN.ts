@@ -2960,6 +2960,14 @@
 <context>
     <name>MeasurePresenter</name>
     <message>
+        <source>Open plan...</source>
+        <translation>打开方案...</translation>
+    </message>
+    <message>
+        <source>NO PLAN YET</source>
+        <translation>尚无方案</translation>
+    </message>
+    <message>
         <source>Feature {0} of {1}</source>
         <translation>要素 {0} / {1}</translation>
     </message>

@@ -12,13 +12,16 @@ from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen_app.look.quantities import number_text
+from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sounds
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.verify.plan_panel import PlanPanel
 from lightpen_app.steps.verify.presenter import VerifyPresenter
 from lightpen_app.steps.verify.probing_page import ProbingPage
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.state_banner import State
 from lightpen_app.work.workbench import Workbench
 
 
@@ -34,6 +37,23 @@ class MeasurePresenter(VerifyPresenter):
     @override
     def next_step(self) -> str:
         return "start"
+
+    def lacks_plan(self) -> bool:
+        """Return whether a plan is all that is missing."""
+        status = self._status
+        return status.tip is not None and status.refusal is not None
+
+    @override
+    def _action(self) -> MainAction:
+        if self.lacks_plan():
+            return MainAction(self.tr("Open plan..."))
+        return super()._action()
+
+    @override
+    def _banner(self) -> State:
+        if self.lacks_plan():
+            return State(self.tr("NO PLAN YET"), "", Sign.RING, Tone.QUIET)
+        return super()._banner()
 
     @override
     def operator_value(self) -> OperatorValue:
@@ -99,8 +119,8 @@ class MeasurePage(ProbingPage):
 
     def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
         run = workbench.measuring
-        presenter = MeasurePresenter(workbench, run)
-        super().__init__(workbench, sounds, run, presenter)
+        self._measures = MeasurePresenter(workbench, run)
+        super().__init__(workbench, sounds, run, self._measures)
 
         # Widgets
         self._plan = PlanPanel(workbench)
@@ -110,6 +130,13 @@ class MeasurePage(ProbingPage):
 
         self._on_workbench_changed()
         self._retranslate()
+
+    @override
+    def run_main_action(self) -> None:
+        if self._measures.lacks_plan():
+            self._plan.pick_plan()
+        else:
+            super().run_main_action()
 
     @override
     def _show(self) -> None:

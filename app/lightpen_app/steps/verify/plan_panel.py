@@ -70,7 +70,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._use_room()
 
         # Connections
-        self._open.clicked.connect(self._on_open_clicked)
+        self._open.clicked.connect(self.pick_plan)
         self._free.clicked.connect(self._on_free_clicked)
         self._plate.clicked.connect(self._on_plate_clicked)
         self._artefact.activated.connect(self._on_artefact_chosen)
@@ -171,7 +171,8 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         )
         self._export.setText(self.tr("Export..."))
 
-    def _on_open_clicked(self) -> None:
+    def pick_plan(self) -> None:
+        """Let the user choose the file of a plan."""
         name, _ = QFileDialog.getOpenFileName(
             self,
             self.tr("Open a measuring plan"),

@@ -60,7 +60,7 @@ class VerifyPresenter(QObject):
             operator=self.operator_value(),
             lamps=lamps_message(status),
             titles=tuple(self._title(task) for task in self.tasks),
-            task=status.task,
+            task=None if status.refusal is not None else status.task,
             reading=self._verification.progress if is_reading else None,
             pause=(
                 self.tr("Continue (Space)")
@@ -71,6 +71,7 @@ class VerifyPresenter(QObject):
             and status.is_done
             and not status.accepted_by,
             has_report=status.is_done and bool(status.files),
+            can_start_over=status.state is not None and status.state.is_begun,
             can_undo=status.state is not None and bool(status.state.touches),
         )
 

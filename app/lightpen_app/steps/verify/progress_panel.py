@@ -121,6 +121,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._act.setVisible(view.task is not None)
         self._undo.setVisible(view.task is not None)
         self._undo.setEnabled(view.can_undo)
+        self._start_over.setVisible(view.can_start_over)
         self._accept.setVisible(view.can_be_accepted)
         self._report.setVisible(view.has_report)
         if not view.can_be_accepted:

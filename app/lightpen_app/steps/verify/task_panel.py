@@ -69,7 +69,8 @@ class TaskPanel(Translated, QWidget):
         if setup is not None and state is not None:
             progress = state.progress(setup, task)
             has_points = bool(progress.points or progress.runs)
-        self._anew.setEnabled(found is not None or has_points)
+        self._anew.setVisible(found is not None or has_points)
+        self._recorded.setVisible(status.refusal is None)
         judged = None if found is None else found.assessment
         if status.is_done and judged is status.assessment:  # shown above all tasks
             judged = None

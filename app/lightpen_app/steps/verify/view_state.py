@@ -39,6 +39,7 @@ class VerifyView:
     reading: float | None = None
     pause: str = ""
     can_be_accepted: bool = False
+    can_start_over: bool = False
     can_undo: bool = False
     has_report: bool = False
 
