@@ -186,8 +186,8 @@ class TaskFinding(ResponsiveLayout, QWidget):
             if self._pictured is not None and self._picture is not None:
                 value = self._picture.value(setup, state, self._task)
                 self._pictured.set_value(value)
-        if is_found and self._task is not PART:  # the summary first
-            tables = tuple(sorted(tables[:MOST_TABLES], key=_is_of_points))
+        if is_found and self._task is not PART:  # the points are in the report
+            tables = tuple(each for each in tables if not _is_of_points(each))
         for index, view in enumerate(self._tables):
             view.set_value(tables[index] if index < len(tables) else None)
 
