@@ -78,11 +78,9 @@ _RULE: Any = _choice(message("limit.rule"), RULES, *map(rule_name, RULES))
 class SwingLimits:
     """Limits on the end of a swing and on the tip."""
 
-    # U (k = 2) of the tip along its weakest direction, mm. A station with a camera
-    # calibrated on 24 views of a board, LEDs measured to 2 um and a pen of carbon fibre
-    # reaches it with 60 images. An aluminium pen needs its temperature stated: the 3 K
-    # that are assumed otherwise alone make 0.013 mm.
-    max_uncertainty: float = _limit(0.02, message("limit.max-uncertainty"))
+    # U (k = 2) of the tip along its weakest direction, mm. A good station reaches it
+    # with 100 images at 0.03 px, or 300 at 0.05 px even if its files state nothing.
+    max_uncertainty: float = _limit(0.012, message("limit.max-uncertainty"))
     min_images: int = _limit(60, message("limit.min-images"), "", IMAGES)
     max_images: int = _limit(300, message("limit.max-images"), "", IMAGES)
     min_per_field: int = 2  # images in each field of the dial

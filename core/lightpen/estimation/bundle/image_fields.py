@@ -20,7 +20,6 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle.seat_modes import axes_of_cone
-from lightpen.estimation.statistics.variance_components import P_NONE
 from lightpen.model.camera import Camera
 from lightpen.model.information import symmetric_root
 from lightpen.model.lens_field import correlation
@@ -29,8 +28,9 @@ from lightpen.model.quantiles import chi_square_quantile
 DEGREE = 6  # of the polynomials of a lens field
 NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
-# How often chance alone supports a field, at most.
-CHANCE = 0.01
+# How often chance alone supports a field, at most; one too many hardly costs accuracy.
+CHANCE = 0.1
+NONE = 0.4  # prior probability that there is no field
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
 
@@ -80,7 +80,7 @@ class FieldComponent(NamedTuple):
 
     @property
     def is_supported(self) -> bool:
-        """Whether chance alone makes such a gain less than once in a hundred."""
+        """Whether chance alone makes such a gain less than once in ten."""
         return self.gain > chi_square_quantile(1, CHANCE)
 
 
@@ -104,8 +104,8 @@ def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldCompone
     costs = np.array([_costs(S, right, root, sigmas) for root in field.roots])
     s, i = np.unravel_index(int(np.argmin(costs)), costs.shape)
     gain, sigma = -float(costs[s, i]), float(sigmas[i])
-    weights = np.exp(-0.5 * (costs + gain)) * (1 - P_NONE) / costs.size
-    weights /= weights.sum() + P_NONE * np.exp(-0.5 * gain)
+    weights = np.exp(-0.5 * (costs + gain)) * (1 - NONE) / costs.size
+    weights /= weights.sum() + NONE * np.exp(-0.5 * gain)
     expected = np.einsum("s,sij->ij", weights @ sigmas**2, np.array(field.shapes))
     return FieldComponent(sigma, gain, sigma**2 * field.shapes[s], expected)
 

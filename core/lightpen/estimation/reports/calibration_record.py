@@ -450,6 +450,11 @@ class SecondConeRecord(Struct, frozen=True, omit_defaults=True):
 class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Calibration of the probe tip of a light pen.
 
+    The tip is the effective one: the point x of the LED frame, in the scale of the LED
+    file, that stays most nearly at one place c over the swing, ``min over x, c of sum
+    |R_i x + T_i - c|^2`` with the poses of the LED frame. Scale and temperature of the
+    pen, and bending under another force, act when it measures.
+
     Lengths are in mm, image points in px. Verdict and weakest direction are those of
     the reported tip; residuals, budget and LEDs those of the joint estimator.
     The file ends with one entry more, its checksum.

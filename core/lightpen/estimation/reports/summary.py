@@ -43,6 +43,10 @@ def calibration_text(
     if nominal_tip is not None:
         lines.append(_numbers("nominal", nominal_tip))
         lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
+    lines += [
+        "  Effective tip, in the scale of the LED file: min over x, c of sum "
+        "|R_i x + T_i - c|^2"
+    ]
     names = calibration.bundle.state.rig.names
     frame = f"frame of {names[0]}" if names else "camera frame"
     lines += ["", _heading(f"Cone in the {frame}, mm", "uvw")]

@@ -140,9 +140,9 @@ def test_the_size_of_one_unknown_is_that_of_its_likelihood(
     assert found.sigma == pytest.approx(sizes[best])
     assert found.gain == pytest.approx(-costs[best], rel=1e-9, abs=1e-12)
     assert found.covariance[0, 0] == pytest.approx(4 * sizes[best] ** 2)
-    assert found.is_supported == (-costs[best] > 6.6349)
-    likely = 0.3 / 60 * np.exp(-0.5 * (costs - costs.min()))
-    likely /= likely.sum() + 0.7 * np.exp(0.5 * costs.min())
+    assert found.is_supported == (-costs[best] > 2.7055)
+    likely = 0.6 / 60 * np.exp(-0.5 * (costs - costs.min()))
+    likely /= likely.sum() + 0.4 * np.exp(0.5 * costs.min())
     assert found.expected[0, 0] == pytest.approx(np.sum(likely * 4 * sizes**2))
 
 

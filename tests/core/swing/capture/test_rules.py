@@ -555,7 +555,7 @@ def test_finishing_early_says_what_is_missing() -> None:
     said = missing(station.setup, station.state)
     assert message(Code.TOO_FEW_IMAGES, n_kept=station.state.n_kept, needed=60) in said
     assert (
-        message(Code.UNCERTAIN, uncertainty=station.state.kept.uncertainty, limit=0.02)
+        message(Code.UNCERTAIN, uncertainty=station.state.kept.uncertainty, limit=0.012)
         in said
     )
     assert too_little_tilt(n_images, bare.tolist()) in said
