@@ -23,10 +23,11 @@ from PySide6.QtCore import QEventLoop, QTimer
 
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 NAMES = Names("Bench", "Ann", "SIM-1", "T-1", "C-1", 10.0)
 PAGES = ("start", "camera", "leds", "swing")
@@ -45,7 +46,12 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
         settings.set_station(
-            NAMES.station, Station(Names("", "Ann", "SIM-1", "T-1", "C-1"), limits=MANY)
+            NAMES.station,
+            Station(
+                Names("", "Ann", "SIM-1", "T-1", "C-1"),
+                camera=StoredCamera(SourceChoice()),
+                limits=MANY,
+            ),
         )
         settings.set_last_station(NAMES.station)
         wizard = Wizard(application, make_pages, settings, Path(folder))

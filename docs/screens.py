@@ -63,6 +63,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
 from lightpen.swing.capture.rules import advance_swing
 from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_resumable
@@ -207,7 +208,7 @@ class Stage:
         settings = Settings(DATA / "lightpen.json")
         settings.set_preferences(Preferences())
         FolderArchive(DATA).store(_earlier_result())
-        around = SourceEnvironment(self._scene, SkippingClock(), lambda: NOW)
+        around = SourceEnvironment(self._scene, SkippingClock(), lambda: NOW, tuple)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
         self.wizard.window.pages()  # they follow what is chosen below
         workbench = self._workbench = self.wizard.workbench
@@ -218,6 +219,7 @@ class Stage:
                 names=NAMES,
                 camera_file=files.camera_file,
                 pen_file=files.pen_file,
+                source=SourceChoice(),
             )
         )
         workbench.live.open(

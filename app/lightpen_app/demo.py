@@ -8,6 +8,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.swings.names import Names
 from lightpen.simulator.plate import plate_plan
 from lightpen.swing.capture.state import Phase
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
@@ -60,7 +61,10 @@ class Demo(QObject):
     def start(self) -> None:
         """Begin on the page that is shown."""
         now = self._workbench.selection.preparation
-        self._workbench.selection.set_preparation(replace(now, names=NAMES))
+        self._workbench.selection.set_preparation(
+            replace(now, names=NAMES).with_source(SourceChoice())
+        )
+        self._workbench.files.use_samples()
         self._timer.start()
 
     def _on_tick(self) -> None:

@@ -56,6 +56,7 @@ from lightpen.record.swings.solving import solve_record
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
@@ -177,7 +178,7 @@ def small_scene() -> Scene:
 @pytest.fixture(scope="session")
 def around(small_scene: Scene) -> SourceEnvironment:
     """Return the small scene, in which all goes four times as fast as usual."""
-    return SourceEnvironment(small_scene, HastyClock())
+    return SourceEnvironment(small_scene, HastyClock(), found_cameras=tuple)
 
 
 SolvingOn: TypeAlias = Callable[[], AbstractContextManager[None]]
@@ -219,6 +220,7 @@ def choose_samples(workbench: Workbench, samples: OpenedFiles, folder: Path) -> 
             names=NAMES,
             camera_file=replace(camera, path=folder / camera.path.name),
             pen_file=replace(pen, path=folder / pen.path.name),
+            source=SourceChoice(),
         )
     )
 

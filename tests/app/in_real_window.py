@@ -8,8 +8,9 @@ from PySide6.QtGui import QGuiApplication, QImage
 
 from lightpen.arrays import Image
 from lightpen.record.swings.names import Names
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -23,7 +24,13 @@ def test_the_operator_view_fills_the_screen(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
     assert QGuiApplication.platformName() == "xcb"
-    settings.set_station(STATION, Station(Names("", "Ann", "LP-04", "T-10", "C-1")))
+    settings.set_station(
+        STATION,
+        Station(
+            Names("", "Ann", "LP-04", "T-10", "C-1"),
+            camera=StoredCamera(SourceChoice()),
+        ),
+    )
     settings.set_last_station(STATION)
     walker = open_wizard()
     while walker.title() != "Swing":

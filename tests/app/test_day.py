@@ -8,15 +8,17 @@ from PySide6.QtCore import Qt
 
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 KNOWN = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    camera=StoredCamera(SourceChoice()),
     limits=SwingLimits(max_uncertainty=0.02, min_images=20, max_images=150),
 )
 

@@ -33,9 +33,10 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.steps.page import step_titles
 from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -61,8 +62,14 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     _check_round(walker)
     for name, text in {**NAMES, **FEW}.items():
         walker.enter(name, text)
+    walker.press(Key.Key_Return)  # takes the last number over
     walker.press(Key.Key_Return)
 
+    walker.until_shows("Camera")
+    assert walker.tells("Choose your camera.")
+    assert not walker.tells("SIMULATED")
+    walker.tab_to("Image source")
+    walker.press(Key.Key_Down)
     walker.until_says("Live")
     walker.until(walker.main_button().isEnabled)
     _check_round(walker)
@@ -108,6 +115,7 @@ def test_a_recorded_swing_gives_its_tip(
     walker.click("Continue to the camera")
     walker.tab_to("Image source")
     walker.press(Key.Key_Down)
+    walker.press(Key.Key_Down)
     walker.until_tells("Choose the folder of the recorded images.")
     walker.click_into("Folder, record or video", str(folder))
     walker.press(Key.Key_Return)
@@ -116,7 +124,7 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until_says("Open the intrinsics file.")
     walker.until_says("Found with the images: camera.yaml and leds.csv")
     walker.click("Use both files")
-    walker.until_tells("Matches the live images: 2448 x 2048")
+    walker.until_tells("Size fits: 2448 x 2048")
     walker.until(walker.main_button().isEnabled)
     assert not walker.offers("Use both files")
     walker.click("Continue to the LEDs")
@@ -152,7 +160,11 @@ def test_no_english_word_is_left_after_a_change_to_chinese(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
     names = Names("", "\u738b", "4", "10", "1")
-    station = Station(names, limits=SwingLimits(0.02, min_images=20))
+    station = Station(
+        names,
+        camera=StoredCamera(SourceChoice()),
+        limits=SwingLimits(0.02, min_images=20),
+    )
     settings.set_station("2\u53f7", station)
     settings.set_last_station("2\u53f7")
     walker = open_wizard()

@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QApplication
 
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -23,6 +24,7 @@ Key = Qt.Key
 STATION = "Hall 2"
 LONG = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1"),
+    camera=StoredCamera(SourceChoice()),
     limits=SwingLimits(max_uncertainty=1e-4, min_images=300),
 )
 N_MASHED = 150  # keys and clicks

@@ -86,7 +86,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     rendered.operator.seat()
     walker.click_step("Camera")
     walker.until_tells("10 of 10 LEDs")
-    assert walker.tells("Matches the live images: 1224 x 1024")
+    assert walker.tells("Size fits: 1224 x 1024")
     assert walker.tells("Incomplete: 0")
     walker.click("Continue to the LEDs")
     walker.until(walker.main_button().isEnabled)

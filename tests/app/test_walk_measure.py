@@ -12,12 +12,13 @@ from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.simulator.plate import plate_plan
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -33,6 +34,7 @@ SMALL = structs.replace(
 )
 PROBING = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    camera=StoredCamera(SourceChoice()),
     verification=VerificationChoices(options=(PartOptions(SMALL),), n_frames=2),
 )
 

@@ -8,10 +8,11 @@ from tests.accepted_tip import accept_tip
 
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.swings.names import Names
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.fixed_point import FixedPointOptions
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -20,6 +21,7 @@ STATION = "Hall 2"
 STRICT = "0.0010"
 CHOSEN = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    camera=StoredCamera(SourceChoice()),
     verification=VerificationChoices(
         options=(FixedPointOptions(5, n_frames=3),), n_frames=2
     ),

@@ -17,13 +17,14 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
+from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.drift import DRIFT, VISIT_POINTS
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.registry import TASKS
 from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -34,6 +35,7 @@ TASKS_BEFORE_PEN = len(TASKS)
 FIVE = (FixedPointOptions(5, n_frames=3),)  # fewer do not verify a tip
 TOUCHES = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
+    camera=StoredCamera(SourceChoice()),
     verification=VerificationChoices(options=FIVE, n_frames=2),
 )
 

@@ -109,6 +109,7 @@ _LACKS: dict[MissingInput, str] = {
     ),
     MissingInput.TIP: QT_TRANSLATE_NOOP("phrases", "Enter the name of the probe tip."),
     MissingInput.CONE: QT_TRANSLATE_NOOP("phrases", "Enter the name of the cone."),
+    MissingInput.SOURCE: QT_TRANSLATE_NOOP("phrases", "Choose your camera."),
     MissingInput.SOURCE_PLACE: QT_TRANSLATE_NOOP(
         "phrases", "Choose the folder of the recorded images."
     ),

@@ -29,6 +29,7 @@ class CameraSetup(QObject):
 
     cameras_found = Signal(object)  # tuple of FoundDevice
     search_failed = Signal(str)  # reason, text for the user
+    all_found = Signal(object)  # tuple of Source and FoundDevice
 
     def __init__(
         self,
@@ -90,6 +91,11 @@ class CameraSetup(QObject):
         self._search.start(
             search, self.cameras_found, self.search_failed, ended=open_again
         )
+
+    def search_all(self) -> None:
+        """Search the cameras of all sources, before one is chosen."""
+        find = self._around.found_cameras
+        self._search.start(lambda _: find(), self.all_found)
 
     def _on_selected(self, before: Preparation) -> None:
         now = self._selection.preparation

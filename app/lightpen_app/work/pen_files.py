@@ -66,7 +66,13 @@ class PenFiles(QObject):
             return words.format(file.path.name, other.id, pen)
         if own is not None:
             words = self.tr("{0} is not the LED file stored with pen {1} ({2}).")
-            return words.format(file.path.name, pen, own.name)
+            if file.path == Path(own.path):
+                words = self.tr("{0} was changed since it was stored with pen {1}.")
+            is_alike = file.path.name == own.name
+            shown, stored = (
+                (file.path, own.path) if is_alike else (file.path.name, own.name)
+            )
+            return words.format(shown, pen, stored)
         return ""
 
     def keep(self, file: PenFile) -> None:

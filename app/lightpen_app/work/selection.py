@@ -8,7 +8,7 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import DueRule, StationLimits, SwingLimits
 from lightpen.record.library.supervision import Supervision
 from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen_app.work.settings import Settings
@@ -51,7 +51,7 @@ class Selection(QObject):
         super().__init__(parent)
         self._settings = settings
         limits = settings.machine_limits()
-        self._preparation = Preparation(limits=limits.swing)
+        self._preparation = Preparation(source=NO_SOURCE, limits=limits.swing)
         self._choices = VerificationChoices(limits=limits.verification)
         self._supervision = Supervision()
         self._unread = FilePaths()

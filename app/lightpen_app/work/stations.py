@@ -11,7 +11,7 @@ from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.limits import SwingLimits
 from lightpen.model.method import Method
 from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SecondCamera, SourceChoice
+from lightpen.swing.image_sources import NO_SOURCE, SecondCamera, SourceChoice
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.session.choices import VerificationChoices
 
@@ -22,7 +22,7 @@ Triple: TypeAlias = tuple[float, float, float]
 class StoredCamera:
     """Stored source of a camera's images, and its mask."""
 
-    source: SourceChoice = field(default_factory=SourceChoice)
+    source: SourceChoice = NO_SOURCE
     mask: tuple[Triple, ...] = ()  # circles of stray light: centre x, y and radius, px
 
 
@@ -73,7 +73,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
         before,
         names=replace(station.names, station=name),
         nominal_tip=None if tip is None else np.array(tip),
-        source=camera.source if _is_known(camera) else SourceChoice(),
+        source=camera.source if _is_known(camera) else NO_SOURCE,
         second=SecondCamera(second.source, mask=_mask(second))
         if second is not None and _is_known(second)
         else None,

@@ -12,6 +12,7 @@ from lightpen.messages import Message
 class SourceNeeds(Enum):
     """Parameters that a source needs."""
 
+    CHOICE = auto()  # no source is chosen yet
     NOTHING = auto()
     FILES = auto()  # a folder, a pattern, a video or a record
     DEVICE = auto()  # a camera, by its serial number or address

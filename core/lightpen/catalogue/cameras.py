@@ -34,6 +34,7 @@ MESSAGES = {
     "replay.lost": "Images of {place} are no longer readable. Connect the disk, restore the images, or choose others.",
     "source.named": "{name}",
     "source.simulated": "Simulated pen",
+    "source.unchosen": "No image source",
     "source.webcam": "Webcam (evaluation only)",
     "camera.too-slow": "Processing cannot keep up: {n_missed} of {n_offered} images skipped. Close other programs, or capturing takes longer.",
     "camera.did-not-stop": "Camera {serial} did not stop within {waited:.0f} s. Unplug it and restart the program.",

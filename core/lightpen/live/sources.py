@@ -7,7 +7,8 @@ from pathlib import Path
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
-from lightpen.cameras.source import SourcePlace
+from lightpen.cameras.source import FoundDevice, Source, SourcePlace
+from lightpen.cameras.sources import found_cameras
 from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
 from lightpen.formats.rig_files import read_rig
 from lightpen.local_time import local_now
@@ -27,6 +28,7 @@ class SourceEnvironment:
     scene: Scene = field(default_factory=Scene)  # scene of the simulated camera
     clock: Clock = field(default_factory=MachineClock)
     now: Callable[[], datetime] = local_now  # returns date and time with the time zone
+    found_cameras: Callable[[], tuple[tuple[Source, FoundDevice], ...]] = found_cameras
 
 
 def sample_files(around: SourceEnvironment, folder: Path) -> OpenedFiles:

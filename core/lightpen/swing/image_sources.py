@@ -9,7 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.replay import RECORDED
 from lightpen.cameras.source import Source, SourceNeeds
-from lightpen.cameras.sources import SIMULATED, source_named
+from lightpen.cameras.sources import SIMULATED, UNCHOSEN, source_named
 from lightpen.formats.rig_files import RigFile
 from lightpen.model.rig import Rig
 
@@ -34,13 +34,16 @@ class SourceChoice:
 
     @property
     def source(self) -> Source:
-        """The source; the simulated pen for an unknown kind."""
-        return source_named(self.kind) or SIMULATED
+        """The source; none chosen for an unknown kind."""
+        return source_named(self.kind) or UNCHOSEN
 
     @property
     def lacks_place(self) -> bool:
         """Whether the place of the images is missing."""
         return self.source.needs is not SourceNeeds.NOTHING and not self.place
+
+
+NO_SOURCE = SourceChoice("")
 
 
 @dataclass(frozen=True)

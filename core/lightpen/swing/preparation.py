@@ -39,6 +39,7 @@ class MissingInput(StrEnum):
     PEN = "pen"
     TIP = "tip"
     CONE = "cone"
+    SOURCE = "source"
     SOURCE_PLACE = "source place"
     DEVICE = "device"
     IMAGES = "images"
@@ -260,10 +261,12 @@ class Preparation:
         """Return the missing inputs of the step Camera."""
         missing_inputs = []
         if self.source.lacks_place:
-            is_of_files = self.source.source.needs is SourceNeeds.FILES
-            missing_inputs.append(
-                MissingInput.SOURCE_PLACE if is_of_files else MissingInput.DEVICE
-            )
+            lacks = {
+                SourceNeeds.CHOICE: MissingInput.SOURCE,
+                SourceNeeds.FILES: MissingInput.SOURCE_PLACE,
+            }
+            needs = self.source.source.needs
+            missing_inputs.append(lacks.get(needs, MissingInput.DEVICE))
         elif self.image_size is None:
             missing_inputs.append(MissingInput.IMAGES)
         camera = self.camera

@@ -1810,8 +1810,8 @@
         <translation>文件的图像尺寸：{0}</translation>
     </message>
     <message>
-        <source>Matches the live images: {0}</source>
-        <translation>与实时图像一致：{0}</translation>
+        <source>Size fits: {0}. Checked against the pen at step LEDs.</source>
+        <translation>尺寸相符：{0}。将在 LED 步骤中与光笔核对。</translation>
     </message>
     <message>
         <source>Image size is {0}; the intrinsics file is for {1}. Choose the file of this camera, or say how the images are binned or cropped.</source>
@@ -3368,6 +3368,10 @@
         <translation>{0} 不是与光笔 {1} 一起保存的 LED 文件（{2}）。</translation>
     </message>
     <message>
+        <source>{0} was changed since it was stored with pen {1}.</source>
+        <translation>{0} 自随光笔 {1} 保存以来已被更改。</translation>
+    </message>
+    <message>
         <source>LED file</source>
         <translation>LED 文件</translation>
     </message>
@@ -4578,6 +4582,10 @@ needed</source>
     <message>
         <source>{0} - not installed</source>
         <translation>{0} - 未安装</translation>
+    </message>
+    <message>
+        <source>Choose your camera</source>
+        <translation>请选择您的相机</translation>
     </message>
     <message>
         <source>Folder, record or video</source>
@@ -6097,6 +6105,10 @@ mm</translation>
     <message>
         <source>No image shows a chessboard of {columns} x {rows} inner corners; the images show {seen_columns} x {seen_rows}. Count the inner corners of the whole board again.</source>
         <translation>没有图像显示内角点为 {columns} x {rows} 的棋盘格；图像显示的是 {seen_columns} x {seen_rows}。请重新数整块标定板的内角点。</translation>
+    </message>
+    <message>
+        <source>No image source</source>
+        <translation>无图像来源</translation>
     </message>
     <message>
         <source>No length is given: all lengths are in hundredths of the largest distance between two LEDs.</source>
@@ -11132,6 +11144,10 @@ mm</translation>
     <message>
         <source>lens</source>
         <translation>镜头</translation>
+    </message>
+    <message>
+        <source>Choose your camera.</source>
+        <translation>请选择您的相机。</translation>
     </message>
     <message>
         <source>No image received from the camera yet.</source>

@@ -118,6 +118,16 @@ def test_another_file_of_the_same_pen_is_doubted_until_it_is_stored(
     assert bench.pens.doubt() == ""
 
 
+def test_files_of_the_same_name_are_told_apart_by_their_folders(bench: Bench) -> None:
+    one = bench.file("04.csv")
+    bench.open(one)
+    (one.path.parent / "old").mkdir()
+    other = bench.file("old/04.csv", x=25.1)
+
+    words = f"{other.path} is not the LED file stored with pen LP-04 ({one.path})."
+    assert bench.pens.doubt_about(other) == words
+
+
 def test_a_file_that_was_changed_since_is_not_used(bench: Bench) -> None:
     bench.open(bench.file("04.csv"))
     bench.choose("LP-05")

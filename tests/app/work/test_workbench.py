@@ -20,10 +20,11 @@ from lightpen.live.sources import sample_files
 from lightpen.messages import message
 from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.streaming.server import StreamPlace
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.languages import LanguageSwitch
@@ -175,12 +176,23 @@ def test_without_a_station_nothing_is_remembered(stage: Stage) -> None:
     assert stage.workbench.selection.stations() == ("Hall 2",)
 
 
-def test_a_first_start_has_the_files_of_the_simulated_pen(
+def test_a_first_start_has_no_source_until_one_is_chosen(
     tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> None:
     settings = Settings(tmp_path / "new" / "lightpen.json")
     first = Workbench(settings, tmp_path / "new data", workbench.around)
     first.start()
+    qtbot.waitUntil(lambda: not first.files.is_reading)
+    assert first.selection.preparation.camera_missing_inputs() == (
+        MissingInput.SOURCE,
+        MissingInput.CAMERA_FILE,
+    )
+    assert first.selection.preparation.origin is Origin.LIVE
+    first.selection.set_preparation(
+        first.selection.preparation.with_source(SourceChoice())
+    )
+    first.files.use_samples()
+    first.camera.open()
     qtbot.waitUntil(lambda: not first.files.is_reading)
     now = first.selection.preparation
 
@@ -242,6 +254,7 @@ def test_sample_files_that_cannot_be_written_are_reported(
     sentences: list[str] = []
     first.notifications.raised.connect(lambda text, _: sentences.append(text))
     first.start()
+    first.files.use_samples()
     qtbot.waitUntil(lambda: not first.files.is_reading)
     first.shut_down()
 
@@ -273,7 +286,7 @@ def test_settings_that_make_no_sense_are_passed_over(
     stage.choose_station("Hall 4")
     now = stage.workbench.selection.preparation
 
-    assert now.source == SourceChoice()
+    assert now.source == NO_SOURCE
     assert now.limits == SwingLimits()
     assert now.assumptions == USUAL
     assert now.mask.shape == (0, 3)
@@ -487,7 +500,8 @@ def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
     lost = str(stage.folder / "lost.json")
     there = stage.settings.station(OTHER.station)
     stage.settings.set_station(
-        OTHER.station, replace(there, second=StoredCamera(), files=FilePaths(rig=lost))
+        OTHER.station,
+        replace(there, second=StoredCamera(SourceChoice()), files=FilePaths(rig=lost)),
     )
     stage.choose_station(OTHER.station)
     (reported,) = (each for each in stage.sentences if "lost.json" in each)

@@ -16,7 +16,7 @@ from lightpen.record.swings.reading import Record, open_record, recorded_names
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import recorded_setup
@@ -58,6 +58,14 @@ def test_at_first_all_is_missing_in_the_order_of_the_steps() -> None:
         ),
         *(MissingInput.IMAGES, MissingInput.CAMERA_FILE, MissingInput.PEN_FILE),
     )
+
+
+def test_a_source_must_be_chosen_before_its_images_are_missed(
+    whole: Preparation,
+) -> None:
+    sourceless = replace(whole, source=NO_SOURCE, image_size=None)
+
+    assert sourceless.camera_missing_inputs() == (MissingInput.SOURCE,)
 
 
 @pytest.mark.parametrize("blank", ["", "  \t"])

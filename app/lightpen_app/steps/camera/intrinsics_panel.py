@@ -179,8 +179,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
             words = self.tr("Image size of the file: {0}")
             return StatusMessage(words.format(made_for), Sign.WAIT, Tone.QUIET)
         if self._image_size == camera.image_size:
-            words = self.tr("Matches the live images: {0}")
-            return StatusMessage.good(words.format(made_for))
+            words = self.tr("Size fits: {0}. Checked against the pen at step LEDs.")
+            return StatusMessage(words.format(made_for), Sign.RING, Tone.ACTIVE)
         words = self.tr(
             "Image size is {0}; the intrinsics file is for {1}. Choose the file of "
             "this camera, or say how the images are binned or cropped."

@@ -4,7 +4,7 @@ from typing_extensions import override
 
 from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import Exposure, inspect
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing, missing_input_text
@@ -18,6 +18,8 @@ from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
+
+_LACKS_SOURCE = MissingInput.SOURCE, MissingInput.SOURCE_PLACE, MissingInput.DEVICE
 
 
 class CameraPage(Page):
@@ -95,6 +97,9 @@ class CameraPage(Page):
         self._is_shown = True
         if not self._live.is_open:
             self._camera.open()
+        if self._selection.preparation.source == NO_SOURCE:
+            self._view.source.set_searching(True)
+            self._camera.search_all()
         self._show_connection()
         self._live.show_pen()
 
@@ -216,7 +221,7 @@ class CameraPage(Page):
     def _why_closed(self) -> str:
         """Return why no camera is open though none has failed."""
         for lack in self._selection.preparation.camera_missing_inputs():
-            if lack in (MissingInput.SOURCE_PLACE, MissingInput.DEVICE):
+            if lack in _LACKS_SOURCE:
                 return missing_input_text(lack)
         return self.tr("No camera is open.")
 

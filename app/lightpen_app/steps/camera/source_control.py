@@ -30,6 +30,7 @@ class SourceSearch(QObject):
             job.succeeded.connect(panel.set_absent)
         camera.cameras_found.connect(self._on_found)
         camera.search_failed.connect(self._on_failed)
+        camera.all_found.connect(panels[0].set_offers)
 
         job.start()
 

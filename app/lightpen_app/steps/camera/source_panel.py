@@ -5,14 +5,14 @@ from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu, QWidget
 
-from lightpen.cameras.source import FoundDevice, SourceNeeds
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds
 from lightpen.cameras.sources import SOURCES
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
 from lightpen.messages import Message
 from lightpen.record.swings.recordings import FilesBeside
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -43,7 +43,7 @@ class SourcePanel(Translated, QGroupBox):
     def __init__(self, *, is_second: bool = False) -> None:
         super().__init__()
         self._is_second = is_second
-        self._value = SourceChoice()
+        self._value = NO_SOURCE
         self._absent: Mapping[str, Message] = {}
         self._is_searching = False
         self._outcome: Callable[[], StatusMessage] = StatusMessage
@@ -70,6 +70,7 @@ class SourcePanel(Translated, QGroupBox):
         self._device = DeviceField()
         self._search = PushButton()
         self._remark_label = SignLabel()
+        self._offers = QWidget()  # the cameras found, before a source is chosen
         self._samples = PushButton()
         self._retry = PushButton()
         self._beside = FilesBeside()
@@ -78,6 +79,8 @@ class SourcePanel(Translated, QGroupBox):
 
         # Layout
         layout = vertical_layout(self)
+        fill(layout, self._offers)
+        self._offers_layout = vertical_layout(self._offers)
         horizontal_layout(layout, (self._kind, 1), self._samples)
         fill(layout, self._place, self._producer)
         horizontal_layout(layout, (self._device, 1), self._search)
@@ -144,6 +147,16 @@ class SourcePanel(Translated, QGroupBox):
         if found and not self._value.place:
             self._choose(replace(self._value, place=found[0].place))
 
+    def set_offers(self, found: tuple[tuple[Source, FoundDevice], ...]) -> None:
+        """Offer the cameras of all sources, each by a button."""
+        self._is_searching = False
+        self._outcome = partial(self._found_message, len(found))
+        for button in self._offers.findChildren(PushButton):
+            button.deleteLater()
+        for each in found:
+            self._offers_layout.addWidget(self._offer(*each))
+        self._refresh()
+
     def set_search_problem(self, why: str) -> None:
         """Show why cameras cannot be searched."""
         self._outcome = partial(StatusMessage.fault, why)
@@ -167,6 +180,12 @@ class SourcePanel(Translated, QGroupBox):
     @property
     def _has_device(self) -> bool:
         return self._needs in (SourceNeeds.DEVICE, SourceNeeds.DEVICE_AND_PRODUCER)
+
+    def _offer(self, source: Source, device: FoundDevice) -> PushButton:
+        button, choice = PushButton(), SourceChoice(source.key, device.place)
+        button.setText(f"{device.label} ({worded(source.name)})")
+        button.clicked.connect(lambda: self._choose(choice))
+        return button
 
     def _on_kind_chosen(self, index: int) -> None:
         source = SOURCES[index]
@@ -223,7 +242,9 @@ class SourcePanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         needs, absent = self._needs, self._absent.get(self._value.source.key)
-        self._kind.setCurrentIndex(SOURCES.index(self._value.source))
+        is_open = needs is SourceNeeds.CHOICE
+        self._kind.setCurrentIndex(-1 if is_open else SOURCES.index(self._value.source))
+        self._offers.setVisible(is_open)
         self._place.setVisible(needs is SourceNeeds.FILES)
         is_usable = self._has_device and absent is None
         self._producer.setVisible(
@@ -240,7 +261,7 @@ class SourcePanel(Translated, QGroupBox):
         self._refresh_beside()
 
     def _remark(self, absent: Message | None) -> StatusMessage:
-        if not self._has_device:
+        if not (self._has_device or self._needs is SourceNeeds.CHOICE):
             return StatusMessage()
         if absent is not None:
             return StatusMessage.warning(worded(absent))
@@ -279,6 +300,7 @@ class SourcePanel(Translated, QGroupBox):
             if source.key in self._absent:
                 name = self.tr("{0} - not installed").format(name)
             self._kind.setItemText(index, name)
+        self._kind.setPlaceholderText(self.tr("Choose your camera"))
         self._kind.setAccessibleName(title)
         # On Linux the accessible name of a drop-down list is its current choice.
         self._kind.setAccessibleDescription(title)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from PySide6.QtCore import QCoreApplication, QObject, QTimer, Signal
 
 from lightpen.record.library.tip_library import ItemKind
+from lightpen.swing.image_sources import NO_SOURCE, SourceKind
 from lightpen.swing.preparation import Preparation
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.words import shortened
@@ -112,6 +113,8 @@ class EntryPresenter(QObject):
         if name in self._selection.stations():
             self._selection.choose_station(name)
         else:
+            if now.names.station and now.source.kind == SourceKind.SIMULATED:
+                now = now.with_source(NO_SOURCE)  # only the station before simulates
             now = replace(now, names=replace(now.names, station=name))
             self._selection.set_preparation(now)
         self._names.set_stations(self._selection.stations())

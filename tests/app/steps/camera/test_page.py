@@ -356,7 +356,7 @@ def test_recorded_images_have_no_exposure_to_set(
 
 
 def test_the_checks_of_the_intrinsics_are_shown(live: "Seen") -> None:
-    assert "Matches the live images: 1224 x 1024" in live.words
+    assert "Size fits: 1224 x 1024" in live.words
     assert re.search(
         r"2319\.10 \u00b1 0\.5\d and 2318\.55 \u00b1 0\.5\d px \(k = 2\)", live.words
     ), live.words
@@ -459,7 +459,7 @@ def test_a_file_of_the_whole_sensor_is_used_for_binned_images(
         Qt.MouseButton.LeftButton,
     )
 
-    live.wait("Matches the live images: 1224 x 1024")
+    live.wait("Size fits: 1224 x 1024")
     used = workbench.selection.preparation.camera_file
     assert used is not None
     assert used.path == path.with_name(f"{path.stem}-binned-2.yaml")
@@ -496,7 +496,7 @@ def test_an_unfit_file_is_reported_beside_the_field_and_the_one_before_stays(
     field = live.named("Intrinsics file")
     assert isinstance(field, QLineEdit)
     assert field.text() == str(path)
-    assert "Matches the live images:" in live.words
+    assert "Size fits:" in live.words
 
 
 def test_the_complaint_goes_with_a_fit_file(
@@ -537,7 +537,7 @@ def test_the_files_of_the_simulated_pen_are_used_at_a_click(
 
     seen.click("Use its files")
 
-    seen.wait("Matches the live images:")
+    seen.wait("Size fits:")
     assert workbench.selection.preparation.pen_file is not None
     assert seen.page.is_complete()
 
@@ -570,7 +570,7 @@ def test_a_folder_and_an_intrinsics_file_are_dropped_on_their_places(
     )
     drop_on(live.child(IntrinsicsPanel), tmp_path / "swing" / "camera.yaml")
 
-    live.wait("Matches the live images:")
+    live.wait("Size fits:")
 
 
 def drop_on(panel: QWidget, path: Path) -> None:

@@ -7,13 +7,14 @@ from PySide6.QtWidgets import QApplication, QComboBox
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.source import FoundDevice
-from lightpen.cameras.sources import SOURCES
+from lightpen.cameras.sources import SOURCES, source_named
 from lightpen.messages import message
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.steps.camera.source_panel import SourcePanel
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel
 
 FOUND = (
@@ -119,3 +120,22 @@ def test_what_a_search_came_to_is_reported_in_the_language_that_is_chosen(
 
     assert english.startswith("No camera found.")
     assert "No camera" not in reported(panel).value().text
+
+
+def test_before_a_source_is_chosen_the_cameras_that_are_there_are_offered(
+    panel: SourcePanel, qtbot: QtBot
+) -> None:
+    assert panel.value() == NO_SOURCE
+    assert panel.findChildren(QComboBox)[0].placeholderText() == "Choose your camera"
+    panel.set_searching(True)
+    assert "Searching for cameras" in reported(panel).value().text
+    sources = [source_named("basler"), source_named("aravis")]
+    panel.set_offers(tuple(zip(sources, FOUND, strict=True)))  # type: ignore[arg-type]
+    (button,) = (
+        each for each in panel.findChildren(PushButton) if "21877692" in each.text()
+    )
+    with qtbot.waitSignal(panel.value_changed):
+        button.click()
+
+    assert panel.value() == SourceChoice("basler", "21877692")
+    assert not button.isVisible()

@@ -39,7 +39,7 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.simulator.swings import simulate_centers, swing_poses
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.record_header import record_header
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.shell.main_window import MainWindow
@@ -410,7 +410,8 @@ def test_a_new_station_takes_over_the_present_choices(
     assert workbench.selection.preparation.names == replace(
         before.names, station="Hall 3"
     )
-    assert workbench.selection.preparation.pen_file is before.pen_file
+    assert workbench.selection.preparation.limits is before.limits
+    assert workbench.selection.preparation.source == NO_SOURCE  # it simulated
     assert workbench.selection.stations() == ("Hall 2", "Hall 3")
     assert settings.await_saved(120.0)
     assert Settings(settings.file).last_station() == "Hall 3"
