@@ -192,7 +192,7 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker.until(lambda: walker.title() == "Verify")
     walker.until_says("2 of 5 points")
     walker.click("Let the simulated operator probe")
-    walker.until(lambda: walker.main_button().text() == "Back to Start")
+    walker.until(lambda: walker.main_button().text() == "Measure a part")
 
     walker.until_tells("The drift reference stays within")
     kinds = [each["verification"] for each in records(walker)]
