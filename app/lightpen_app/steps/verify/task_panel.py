@@ -36,7 +36,6 @@ class TaskPanel(Translated, QWidget):
         self._recorded = PushButton()
         self._recorded.setCheckable(True)
         self._is_chosen = QCheckBox()
-        self._is_chosen.setVisible(task in TASKS)  # a part is not a selectable task
         self._verdict = SignLabel()
         self._images = ImagesRow()
 
@@ -44,6 +43,8 @@ class TaskPanel(Translated, QWidget):
         layout = vertical_layout(self, spacing=GRID // 2)
         horizontal_layout(layout, self._is_chosen, 1, self._recorded, self._anew)
         fill(layout, self._images, self._verdict, (self._finding, 1))
+
+        self._is_chosen.setVisible(task in TASKS)  # a part is not a selectable task
 
         # Connections
         self._is_chosen.clicked.connect(self._on_chosen)
