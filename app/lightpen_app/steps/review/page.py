@@ -13,13 +13,14 @@ from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.model.method import Method
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.swing.status import SwingStatus
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.review.acceptance_control import AcceptanceControl
 from lightpen_app.steps.review.next_tips import NextTipsControl
 from lightpen_app.steps.review.press_control import PressTestControl
 from lightpen_app.steps.review.result_export import ResultExport
-from lightpen_app.steps.review.result_panel import ReviewedResult
+from lightpen_app.steps.review.result_panel import reviewed_result
 from lightpen_app.steps.review.view import ReviewView
 from lightpen_app.steps.review.view_state import (
     OF_FILES,
@@ -50,7 +51,7 @@ class ReviewPage(Page):
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
         self._selection = workbench.selection
-        self._run, self._runner = workbench.run, workbench.run.runner
+        self._run, self._ask = workbench.run, workbench.run.runner.ask
         self._shown = SwingStatus()
 
         # Widgets
@@ -79,8 +80,8 @@ class ReviewPage(Page):
         self._run.progressed.connect(view.set_progress)
         self._accepted.timeout.connect(self.changed)
         self._reading.timeout.connect(self.changed)
-        view.cancel.clicked.connect(self._on_cancel_clicked)
-        view.capture_more.clicked.connect(self._capture_more)
+        view.cancel.clicked.connect(lambda: self._ask(SwingWorkflow.cancel))
+        view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
         view.verify.clicked.connect(self._on_verify_clicked)
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.methods_made.connect(self._on_methods_made)
@@ -127,17 +128,17 @@ class ReviewPage(Page):
             if not self._next_tip():
                 self.step_requested.emit("start")
             # this leads to the next swing
-            self._runner.ask(lambda workflow: workflow.abandon())
+            self._ask(SwingWorkflow.abandon)
             return
         if why_not_now(status):
             return
         match next_step(status):
             case NextStep.ACCEPT:
-                self._runner.ask(lambda workflow: workflow.accept())
+                self._ask(SwingWorkflow.accept)
             case NextStep.CAPTURE_MORE if not status.is_recording:
-                self._capture_more()
+                self._ask(SwingWorkflow.capture_more)
             case NextStep.USE_PART:
-                self._runner.ask(lambda workflow: workflow.use_part())
+                self._ask(SwingWorkflow.use_part)
             case NextStep.REPORT_JOINT:
                 self._report_by("joint")
             case NextStep.SEE_TO_CAUSE:
@@ -182,10 +183,6 @@ class ReviewPage(Page):
         self._along.shut_down()
         self._view.tabs.shut_down()
 
-    @override
-    def _retranslate(self) -> None:
-        self._refresh_words()
-
     @Slot()
     def _on_run_changed(self) -> None:
         before, now = self._shown, self._run.status
@@ -200,7 +197,7 @@ class ReviewPage(Page):
         self._view.set_solving(now.is_solving)
         self._press.follow(now)
         if now.assessment is not before.assessment:
-            self._show_result(now)  # also while hidden, to be up to date when shown
+            self._view.result.set_value(reviewed_result(now))  # also while hidden
         if self.isVisible():
             self._refresh()
         self.changed.emit()
@@ -210,48 +207,37 @@ class ReviewPage(Page):
     def _refresh(self) -> None:
         """Show the current state."""
         self._view.tabs.fill()
-        self._refresh_words()
+        self._retranslate()
 
-    def _refresh_words(self) -> None:
+    @override
+    def _retranslate(self) -> None:
         names = self._selection.preparation.names
         state = review_page_state(self._run.status, names, self.main_action())
         self._view.set_state(state)
         if self._methods is not None:
             self._methods.set_locked(state.why_locked)
 
-    def _show_result(self, status: SwingStatus) -> None:
-        outcome = None
-        if status.solution is not None and status.assessment is not None:
-            outcome = ReviewedResult(status.solution, status.names, status.assessment)
-        self._view.result.set_value(outcome)
-
     def _on_images_made(self, images: "ImagesPanel") -> None:
-        self._refresh_words()
+        self._retranslate()
         images.exclude_requested.connect(self._exclude)
         images.include_requested.connect(self._include)
 
     def _on_methods_made(self, methods: "MethodsPanel") -> None:
         self._methods = methods
-        self._refresh_words()
+        self._retranslate()
         methods.method_chosen.connect(self._report_by)
 
     def _report_by(self, method: Method) -> None:
         """Report this swing and later ones at the station by a method."""
-        self._runner.ask(lambda workflow: workflow.report_by(method))
+        self._ask(lambda workflow: workflow.report_by(method))
         chosen = replace(self._selection.preparation, method=method)
         self._selection.set_preparation(chosen)
 
-    def _on_cancel_clicked(self) -> None:
-        self._runner.ask(lambda workflow: workflow.cancel())
-
-    def _capture_more(self) -> None:
-        self._runner.ask(lambda workflow: workflow.capture_more())
-
     def _exclude(self, numbers: list[int]) -> None:
-        self._runner.ask(lambda workflow: workflow.exclude(numbers))
+        self._ask(lambda workflow: workflow.exclude(numbers))
 
     def _include(self, numbers: list[int]) -> None:
-        self._runner.ask(lambda workflow: workflow.include(numbers))
+        self._ask(lambda workflow: workflow.include(numbers))
 
     def _next_tip(self) -> str:
         """Return the tip that can be swung at once, as it is chosen by now."""

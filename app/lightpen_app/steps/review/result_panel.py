@@ -15,6 +15,7 @@ from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
+from lightpen.swing.status import SwingStatus
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.quantities import AXES, micrometres_text, mm_text
@@ -50,6 +51,13 @@ class ReviewedResult:
     def uncertainty(self) -> FloatArray:
         """U (k = 2) along x, y and z, (3,), mm."""
         return reported(self.solution.calibration).expanded_uncertainty[:3]
+
+
+def reviewed_result(status: SwingStatus) -> ReviewedResult | None:
+    """Return what a swing is solved to; None until it is."""
+    if status.solution is None or status.assessment is None:
+        return None
+    return ReviewedResult(status.solution, status.names, status.assessment)
 
 
 class ResultPanel(Translated, QFrame):
