@@ -24,7 +24,7 @@ from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
 from lightpen.formats.json_records import plain
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.rig_files import write_rig
-from lightpen.intrinsics.boards import Board, parse_board
+from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.calibration import calibrate_camera
 from lightpen.intrinsics.observing import observe_board, observe_board_of_rig
 from lightpen.intrinsics.pair import SCALE_SIGMA, calibrate_pair
@@ -34,7 +34,6 @@ from lightpen.intrinsics.report import (
     pair_record,
     pair_text,
 )
-from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen.local_time import local_now
 from lightpen.messages import printable
 
@@ -105,6 +104,13 @@ def add_extrinsics(parser: argparse.ArgumentParser) -> None:
         help="rig file to write (rig.json); without --cameras the intrinsics files are "
         "written next to it",
     )
+    parser.add_argument(
+        "--scale-sigma",
+        type=number_from(1e-9, 0.1, "share", "of 1"),
+        default=SCALE_SIGMA,
+        metavar="SHARE",
+        help=f"relative standard uncertainty of the board's scale ({SCALE_SIGMA:g})",
+    )
     _add_temperature(parser)
     add_json(parser)
 
@@ -118,21 +124,6 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         "charuco:12x9:20:15:DICT_5X5_100 (squares, side, marker), circles:9x7:20:10 "
         "(distance, diameter), asymmetric-circles:4x11:20:10",
     )
-    parser.add_argument(
-        "--scale-sigma",
-        type=number_from(1e-9, 0.1, "share", "of 1"),
-        default=SCALE_SIGMA,
-        metavar="SHARE",
-        help=f"relative standard uncertainty of the board's scale ({SCALE_SIGMA:g})",
-    )
-    parser.add_argument(
-        "--measured",
-        type=float,
-        nargs=3,
-        metavar=("STATED", "MEASURED", "U"),
-        help="a length of the board as stated by BOARD, as measured, and U (k = 2) of "
-        "the measurement, mm: scales the board and replaces --scale-sigma",
-    )
 
 
 def _add_temperature(parser: argparse.ArgumentParser) -> None:
@@ -144,18 +135,9 @@ def _add_temperature(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _board(options: argparse.Namespace) -> tuple[Board, float]:
-    """Return the board in mm, with its measured scale if any, and the scale's sigma."""
-    board, scale = parse_board(options.board), options.scale_sigma
-    if options.measured:
-        check = ScaleCheck(*options.measured)
-        board, scale = check.scaled(board), check.sigma
-    return board, scale
-
-
 @printing
 def _intrinsics(options: argparse.Namespace) -> None:
-    board, _ = _board(options)
+    board = parse_board(options.board)
     source = images_at(*options.images)
     require_other_file(options.json, *source.files, options.out)
     _require_new_file(options.out, *source.files)
@@ -180,7 +162,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
 
 @printing
 def _extrinsics(options: argparse.Namespace) -> None:
-    board, scale_sigma = _board(options)
+    board = parse_board(options.board)
     names = (options.names[0], options.names[1])
     _require_names(names)
     sources = [images_at(options.left), images_at(options.right)]
@@ -204,7 +186,7 @@ def _extrinsics(options: argparse.Namespace) -> None:
                 seen_width=size[0],
                 seen_height=size[1],
             )
-    calibration = calibrate_pair(observed.views, names, cameras, scale_sigma)
+    calibration = calibrate_pair(observed.views, names, cameras, options.scale_sigma)
     written = list(given)
     if not written:
         for name, camera in zip(names, calibration.rig.cameras, strict=True):

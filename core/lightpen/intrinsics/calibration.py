@@ -14,7 +14,6 @@ import numpy as np
 
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.board_fit import BoardFit
-from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.changes import (
     FEWEST,
     CameraChange,
@@ -56,7 +55,6 @@ LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CONTRADICTED = 3.0  # standard uncertainties of the shape of a board
 BENT = 0.3  # mm, beyond its uncertainty
 STRETCHED = 3e-3  # relative, beyond its uncertainty
-USUAL_SIDES = 10.0, 3000.0  # mm, of a board
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +197,7 @@ def _result(
         calibrated_on=calibrated_on,
         lens_field=found.effects.field,
     )
-    remarks = [*found.remarks, *messages_on_size(views.board)]
+    remarks = [*found.remarks]
     if duplicates:
         remarks.append(message_on_duplicates(views.n_views, duplicates))
     if found.change is not None:
@@ -285,17 +283,6 @@ def _messages_on_board(fitted: BoardFit) -> tuple[Message, ...]:
         bend = float(np.abs(shape[2:]).max())
         remarks.append(message("intrinsics.board-bent", bend=bend))
     return tuple(remarks)
-
-
-def messages_on_size(board: Board) -> tuple[Message, ...]:
-    """Return the question whether lengths were in another unit."""
-    longer = 2 * float(np.abs(board.points[:, :2]).max())
-    least, most = USUAL_SIDES
-    if least <= longer <= most:
-        return ()
-    return (
-        message("intrinsics.size-implausible", pitch=board.pitch, side=longer / 1000),
-    )
 
 
 def _message_on_projection(fitted: BoardFit) -> tuple[Message, ...]:

@@ -48,14 +48,12 @@ class Choice:
 
     @property
     def message(self) -> Message:
-        """The reason as text."""
+        """The lens model and its cross-validated error as text."""
         own = self.held_out[self.n_coefficients]
-        others = tuple(
-            _other_model(n, rms)
-            for n, rms in self.held_out.items()
-            if n != self.n_coefficients
-        )
-        return _model(self.n_coefficients, own, others)
+        if self.n_coefficients == FISHEYE:
+            return message("intrinsics.fisheye", held_out=own)
+        n = self.n_coefficients
+        return message("intrinsics.brown", n_coefficients=n, held_out=own)
 
     @property
     def pulls(self) -> tuple[float | None, ...]:
@@ -106,34 +104,6 @@ def choice_record(choice: Choice) -> dict[str, object]:
         "held_out_rms_px_fisheye": choice.held_out.get(FISHEYE),
         "reason": choice.message if choice.held_out else None,
     }
-
-
-def _model(n_coefficients: int, own: float, others: tuple[Message, ...]) -> Message:
-    """Return the message on the chosen model."""
-    match n_coefficients, bool(others):
-        case 5, True:
-            return message("intrinsics.five", held_out=own, others=others)
-        case 5, False:
-            return message("intrinsics.five-only", held_out=own)
-        case 8, True:
-            return message("intrinsics.eight", held_out=own, others=others)
-        case 8, False:
-            return message("intrinsics.eight-only", held_out=own)
-        case _, True:
-            return message("intrinsics.fisheye", held_out=own, others=others)
-        case _:
-            return message("intrinsics.fisheye-only", held_out=own)
-
-
-def _other_model(n_coefficients: int, rms: float) -> Message:
-    """Return the message on a model that was tried besides."""
-    match n_coefficients:
-        case 5:
-            return message("held-out.five", held_out=rms)
-        case 8:
-            return message("held-out.eight", held_out=rms)
-        case _:
-            return message("held-out.fisheye", held_out=rms)
 
 
 def choose_distortion(

@@ -284,22 +284,6 @@
         <translation>打印 (PDF)...</translation>
     </message>
     <message>
-        <source>Scale check (optional): stated, measured, U / mm</source>
-        <translation>比例核查（可选）：标称值、实测值、U / mm</translation>
-    </message>
-    <message>
-        <source>Scale check (optional)</source>
-        <translation>比例核查（可选）</translation>
-    </message>
-    <message>
-        <source>200 200.12 0.04 (mm)</source>
-        <translation>200 200.12 0.04 (mm)</translation>
-    </message>
-    <message>
-        <source>Measured with a caliper: stated length, measured length and its U (k = 2) in mm. The scale does not affect the intrinsics of one camera.</source>
-        <translation>用卡尺测量：标称长度、实测长度及其 U (k = 2)，单位 mm。比例不影响单台相机的内参。</translation>
-    </message>
-    <message>
         <source>From a folder...</source>
         <translation>从文件夹...</translation>
     </message>
@@ -5711,20 +5695,12 @@ mm</translation>
         <translation>1 个数</translation>
     </message>
     <message>
-        <source>5 distortion coefficients are enough: they predict views that were left out to {held_out:.4f} px ({others}).</source>
-        <translation>5 个畸变系数已足够：它们对留出视图的预测误差为 {held_out:.4f} px（{others}）。</translation>
-    </message>
-    <message>
         <source>A fixed cone is the drift reference: its moves from visit to visit count in U of what is probed in between.</source>
         <translation>以固定不动的锥孔作为漂移参考点：它在相邻两次触测之间的位移计入其间所测结果的 U。</translation>
     </message>
     <message>
         <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
-    </message>
-    <message>
-        <source>A square size of {pitch:g} mm makes a board of {side:.3g} m. Check that it is in mm. The intrinsics do not depend on it; all distances do.</source>
-        <translation>方格边长 {pitch:g} mm 意味着标定板长 {side:.3g} m。请检查单位是否为 mm。内参与它无关，所有距离都与它有关。</translation>
     </message>
     <message>
         <source>Actual</source>
@@ -5827,10 +5803,6 @@ mm</translation>
         <translation>请输入主管的姓名。</translation>
     </message>
     <message>
-        <source>5 distortion coefficients: no more would predict views better. Cross-validated error: {held_out:.4f} px.</source>
-        <translation>5 个畸变系数：更多系数不会更好地预测视图。交叉验证误差：{held_out:.4f} px。</translation>
-    </message>
-    <message>
         <source>Bending: {assumed:.0f} µm assumed; a press test measures it.</source>
         <translation>弯曲：假定为 {assumed:.0f} µm；压力试验可测出实际值。</translation>
     </message>
@@ -5841,6 +5813,10 @@ mm</translation>
     <message>
         <source>Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}.</source>
         <translation>弯曲：{bending:.0f} ± {uncertainty:.0f} µm（{day} 的压力试验）。</translation>
+    </message>
+    <message>
+        <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
+        <translation>Brown 镜头模型，{n_coefficients} 个系数；交叉验证误差 {held_out:.4f} px。</translation>
     </message>
     <message>
         <source>Cone or camera moved</source>
@@ -5861,6 +5837,10 @@ mm</translation>
     <message>
         <source>File name too long</source>
         <translation>文件名过长</translation>
+    </message>
+    <message>
+        <source>Fisheye model (Kannala-Brandt); cross-validated error {held_out:.4f} px.</source>
+        <translation>鱼眼模型 (Kannala-Brandt)；交叉验证误差 {held_out:.4f} px。</translation>
     </message>
     <message>
         <source>Fixed point: std. deviation along the line of sight</source>
@@ -7151,14 +7131,6 @@ mm</translation>
         <translation>3D Slicer</translation>
     </message>
     <message>
-        <source>8 distortion coefficients (rational model). Cross-validated error: {held_out:.4f} px.</source>
-        <translation>8 个畸变系数（有理模型）。交叉验证误差：{held_out:.4f} px。</translation>
-    </message>
-    <message>
-        <source>8 distortion coefficients (rational model): they reduce the cross-validated error to {held_out:.4f} px; {others}.</source>
-        <translation>8 个畸变系数（有理模型）：交叉验证误差降至 {held_out:.4f} px；{others}。</translation>
-    </message>
-    <message>
         <source>A password in the system keyring needs the package keyring, which is not installed. Install it with: pip install &quot;lightpen[keyring]&quot;.</source>
         <translation>系统密钥环中的密码需要软件包 keyring，但尚未安装。安装命令：pip install &quot;lightpen[keyring]&quot;。</translation>
     </message>
@@ -7959,14 +7931,6 @@ mm</translation>
         <translation>工件坐标系中的要素 / mm，角度 / 度，k = 2</translation>
     </message>
     <message>
-        <source>Fisheye model (Kannala-Brandt), cross-validated error {held_out:.4f} px; {others}.</source>
-        <translation>鱼眼模型 (Kannala-Brandt)，交叉验证误差 {held_out:.4f} px；{others}。</translation>
-    </message>
-    <message>
-        <source>Fisheye model (Kannala-Brandt): no other fits. Cross-validated error: {held_out:.4f} px.</source>
-        <translation>鱼眼模型 (Kannala-Brandt)：其他模型均不适合。交叉验证误差：{held_out:.4f} px。</translation>
-    </message>
-    <message>
         <source>Frame rate {sent:.1f} fps instead of {wanted:.1f} fps, limited by link or exposure. Lower the frame rate, or use a smaller region or a shorter exposure.</source>
         <translation>帧率为 {sent:.1f} 幅/秒，而不是设定的 {wanted:.1f} 幅/秒，受链路或曝光限制。请降低帧率，或使用更小的区域或更短的曝光。</translation>
     </message>
@@ -8431,10 +8395,6 @@ mm</translation>
         <translation>标定板与 {board} 不符：沿行的长度比沿列长 {stretch:+.2%}，直角偏差 {shear:+.2f}°。打印时可能被缩放。请按实际尺寸打印，或重新测量。</translation>
     </message>
     <message>
-        <source>The board measures {measured:g} mm where {stated:g} mm are stated. No printer errs by that much: check both lengths and their unit (mm). If the board was printed at another size, state the squares as they are.</source>
-        <translation>标定板测得 {measured:g} mm，而给定为 {stated:g} mm。打印机不会有如此大的偏差：请检查两个长度及其单位 (mm)。如果标定板以其他尺寸打印，请按实际尺寸给出方格边长。</translation>
-    </message>
-    <message>
         <source>The board {board} is {width:.0f} x {height:.0f} mm and needs a white margin of {foot:g} mm, which exceeds the paper. Choose a larger paper, or a smaller board.</source>
         <translation>标定板 {board} 为 {width:.0f} x {height:.0f} mm，还需 {foot:g} mm 白边，超出纸张。请选择更大的纸张或更小的标定板。</translation>
     </message>
@@ -8749,10 +8709,6 @@ mm</translation>
     <message>
         <source>The local entries do not continue with {entry}. A data folder was copied and both copies were used, or entries were modified. Check both archives.</source>
         <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
-    </message>
-    <message>
-        <source>The measured length {measured:g} mm (stated {stated:g}, U {u:g} mm) is not valid: all must be above 0, and U at most a twentieth of the length. Measure over as many squares as possible.</source>
-        <translation>测得长度 {measured:g} mm（标称 {stated:g}，U {u:g} mm）无效：均须大于 0，且 U 不超过长度的二十分之一。请跨尽可能多的方格测量。</translation>
     </message>
     <message>
         <source>The measuring plan {name} is not valid: {found}. Correct the plan; docs/measuring.md describes its entries.</source>
@@ -9539,18 +9495,6 @@ mm</translation>
         <translation>{folder} 中有摆动的图像，但没有 {name}。请用备份恢复该文件，或移走文件夹。</translation>
     </message>
     <message>
-        <source>{held_out:.4f} px with 5 coefficients</source>
-        <translation>5 个系数时 {held_out:.4f} px</translation>
-    </message>
-    <message>
-        <source>{held_out:.4f} px with 8 coefficients</source>
-        <translation>8 个系数时 {held_out:.4f} px</translation>
-    </message>
-    <message>
-        <source>{held_out:.4f} px with a fisheye model</source>
-        <translation>鱼眼模型时 {held_out:.4f} px</translation>
-    </message>
-    <message>
         <source>{journal} lists none of the {n_images} images in its folder. Restore this file from a copy.</source>
         <translation>{journal} 中没有其文件夹内 {n_images} 幅图像的任何一幅。请用备份恢复该文件。</translation>
     </message>
@@ -9657,10 +9601,6 @@ mm</translation>
     <message>
         <source>{reason} {power}</source>
         <translation>{reason} {power}</translation>
-    </message>
-    <message>
-        <source>{text} is not a scale check. Enter the stated length, the measured length and its U (k = 2) in mm, such as 200 200.12 0.04.</source>
-        <translation>{text} 不是比例检查。请输入标称长度、实测长度及其 U (k = 2)，单位 mm，例如 200 200.12 0.04。</translation>
     </message>
     <message>
         <source>{time} early</source>

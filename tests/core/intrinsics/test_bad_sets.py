@@ -201,13 +201,6 @@ def with_rotated(views: Views, which: list[int]) -> Views:
 
 
 @pytest.mark.slow
-def test_a_board_in_another_unit_is_questioned(make_views: MakeViews) -> None:
-    found = calibrated(make_views("chessboard:9x6:2423"))
-
-    assert "makes a board of 19.4 m" in str(found.remarks[-1])
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("bend", [(0.3, 0.0, 0.0), (1.0, 0.5, 0.0), (5.0, 0.0, 5.0)])
 def test_a_bowed_or_curled_board_is_calibrated_with(
     make_views: MakeViews, camera: Camera, bend: tuple[float, float, float]

@@ -55,7 +55,6 @@ def test_five_coefficients_are_kept_where_eight_gain_nothing(
     found: CameraCalibration,
 ) -> None:
     assert found.choice.n_coefficients == 5
-    assert "no more would predict views better" in str(found.choice.message)
 
 
 @pytest.mark.slow
@@ -71,7 +70,7 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
     choice, _ = choose_distortion(views, fitted, lambda fraction: None)
 
     assert choice.n_coefficients == 8
-    assert "they reduce the cross-validated error" in str(choice.message)
+    assert "Brown's lens model with 8 coefficients" in str(choice.message)
 
 
 @pytest.mark.slow

@@ -13,7 +13,6 @@ from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS, CameraCalibration
 from lightpen.intrinsics.capture import cells_of
-from lightpen.intrinsics.scale_check import ScaleCheck
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
@@ -33,7 +32,6 @@ from lightpen_app.widgets.board_view import BoardOverlay, BoardView
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -68,8 +66,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._image = BoardView()
         self._remark = SignLabel()
         self.board = BoardForm()
-        self._measured_name = text_label(TextSize.BODY)
-        self._measured = EnterEdit()
         self._print = PushButton()
         self._begin = PushButton()
         self._folder = PushButton()
@@ -90,7 +86,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         # Layout
         panel = QWidget()
         side = vertical_layout(panel, self.board, self._print, margins=None)
-        fill(side, self._measured_name, self._measured)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
         fill(side, self._count, (self._outcome, 1), 1)
         outcome = vertical_layout(self._outcome, self._facts)
@@ -167,15 +162,10 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         if self._live.operator is not None:
             self._live.operator.board = board
 
-    def _named_board(self, *, measured: bool = True) -> Board | None:
-        """Return the board of the fields, or report why there is none.
-
-        Scaled by the measured length, if there is one and it is requested.
-        """
+    def _named_board(self) -> Board | None:
+        """Return the board of the fields, or report why there is none."""
         try:
             board = self.board.board()
-            if measured and self._measured.text().strip():
-                board = ScaleCheck.parse(self._measured.text()).scaled(board)
         except UsageError as error:
             self._calibration.set_remark(partial(fault_message, error.message))
             return None
@@ -199,7 +189,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def print_board(self, path: Path) -> None:
         """Write the board as a page at true scale."""
-        board = self._named_board(measured=False)
+        board = self._named_board()
         if board is not None:
             self._place.remember(path.parent)
             self._calibration.print_board(board, path)
@@ -247,18 +237,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Camera calibration"))
         self._print.setText(self.tr("Print (PDF)..."))
-        self._measured_name.setText(
-            self.tr("Scale check (optional): stated, measured, U / mm")
-        )
-        self._measured.setAccessibleName(self.tr("Scale check (optional)"))
-        self._measured.setPlaceholderText(self.tr("200 200.12 0.04 (mm)"))
-        set_tooltip(
-            self._measured,
-            self.tr(
-                "Measured with a caliper: stated length, measured length and its U "
-                "(k = 2) in mm. The scale does not affect the intrinsics of one camera."
-            ),
-        )
         self._folder.setText(self.tr("From a folder..."))
         self._compute.setText(self.tr("Calibrate"))
         self._worst_title.setText(self.tr("Views (worst first)"))

@@ -36,7 +36,6 @@ from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.pooling import pooled
 from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.widgets.board_view import BoardView
-from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
@@ -383,23 +382,6 @@ def test_a_calibration_under_way_ends_where_other_views_are_begun(
 
     assert (remark(window), views_listed(window)) == ("", 0)
     press(window, "Stop")
-
-
-@pytest.mark.slow
-def test_a_scale_check_by_caliper_is_asked_for_and_its_form_is_reported(
-    window: BoardWindow, tmp_path: Path, images: list[Image], qtbot: QtBot
-) -> None:
-    (measured,) = window.findChildren(EnterEdit)
-    measured.setText("100")
-    window.read_folder(written(tmp_path, images))
-    assert "such as 200 200.12 0.04" in remark(window)
-
-    measured.setText("200 200.4 0.1")
-    with qtbot.waitSignal(window.concluded) as concluded:
-        window.read_folder(str(tmp_path))
-        qtbot.waitUntil(lambda: views_listed(window) == 7)
-        window.close()
-    assert "20.04" in concluded.args[0].board
 
 
 def test_a_simulated_operator_holds_the_board_while_views_are_captured(
