@@ -34,7 +34,6 @@ from lightpen.verification.session.status import (
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 TIMEOUT = 60.0  # s until a test gives up
@@ -174,13 +173,3 @@ class Verifier:
         state = self.status.state
         if state is not None and state.touching.phase is ProbingPhase.AT_REST:
             self.see(deepcopy(self.holder).still(TABLE, 1))
-
-    def read(self, task: AnyTask, place: Path) -> None:
-        """Read recorded images, and wait until that has ended."""
-        n_events, n_faults = len(self.ear.events), len(self.ear.faults)
-        self.runner.ask(
-            lambda workflow: workflow.read(task, str(place), is_still=False)
-        )
-        self.ear.wait_until(
-            lambda: len(self.ear.events) > n_events or len(self.ear.faults) > n_faults
-        )

@@ -29,7 +29,6 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.verification.probing.current_tip import CurrentTip, read_tip_in_force
 from lightpen.verification.probing.drift_reference import LampObservations
-from lightpen.verification.probing.probing import read_rules
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import (
     SessionTransition,
@@ -38,14 +37,9 @@ from lightpen.verification.session.session import (
     touched_anew,
     with_moved_part,
     with_other_choices,
-    with_read,
     without_last_touch,
 )
-from lightpen.verification.session.session_state import (
-    SessionState,
-    with_drift,
-    with_pen_at_rest,
-)
+from lightpen.verification.session.session_state import SessionState, with_pen_at_rest
 from lightpen.verification.session.status import (
     ReadingState,
     SessionEventKind,
@@ -54,16 +48,14 @@ from lightpen.verification.session.status import (
     ending,
     event_kinds,
 )
-from lightpen.verification.storage.checkpoint import InterruptedVerification, ReadImages
+from lightpen.verification.storage.checkpoint import InterruptedVerification
 from lightpen.verification.storage.conclusion import Conclusion, accepting_supervisor
 from lightpen.verification.storage.point_images import LivePoints, NewRecord, new_record
-from lightpen.verification.storage.recorded_runs import ReadRuns, read_runs
 from lightpen.verification.storage.resuming import (
     ResumedVerification,
     resume_verification,
 )
 from lightpen.verification.storage.session_files import SessionKeeping
-from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.registry import AnyTask
 
@@ -234,28 +226,6 @@ class VerificationWorkflow:
             return
         self._become(transition)
 
-    def read(self, task: AnyTask, place: str, *, is_still: bool) -> None:
-        """Do a task with recorded images; a drift reference counts in it.
-
-        The place is a folder, pattern, video or record; or a folder of such folders,
-        one a run. The pen is held still through the images of a touch, or each image is
-        a touch.
-        """
-        tip, setup, state = self._status.tip, self._status.setup, self._status.state
-        if self._task.is_there or tip is None or setup is None or state is None:
-            return
-        if self._keeping.has_read(DRIFT):
-            setup = with_drift(setup, state.found_by(DRIFT))
-        rules = read_rules(is_still, setup.choices.frames_of(task))
-        work = partial(read_runs, task, place, tip, setup, rules)
-        images = ReadImages(task.kind, place, is_still)
-        self._start(
-            ReadingState.IMAGES,
-            work,
-            partial(self._on_runs_read, images),
-            self._on_runs_unread,
-        )
-
     def go_on(self, interrupted: InterruptedVerification) -> None:
         """Resume an interrupted verification, or report why that is impossible."""
         preparation, under_way = self._preparation, interrupted.under_way
@@ -277,7 +247,7 @@ class VerificationWorkflow:
             ReadingState.IMAGES,
             work,
             partial(self._on_gone_on, interrupted.path),
-            self._on_runs_unread,
+            self._on_not_resumed,
         )
 
     def _on_gone_on(self, path: Path, before: ResumedVerification) -> None:
@@ -287,7 +257,7 @@ class VerificationWorkflow:
         try:
             self._keeping.take_over(path, before, lamp_drift)
         except FileError as error:
-            self._on_runs_unread(error.message)
+            self._on_not_resumed(error.message)
             return
         self._faults.end()
         self._choices = before.setup.choices.with_moves(())  # of that session
@@ -449,22 +419,7 @@ class VerificationWorkflow:
             return self._status.refusal
         return self._choices.missing(tip.names.ball_diameter)
 
-    # Recorded images
-
-    def _on_runs_read(self, images: ReadImages, read: ReadRuns) -> None:
-        status = replace(self._status, reading=ReadingState.NOTHING)
-        setup, state, done = status.setup, status.state, read.done
-        if setup is None or state is None:
-            return
-        self._faults.end()
-        self._status = replace(status, began=status.began or self._now())
-        self._touch_again(with_read(setup, state, read.touched, read.found))
-        self._keeping.add_read(images, done)
-        self._keep()
-        self._conclude_done()
-        self._publish(self._status, ending(self._status))
-
-    def _on_runs_unread(self, why: Message) -> None:
+    def _on_not_resumed(self, why: Message) -> None:
         self._faults.report(why)
         self._publish(replace(self._status, reading=ReadingState.NOTHING))
 

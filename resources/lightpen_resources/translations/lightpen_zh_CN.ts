@@ -1588,45 +1588,6 @@
     </message>
 </context>
 <context>
-    <name>ImagesRow</name>
-    <message>
-        <source>Choose...</source>
-        <translation>选择...</translation>
-    </message>
-    <message>
-        <source>Folder, video or record of images</source>
-        <translation>图像的文件夹、视频或记录</translation>
-    </message>
-    <message>
-        <source>Held still</source>
-        <translation>握住不动</translation>
-    </message>
-    <message>
-        <source>On: a point is several images with the pen held still. Off: each image is a point.</source>
-        <translation>开启：光笔静止时的多幅图像为一个点。关闭：每幅图像为一个点。</translation>
-    </message>
-    <message>
-        <source>Do this task with recorded images: a folder, or a folder of folders.</source>
-        <translation>用已录图像执行此任务：一个文件夹，或包含多个文件夹的文件夹。</translation>
-    </message>
-    <message>
-        <source>Read</source>
-        <translation>读取</translation>
-    </message>
-    <message>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
-        <source>Progress of reading</source>
-        <translation>读取进度</translation>
-    </message>
-    <message>
-        <source>Folder of recorded images</source>
-        <translation>录制图像的文件夹</translation>
-    </message>
-</context>
-<context>
     <name>InterruptedControl</name>
     <message>
         <source>Reading the swing</source>
@@ -5222,14 +5183,6 @@ needed</source>
     <message>
         <source>Include: {0}</source>
         <translation>包括：{0}</translation>
-    </message>
-    <message>
-        <source>Recorded images...</source>
-        <translation>录制的图像...</translation>
-    </message>
-    <message>
-        <source>Do this task with recorded images.</source>
-        <translation>用录制的图像完成该项。</translation>
     </message>
     <message>
         <source>Probe again</source>

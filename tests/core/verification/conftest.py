@@ -11,11 +11,8 @@ from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
-from lightpen.formats.decoding import encode_png
 from lightpen.model.posture import rotations_of
 from lightpen.model.rig import rig_of
-from lightpen.simulator.image_plans import plan_scene, render_plan
-from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import (
     PAPER_TIP,
     paper_camera,
@@ -96,18 +93,6 @@ def ring() -> Callable[..., FloatArray]:
         return np.asarray(np.array([-8.0, 168.0, 1050.0]) + radius * spokes)
 
     return points
-
-
-@pytest.fixture(scope="session")
-def recorded(prepared: Preparation, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Five images of the pen in the cone, each in another posture."""
-    assert prepared.camera is not None
-    scene = Scene(n_images=5, camera=prepared.camera)
-    folder = tmp_path_factory.mktemp("touches")
-    for plan in plan_scene(scene).image_plans:
-        image = render_plan(scene, plan)
-        (folder / f"{plan.index}.png").write_bytes(encode_png(image))
-    return folder
 
 
 @pytest.fixture

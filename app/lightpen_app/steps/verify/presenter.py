@@ -53,7 +53,6 @@ class VerifyPresenter(QObject):
     def view(self) -> VerifyView:
         """Return the view."""
         status = self._status
-        is_reading = status.reading is ReadingState.IMAGES
         headline = self.headline()
         return VerifyView(
             headline=headline,
@@ -61,7 +60,6 @@ class VerifyPresenter(QObject):
             lamps=lamps_message(status),
             titles=tuple(self._title(task) for task in self.tasks),
             task=None if status.refusal is not None else status.task,
-            reading=self._verification.progress if is_reading else None,
             pause=(
                 self.tr("Continue (Space)")
                 if status.is_paused

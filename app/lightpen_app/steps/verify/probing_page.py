@@ -200,7 +200,7 @@ class ProbingPage(ResponsiveLayout, Page):
         for (task, place), title in zip(self._panels.items(), view.titles, strict=True):
             panel = place.content_so_far()
             if panel is not None:
-                panel.set_status(status, view.reading)
+                panel.set_status(status)
             self._pages.set_title(place, title.text, title.sign, title.tone)
             if task is view.task and view.task is not before.task:
                 self._pages.show_page(place)
@@ -212,7 +212,7 @@ class ProbingPage(ResponsiveLayout, Page):
     def _make_panel(self, task: AnyTask) -> TaskPanel:
         panel = TaskPanel(task, self._runner)
         panel.set_choices(self._selection.choices)
-        panel.set_status(self._run.status, self._view.reading)
+        panel.set_status(self._run.status)
         panel.value_changed.connect(self._selection.set_choices)
         return panel
 

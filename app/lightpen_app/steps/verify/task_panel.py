@@ -1,4 +1,4 @@
-"""One task of a verification: its options, its results, and recorded images."""
+"""One task of a verification: its choice and its results."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QWidget
@@ -14,7 +14,6 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.verify.findings import TaskFinding
-from lightpen_app.steps.verify.images_row import ImagesRow
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -33,27 +32,20 @@ class TaskPanel(Translated, QWidget):
         # Widgets
         self._finding = TaskFinding(task)
         self._anew = PushButton()
-        self._recorded = PushButton()
-        self._recorded.setCheckable(True)
         self._is_chosen = QCheckBox()
         self._verdict = SignLabel()
-        self._images = ImagesRow()
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
-        horizontal_layout(layout, self._is_chosen, 1, self._recorded, self._anew)
-        fill(layout, self._images, self._verdict, (self._finding, 1))
+        horizontal_layout(layout, self._is_chosen, 1, self._anew)
+        fill(layout, self._verdict, (self._finding, 1))
 
         self._is_chosen.setVisible(task in TASKS)  # a part is not a selectable task
 
         # Connections
         self._is_chosen.clicked.connect(self._on_chosen)
-        self._recorded.toggled.connect(self._images.setVisible)
         self._anew.clicked.connect(self._on_anew_clicked)
-        self._images.read_requested.connect(self._on_read_requested)
-        self._images.cancel_requested.connect(self._on_cancel_requested)
 
-        self._images.hide()
         self._retranslate()
 
     def set_choices(self, choices: VerificationChoices) -> None:
@@ -61,8 +53,8 @@ class TaskPanel(Translated, QWidget):
         self._choices = choices
         self._is_chosen.setChecked(self._task.kind in choices.kinds)
 
-    def set_status(self, status: VerificationStatus, reading: float | None) -> None:
-        """Show a verification, and the progress of reading images."""
+    def set_status(self, status: VerificationStatus) -> None:
+        """Show a verification."""
         setup, state, task = status.setup, status.state, self._task
         self._finding.set_value(setup, state)
         found = None if state is None else state.found.get(task.kind)
@@ -71,7 +63,6 @@ class TaskPanel(Translated, QWidget):
             progress = state.progress(setup, task)
             has_points = bool(progress.points or progress.runs)
         self._anew.setVisible(found is not None or has_points)
-        self._recorded.setVisible(status.refusal is None)
         judged = None if found is None else found.assessment
         if status.is_done and judged is status.assessment:  # shown above all tasks
             judged = None
@@ -80,14 +71,11 @@ class TaskPanel(Translated, QWidget):
             if judged is None
             else StatusMessage(worded(judged.reason), *GRADE_MARKS[judged.grade])
         )
-        self._images.set_progress(reading)
 
     @override
     def _retranslate(self) -> None:
         purpose = worded(self._task.purpose)
         self._is_chosen.setText(self.tr("Include: {0}").format(purpose))
-        self._recorded.setText(self.tr("Recorded images..."))
-        set_tooltip(self._recorded, self.tr("Do this task with recorded images."))
         self._anew.setText(self.tr("Probe again"))
         set_tooltip(
             self._anew,
@@ -100,11 +88,3 @@ class TaskPanel(Translated, QWidget):
 
     def _on_anew_clicked(self) -> None:
         self._runner.ask(lambda workflow: workflow.touch_anew(self._task))
-
-    def _on_read_requested(self, place: str, is_still: bool) -> None:
-        self._runner.ask(
-            lambda workflow: workflow.read(self._task, place, is_still=is_still)
-        )
-
-    def _on_cancel_requested(self) -> None:
-        self._runner.ask(lambda workflow: workflow.cancel())

@@ -35,8 +35,6 @@ class VerifyView:
     lamps: StatusMessage = field(default_factory=StatusMessage)
     titles: tuple[StatusMessage, ...] = ()  # titles of the tasks with their progress
     task: AnyTask | None = None  # the current one
-    # Loaded fraction of recorded images; None if there are none.
-    reading: float | None = None
     pause: str = ""
     can_be_accepted: bool = False
     can_start_over: bool = False

@@ -18,7 +18,6 @@ from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.probing.image_locations import (
-    ImageLocation,
     PenCameras,
     viewers_of_camera,
     viewers_of_rig,
@@ -108,26 +107,6 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> Curre
         temperature_c=today.temperature_c,
         humidity_percent=today.humidity_percent,
         bending=bending,
-    )
-
-
-def tip_at(tip: CurrentTip, place: ImageLocation) -> CurrentTip:
-    """Return a tip before the camera of recorded images, if they bring one.
-
-    Raises `UsageError` if they are of another pen.
-    """
-    viewers, pen, pen_file = place.viewers, place.pen, place.pen_file
-    if viewers is None or pen is None or pen_file is None:
-        return tip
-    return replace(
-        tip,
-        instrument=instrument_of(
-            *(tip.calibration, viewers, pen, pen_file),
-            *(tip.temperature_c, tip.bending),
-        ),
-        cone_cam=cone_before(tip.calibration, viewers),
-        viewers=viewers,
-        pen_file=hashed(pen_file),
     )
 
 

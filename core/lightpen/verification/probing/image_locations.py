@@ -10,9 +10,8 @@ from pathlib import Path
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import FOLDER, unreadable
 from lightpen.formats.hashes import InputFile, all_hashed
-from lightpen.formats.images import ImageSource, find_images, natural_order
+from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.messages import printable
 from lightpen.model.camera import Camera
@@ -148,39 +147,3 @@ def _of_each_camera(where: tuple[str, ...], rig: Rig) -> tuple[str, ...]:
             names=", ".join(rig.names),
         )
     return tuple(map(str, folders))
-
-
-def runs_at(place: str, rig: Rig | None = None) -> tuple[str, ...]:
-    """Return the runs at a place: itself, or folders in it that hold the images."""
-    folder = Path(place)
-    if is_record(folder):
-        return (place,)
-    try:
-        touch_place((place,), rig)
-    except FileError:
-        runs = _folders_with_images(folder, rig)
-        if not runs:
-            raise
-        return runs
-    return (place,)
-
-
-def _folders_with_images(folder: Path, rig: Rig | None) -> tuple[str, ...]:
-    if not folder.is_dir():
-        return ()
-    try:
-        inner = [path for path in folder.iterdir() if path.is_dir()]
-    except OSError as error:
-        raise unreadable(folder, FOLDER, error) from error
-    inner.sort(key=lambda path: natural_order(path.name))
-    return tuple(str(path) for path in inner if _holds_images(path, rig))
-
-
-def _holds_images(folder: Path, rig: Rig | None) -> bool:
-    if is_record(folder):
-        return True
-    try:
-        touch_place((str(folder),), rig)
-    except FileError:
-        return False
-    return True

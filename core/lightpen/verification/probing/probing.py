@@ -179,14 +179,6 @@ def take_all(
     return state
 
 
-def read_rules(is_still: bool, n_frames: int) -> ProbingRules:
-    """Return the probing rules for recorded images.
-
-    The pen is held still through the images of a point, or each image is a point.
-    """
-    return ProbingRules(n_frames) if is_still else ONE_IMAGE
-
-
 def taken_again(
     instrument: Instrument, rules: ProbingRules, state: ProbingState, still: StillFrames
 ) -> ProbingState:

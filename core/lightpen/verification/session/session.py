@@ -159,22 +159,6 @@ def measure_with_drift(setup: SessionSetup, done: RunsOfTask) -> Found:
     return replace(found, assessment=judged_with(found.assessment, done.lamps))
 
 
-def with_read(
-    setup: SessionSetup, state: SessionState, read: RunsOfTask, found: Found
-) -> SessionState:
-    """Return the state with the results of recorded images.
-
-    A measured drift corrects the results before it; one that is still to be measured
-    will correct these.
-    """
-    if isinstance(found, Drift):
-        state = _counting(setup, state, found)
-    elif state.awaits_drift(setup):
-        others = (each for each in state.pending if each.task is not read.task)
-        state = replace(state, pending=(*others, read))
-    return with_found(state, read, found)
-
-
 def with_found(state: SessionState, done: RunsOfTask, found: Found) -> SessionState:
     """Return the session with a task's result; the next begins when the pen moves."""
     kind = done.task.kind

@@ -56,14 +56,6 @@ class CountingRun(Struct, frozen=True):
     is_last: bool = False  # its task ended with it
 
 
-class ReadImages(Struct, frozen=True):
-    """Recorded images that have done a task; see `VerificationWorkflow.read`."""
-
-    task: TaskKind
-    place: str
-    is_still: bool
-
-
 class VerificationCheckpoint(Struct, frozen=True):
     """A verification that began and is not concluded."""
 
@@ -76,7 +68,6 @@ class VerificationCheckpoint(Struct, frozen=True):
     seen_by: tuple[Digest, ...]  # of the camera files
     choices: VerificationChoices
     runs: tuple[CountingRun, ...] = ()  # in order of time
-    read: tuple[ReadImages, ...] = ()
     files: tuple[str, ...] = ()  # records that were written
     unwritten: tuple[TaskKind, ...] = ()  # tasks done without record
 
@@ -86,8 +77,7 @@ class VerificationCheckpoint(Struct, frozen=True):
     @property
     def n_done(self) -> int:
         """Number of completed tasks."""
-        done = {run.task for run in self.runs if run.is_last}
-        return len(done | {images.task for images in self.read})
+        return len({run.task for run in self.runs if run.is_last})
 
 
 @dataclass(frozen=True)

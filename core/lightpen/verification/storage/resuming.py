@@ -24,14 +24,8 @@ from lightpen.swing.preparation import Preparation
 from lightpen.verification.probing.current_tip import CurrentTip, read_tip_in_force
 from lightpen.verification.probing.drift_reference import LampObservations, lamps_in
 from lightpen.verification.probing.image_locations import touch_place
-from lightpen.verification.probing.probing import read_rules
 from lightpen.verification.probing.sources import observe_place
-from lightpen.verification.session.session import (
-    run_again,
-    setup_of,
-    touch_again,
-    with_read,
-)
+from lightpen.verification.session.session import run_again, setup_of, touch_again
 from lightpen.verification.session.session_state import (
     SessionSetup,
     SessionState,
@@ -45,12 +39,10 @@ from lightpen.verification.storage.checkpoint import (
 )
 from lightpen.verification.storage.conclusion import Conclusion, conclusion_record
 from lightpen.verification.storage.point_images import CONCLUDED, touch_image_name
-from lightpen.verification.storage.recorded_runs import CompletedTask, read_runs
 from lightpen.verification.storage.verification_files import (
     keep_verification,
     verifications_folder,
 )
-from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.probed_point import (
     ProbingFrame,
     StillFrames,
@@ -70,7 +62,6 @@ class ResumedVerification:
     files: tuple[Path, ...]  # records written of it
     unwritten: tuple[str, ...]  # tasks done without record
     lamps: LampObservations  # in the images of touches
-    read: tuple[CompletedTask, ...]  # computed again
 
 
 def resume_verification(
@@ -90,21 +81,8 @@ def resume_verification(
     _require_same(tip, under_way)
     root = _root(data, under_way)
     setup, state = setup_of(tip, under_way.choices), SessionState()
-    n_all = len(under_way.read) + len(under_way.runs)
-    done: list[CompletedTask] = []
-    for n, images in enumerate(under_way.read, start=1):
-        rules = read_rules(
-            images.is_still, under_way.choices.frames_of(task_of(images.task))
-        )
-        drifted = with_drift(setup, state.found_by(DRIFT))  # which was read before
-        read = read_runs(
-            task_of(images.task), images.place, tip, drifted, rules, lambda _: None
-        )
-        state = with_read(setup, state, read.touched, read.found)
-        done.append(read.done)
-        report(n / n_all)
     lamps, cameras = LampObservations(), setup.instrument.rig.cameras
-    for n, run in enumerate(under_way.runs, start=1 + len(under_way.read)):
+    for n, run in enumerate(under_way.runs, start=1):
         record = open_record(root / TOUCHES / run.folder)
         task = task_of(run.task)
         scans = task.scans(under_way.choices.options_of(task), len(state.runs))
@@ -116,13 +94,11 @@ def resume_verification(
             state = run_again(drifted, state, touches, is_last=run.is_last)
         else:
             state = touch_again(drifted, state, held)
-        report(n / n_all)
+        report(n / len(under_way.runs))
     since = written_since(root, under_way)
     files = tuple(root / name for name in (*under_way.files, *since.files))
     unwritten = tuple(task for task in under_way.unwritten if task not in since.kinds)
-    return ResumedVerification(
-        under_way, tip, setup, state, files, unwritten, lamps, tuple(done)
-    )
+    return ResumedVerification(under_way, tip, setup, state, files, unwritten, lamps)
 
 
 def abandon_interrupted(

@@ -18,13 +18,11 @@ from lightpen.verification.session.session_state import SessionState
 from lightpen.verification.session.status import VerificationStatus
 from lightpen.verification.storage.checkpoint import (
     CheckpointFile,
-    ReadImages,
     VerificationCheckpoint,
     under_way_path,
 )
 from lightpen.verification.storage.conclusion import Conclusion, conclusion_record
 from lightpen.verification.storage.point_images import NewRecord, PointImages
-from lightpen.verification.storage.recorded_runs import CompletedTask
 from lightpen.verification.storage.resuming import ResumedVerification
 from lightpen.verification.storage.verification_files import (
     TaskImages,
@@ -37,6 +35,15 @@ from lightpen.verification.tasks.registry import AnyTask, task_of
 from lightpen.verification.tasks.task import Found
 
 _logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class CompletedTask:
+    """A task that is done: with which tip, by which images."""
+
+    task: AnyTask
+    tip: CurrentTip
+    images: TaskImages
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +86,6 @@ class SessionKeeping:
         self._files: list[Path] = []  # of the current session
         self._waiting: list[tuple[PendingRecord, list[Path]]] = []  # with its files
         self._unkept: tuple[CompletedTask, ...] = ()  # whose drift is not known yet
-        self._read: tuple[ReadImages, ...] = ()
         self._done: dict[str, CompletedTask] = {}
         self._file: CheckpointFile | None = None  # of the verification under way
 
@@ -92,10 +98,6 @@ class SessionKeeping:
     def is_behind(self) -> bool:
         """Whether something could not be written yet."""
         return bool(self._waiting)
-
-    def has_read(self, task: AnyTask) -> bool:
-        """Return whether a task that is done was done with recorded images."""
-        return any(images.task == task.kind for images in self._read)
 
     def root(self, tip: CurrentTip) -> Path:
         """Return the folder of the verifications of a tip."""
@@ -114,11 +116,6 @@ class SessionKeeping:
         records = self.images.records(task)
         images = TaskImages(tip.origin, lamp_drift=lamp_drift, records=records)
         return CompletedTask(task, tip, images)
-
-    def add_read(self, images: ReadImages, done: CompletedTask) -> None:
-        """Store the result of recorded images once its drift is known."""
-        self._read = (*self._read, images)
-        self._keep(done)
 
     def add_again(self, before: SessionState, state: SessionState) -> bool:
         """Store results of points measured again; return whether there are any."""
@@ -154,7 +151,6 @@ class SessionKeeping:
         kinds = {*state.found, *([DRIFT.kind] if state.visits else [])}
         self.images.forget_but(kinds)
         self._unkept = tuple(each for each in self._unkept if each.task.kind in kinds)
-        self._read = tuple(each for each in self._read if each.task in kinds)
 
     def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
         """Write the outcome of the verification with all its records."""
@@ -179,7 +175,7 @@ class SessionKeeping:
     def begin(self) -> None:
         """Begin another session."""
         self._files = []
-        self._unkept, self._read, self._file = (), (), None
+        self._unkept, self._file = (), None
         self._done = {}
 
     def write(self) -> None:
@@ -191,10 +187,9 @@ class SessionKeeping:
     def note(self, status: VerificationStatus) -> None:
         """Write the checkpoint from which the verification can be resumed."""
         tip, setup, runs = status.tip, status.setup, self.images.runs
-        has_some = bool(runs or self._read)
         if tip is None or setup is None or status.began is None:
             return
-        if status.is_done or not has_some:
+        if status.is_done or not runs:
             return
         if self._file is None:
             path = under_way_path(self.root(tip), tip.names, status.began)
@@ -216,7 +211,6 @@ class SessionKeeping:
                 seen_by=tip.viewers.hashes,
                 choices=setup.choices,
                 runs=runs,
-                read=self._read,
                 files=tuple(file.name for file in self._files),
                 unwritten=(*unkept, *queued),
             )
@@ -233,13 +227,10 @@ class SessionKeeping:
         except BaseException:
             file.release()
             raise
-        self._file, self._read = file, under_way.read
+        self._file = file
         self._files = list(before.files)
-        read = {done.task.kind: done for done in before.read}
         for kind in before.state.found:
-            done = read.get(kind) or self._live_task(
-                task_of(kind), before.tip, lamp_drift
-            )
+            done = self._live_task(task_of(kind), before.tip, lamp_drift)
             self._done[kind] = done
             if kind in before.unwritten:
                 self._keep(done)

@@ -11,10 +11,8 @@ from lightpen.errors import FileError
 from lightpen.formats.simulated_files import mark_simulated
 from lightpen.model.origin import Origin
 from lightpen.model.rig import Rig, rig_of
-from lightpen.record.swings.header import HEADER
-from lightpen.record.swings.journal import JOURNAL
 from lightpen.simulator.swings import paper_camera
-from lightpen.verification.probing.image_locations import runs_at, touch_place
+from lightpen.verification.probing.image_locations import touch_place
 
 ONE = rig_of(paper_camera())
 TWO = replace(
@@ -91,28 +89,3 @@ def test_images_of_a_simulated_camera_say_so(tmp_path: Path) -> None:
     mark_simulated(tmp_path / "run")
 
     assert touch_place((str(tmp_path / "run"),)).origin is Origin.SIMULATED
-
-
-def test_a_place_is_a_run_or_a_folder_of_runs_in_their_order(tmp_path: Path) -> None:
-    for name in ("run 10", "run 2", "both/left", "both/right"):
-        write_images(tmp_path / name)
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "notes.txt").write_text("Not a run.")
-    runs = (str(tmp_path / "run 2"), str(tmp_path / "run 10"))
-
-    assert runs_at(runs[0]) == runs[:1]
-    assert runs_at(str(tmp_path)) == runs
-    assert runs_at(str(tmp_path), TWO) == (str(tmp_path / "both"),)
-    assert runs_at(str(tmp_path / "both"), TWO) == (str(tmp_path / "both"),)
-    for nowhere in ("empty", "nothing"):
-        with pytest.raises(FileError):
-            runs_at(str(tmp_path / nowhere))
-
-
-def test_records_in_a_folder_are_its_runs(tmp_path: Path) -> None:
-    record = tmp_path / "record"
-    record.mkdir()
-    for name in (HEADER, JOURNAL):
-        (record / name).touch()
-
-    assert runs_at(str(tmp_path)) == (str(record),)

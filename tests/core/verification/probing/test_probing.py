@@ -29,7 +29,6 @@ from lightpen.verification.probing.probing import (
     advance_touch,
     approach_of,
     at_rest,
-    read_rules,
     taken_again,
 )
 from lightpen.verification.tasks.probed_point import ProbingFrame, StillFrames
@@ -251,8 +250,6 @@ def test_the_usual_touch_and_the_precise_one_have_so_many_images() -> None:
     assert (usual.n_frames, usual.n_settling, PRECISE) == (5, 3, 30)
     assert (usual.min_turn, usual.min_distance) == (0.0, 0.0)
     assert ProbingRules(1, 0) == ONE_IMAGE
-    assert read_rules(True, 7) == ProbingRules(7)
-    assert read_rules(False, 7) == ONE_IMAGE
     with pytest.raises(ValueError, match="Nothing can be touched"):
         ProbingRules(n_settling=-1)
 

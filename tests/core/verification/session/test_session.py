@@ -26,17 +26,15 @@ from lightpen.verification.session.session import (
     run_again,
     touched_anew,
     with_other_choices,
-    with_read,
     without_last_touch,
 )
 from lightpen.verification.session.session_state import (
-    RunsOfTask,
     SessionSetup,
     SessionState,
     instruction,
     with_drift,
 )
-from lightpen.verification.tasks.drift import DRIFT, measure_drift
+from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.part import PART, sizes_of
 from lightpen.verification.tasks.part_course import PartOptions
@@ -439,33 +437,14 @@ def test_runs_of_earlier_are_added_and_end_their_task(session: Session) -> None:
 def test_each_task_waits_for_the_visit_after_it_alone(witnessed: Session) -> None:
     visit(witnessed)
     witnessed.touch(*leant(4))
-    state, setup = witnessed.state, witnessed.setup
+    state = witnessed.state
     (waiting,) = state.pending
     point = found_by(state, FIXED_POINT)
-    again = RunsOfTask(FIXED_POINT, waiting.runs)
-    length = RunsOfTask(PART, waiting.runs)
-
-    assert with_read(setup, state, again, point).pending == (again,)
-    assert with_read(setup, state, length, point).pending == (waiting, length)
     assert touched_anew(state, FIXED_POINT).pending == ()
     assert touched_anew(state, PART).pending == (waiting,)
     assert touched_anew(state, PART).visits == state.visits
     assert touched_anew(state, DRIFT).visits == ()
     assert touched_anew(state, DRIFT).found == {FIXED_POINT.kind: point}
-    visit(witnessed)
-    drift = measure_drift(
-        [("", each) for each in witnessed.state.visits], setup.conditions
-    )
-    counted = with_read(setup, state, RunsOfTask(DRIFT, ()), drift)
-    assert counted.pending == ()
-    within = np.hypot(point.uncertainty, 2 * drift.share)
-    np.testing.assert_allclose(found_by(counted, FIXED_POINT).uncertainty, within)
-    assert counted.found_by(DRIFT) is drift
-    own = replace(setup, choices=replace(setup.choices, n_frames=9))
-    for by, known in ((None, setup), (own, own)):
-        read = with_read(setup, state, replace(again, setup=by), point)
-        measured = with_read(setup, read, RunsOfTask(DRIFT, ()), drift).measured
-        assert measured[FIXED_POINT.kind].setup is known
 
 
 def test_a_drift_is_the_larger_one_of_lamps_and_cone(witnessed: Session) -> None:
