@@ -128,22 +128,6 @@ def fit_board_poses(views: Views, state: BoardState) -> BoardFit:
     )
 
 
-def view_information(
-    board: Board, state: BoardState, image_size: tuple[int, int]
-) -> FloatArray:
-    """Return the information of views by one camera, poses eliminated, (V, p, p).
-
-    Points have 1 px noise; outside the image none is seen.
-    """
-    _, points = _points_cam(board, state)
-    pixels = np.array(state.cameras[0].project(points))
-    inside = (pixels >= 0).all(axis=-1) & (pixels < np.array(image_size)).all(axis=-1)
-    pixels[~inside | (points[..., 2] <= 0)] = np.nan
-    names = ("",) * len(pixels)
-    views = Views(board, names, pixels, (image_size,))
-    return _eliminated(_system(views, state, board_residuals(views, state)))[0]
-
-
 def _settled(
     views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
 ) -> tuple[BoardState, _System]:

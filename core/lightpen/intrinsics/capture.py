@@ -6,14 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import adjust_board
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
 from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.calibration import MIN_VIEWS
-from lightpen.intrinsics.distortion import FEW
-from lightpen.intrinsics.next_view import choose_next_view, first_views
-from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.views import Views
 
 STILL = 0.0015  # of the image's longer side, between detections, rms
@@ -86,30 +79,6 @@ def cells_of(views: Views) -> IntArray:
     cells = np.zeros((ROWS, COLUMNS), dtype=np.int64)
     np.add.at(cells, (at[:, 1], at[:, 0]), 1)
     return cells
-
-
-def wanted_outline(capture: Capture) -> FloatArray:
-    """Return the suggested outline of the board, (4, 2), px, from its first corner on.
-
-    Until the camera is known roughly, it is led to the middle, tilted to each side.
-    """
-    views = capture.views
-    guesses = first_views(capture.board, capture.image_size)
-    if views.n_views < MIN_VIEWS:
-        return guesses[views.n_views]
-    camera = start_camera(views, FEW)
-    state = BoardState(
-        (camera,),
-        np.eye(3)[None],
-        np.zeros((1, 3)),
-        start_board_poses(camera, views),
-        np.zeros(N_SHAPE),
-    )
-    try:
-        fitted = adjust_board(views, state)
-        return choose_next_view(fitted, capture.board).outline
-    except CalibrationError:  # they are alike
-        return guesses[views.n_views % MIN_VIEWS]
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:

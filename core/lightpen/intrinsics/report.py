@@ -10,7 +10,6 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.distortion import choice_record
-from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
@@ -105,7 +104,6 @@ def intrinsics_record(
     assert camera.covariance is not None
     uncertain = map_uncertainty(camera, camera.covariance)
     regions = measure_regions(fitted, camera)
-    next_view = choose_next_view(fitted, views.board)
     field = calibration.effects.field
     return {
         "kind": "intrinsics",
@@ -132,7 +130,6 @@ def intrinsics_record(
             "mean_px": regions.means,
         },
         "board_found": _board_record(fitted),
-        "next_view": {"outline_px": next_view.outline, "gain": next_view.gain},
         "views": [
             {
                 "name": name,

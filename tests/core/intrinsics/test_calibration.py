@@ -18,7 +18,6 @@ from lightpen.intrinsics.calibration import (
 )
 from lightpen.intrinsics.distortion import PULLS, choose_distortion, fit_camera
 from lightpen.intrinsics.effects import MixedFit, fit_effects
-from lightpen.intrinsics.next_view import choose_next_view
 from lightpen.intrinsics.report import measure_regions
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
@@ -177,19 +176,6 @@ def test_points_of_another_board_are_refused(make_views: MakeViews) -> None:
 
     with pytest.raises(CalibrationError, match="its squares differ"):
         calibrate_camera(replace(views, pixels=shuffled))
-
-
-@pytest.mark.slow
-def test_the_next_view_takes_more_of_the_uncertainty_where_little_is_known(
-    few: CameraCalibration, found: CameraCalibration
-) -> None:
-    wanted = [
-        choose_next_view(each.adjustment, each.views.board) for each in (few, found)
-    ]
-
-    assert wanted[0].gain > wanted[1].gain > 0
-    for each in wanted:
-        assert np.all((each.outline >= 0) & (each.outline <= [639, 479]))
 
 
 def test_more_views_lessen_the_uncertainty_over_the_image(

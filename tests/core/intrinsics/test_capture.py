@@ -2,18 +2,19 @@
 
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.boards import parse_board
-from lightpen.intrinsics.capture import (
-    STILL_TIME,
-    BoardVisibility,
-    Capture,
-    wanted_outline,
-)
+from lightpen.intrinsics.boards import Board, parse_board
+from lightpen.intrinsics.calibration import calibrate_camera
+from lightpen.intrinsics.capture import STILL_TIME, BoardVisibility, Capture
+from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import Views
+from lightpen.intrinsics.wanted_views import VIEWS, wanted_outline
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import rotation_from_vector
 
 MakeViews = Callable[..., Views]
 SIZE = (640, 480)
@@ -87,14 +88,36 @@ def test_points_that_were_not_seen_are_none_of_the_view(
     assert held(capture, points).views.seen.sum() == 45
 
 
-def test_the_board_is_wanted_within_the_image_from_the_first_view_on(
-    capture: Capture, make_views: MakeViews
-) -> None:
-    views = make_views(n_views=7)
-    for v in range(8):
-        outline = wanted_outline(capture)
-        assert np.all((outline >= 0) & (outline < SIZE))
-        if v < 7:
-            capture = held(capture, views.pixels[v, 0], 10.0 * v)
-    assert len(capture.kept) == 7
-    assert (capture.cells > 0).any()
+@pytest.mark.parametrize("word", ["chessboard:9x6:20", "circles:5x5:20:10"])
+def test_views_are_wanted_within_the_image_and_reach_its_corners(word: str) -> None:
+    board = parse_board(word)
+    wanted = np.stack([wanted_outline(board, SIZE, n) for n in range(len(VIEWS))])
+
+    assert np.all((wanted >= 0) & (wanted <= np.array(SIZE) - 1))
+    corners = np.array([[0, 0], [639, 0], [639, 479], [0, 479]])
+    apart = np.linalg.norm(wanted[..., None, :] - corners, axis=-1)
+    assert np.all(apart.min(axis=(0, 1)) < 0.15 * 639)
+    again = wanted_outline(board, SIZE, len(VIEWS))
+    np.testing.assert_array_equal(again, wanted[0])
+
+
+def test_the_wanted_views_determine_a_camera(camera: Camera) -> None:
+    board = parse_board("chessboard:9x6:20")
+    rng = np.random.default_rng(1)
+    poses = [held_as(camera, board, n) for n in range(len(VIEWS))]
+    pixels = np.stack([camera.project(board.points @ R.T + t) for R, t in poses])
+    pixels = pixels[:, None] + rng.normal(0, 0.05, (len(VIEWS), 1, 54, 2))
+    found = calibrate_camera(Views(board, tuple("abcdefghijklmno"), pixels, (SIZE,)))
+
+    assert found.camera.covariance is not None
+    assert not found.remarks
+    assert map_uncertainty(camera, found.camera.covariance).worst < 0.5
+
+
+def held_as(camera: Camera, board: Board, n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the pose of a board whose outline is where it is wanted."""
+    rays = camera.unproject(wanted_outline(board, SIZE, n))[:, None]
+    turns, shift = cv2.solvePnP(
+        board.outline, rays, np.eye(3), np.zeros(5), flags=cv2.SOLVEPNP_IPPE
+    )[1:]
+    return rotation_from_vector(np.ravel(turns)), np.ravel(shift).astype(np.float64)

@@ -10,9 +10,10 @@ from PySide6.QtCore import QCoreApplication, QObject, Signal
 from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.protocol import Frame
 from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.capture import BoardVisibility, Capture, wanted_outline
+from lightpen.intrinsics.capture import BoardVisibility, Capture
 from lightpen.intrinsics.observing import why_unseen
 from lightpen.intrinsics.sightings import find_points
+from lightpen.intrinsics.wanted_views import wanted_outline
 from lightpen.messages import Message
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -34,19 +35,11 @@ class BoardLook:
 
 
 @dataclass(frozen=True, eq=False)
-class SuggestedOutline:
-    """Next posture of the board, as its outline in the image, (4, 2), px."""
-
-    outline: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class CaptureState:
     """State of the capture."""
 
     sought: Board | None = None  # board to detect; None while no views are captured
     capture: Capture | None = None  # None before the first image
-    outline: FloatArray | None = None  # (4, 2), where the board should be held next, px
     why_unseen: Message | None = None  # why it has not been seen for a while
     # When it was seen, or last asked why it is not, s on the clock of the images.
     seen_s: float = 0.0
@@ -58,6 +51,13 @@ class CaptureState:
         """Number of captured views."""
         return 0 if self.capture is None else len(self.capture.kept)
 
+    @property
+    def outline(self) -> FloatArray | None:
+        """Where the board should be held next, (4, 2), px."""
+        if self.capture is None or self.sought is None:
+            return None
+        return wanted_outline(self.sought, self.capture.image_size, self.n_kept)
+
 
 class BoardCapture(QObject):
     """Detects a board in one image after another, off the GUI thread."""
@@ -68,7 +68,6 @@ class BoardCapture(QObject):
         super().__init__(parent)
         self._state = CaptureState()
         self._searching = LatestJob(self)
-        self._leading = LatestJob(self)
 
     @property
     def state(self) -> CaptureState:
@@ -83,12 +82,11 @@ class BoardCapture(QObject):
     def start(self, board: Board | None) -> None:
         """Restart, without views."""
         self._searching.cancel()
-        self._leading.cancel()
         self._become(CaptureState(board))
 
     def stop(self) -> None:
         """Stop capturing; captured views are kept."""
-        self._become(replace(self._state, sought=None, outline=None))
+        self._become(replace(self._state, sought=None))
 
     def take(self, frame: Frame) -> None:
         """Process an image unless the previous one is still being processed."""
@@ -101,7 +99,6 @@ class BoardCapture(QObject):
             capture = Capture(state.sought, (width, height))
             state = replace(state, capture=capture, seen_s=time_s, why_unseen=None)
             self._state = state
-            self._lead()
         asks_why = time_s - state.seen_s >= LONGEST_UNSEEN
         if asks_why or capture.points is not None:
             self._state = replace(state, seen_s=time_s)
@@ -123,29 +120,6 @@ class BoardCapture(QObject):
             name = now.capture.views.names[-1]
             now = replace(now, hashes={**state.hashes, name: seen.sha256})
         self._become(now)
-        if now.n_kept > state.n_kept:
-            self._lead()
-
-    def _lead(self) -> None:
-        """Find the next pose to suggest."""
-        capture = self._state.capture
-        if capture is None or self._leading.is_running:
-            return
-        n_kept = len(capture.kept)
-        self._leading.start(
-            partial(find_outline, capture),
-            self._on_led,
-            ended=lambda: self._on_leading_ended(n_kept),
-        )
-
-    def _on_led(self, wanted: SuggestedOutline) -> None:
-        if self._state.sought is not None:
-            self._become(replace(self._state, outline=wanted.outline))
-
-    def _on_leading_ended(self, n_kept: int) -> None:
-        """Repeat the computation if views were added meanwhile."""
-        if self._state.sought is not None and self._state.n_kept > n_kept:
-            self._lead()
 
 
 def look_for_board(
@@ -158,11 +132,6 @@ def look_for_board(
             None, why_unseen=why_unseen(lambda: [image], board) if asks_why else None
         )
     return BoardLook(points, sha256(image.tobytes()).hexdigest())
-
-
-def find_outline(capture: Capture, report: Report) -> SuggestedOutline:
-    """Return the next posture of the board."""
-    return SuggestedOutline(wanted_outline(capture))
 
 
 def sight_text(sight: BoardVisibility) -> str:
