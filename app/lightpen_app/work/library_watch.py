@@ -14,15 +14,10 @@ from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.tip_library import Library, read_library
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen_app.look.sentences import worded
-from lightpen_app.look.theme import Tone
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.notifications import Notifications
 
 AGAIN_MS = 15 * 60 * 1000  # interval of checking for overdue tips
-LOOK_MS = 5000  # interval of looking for changes of other stations
-MOST_SHOWN = 5  # changes; the newest
-SHARED = "shared_library"  # cause of its notifications
 
 Change = Callable[[], Library]
 
@@ -59,13 +54,9 @@ class LibraryWatch(QObject):
         self._changing: Job | None = None
         self._is_over = False
         self._timer = QTimer(self, interval=AGAIN_MS)
-        self._n_shared = 0
-        self._look = QTimer(self)
-        self._look.start(LOOK_MS)
 
         # Connections
         self._timer.timeout.connect(self.refresh)
-        self._look.timeout.connect(self.look_at_shared)
 
     @property
     def statuses(self) -> StationStatus:
@@ -110,16 +101,6 @@ class LibraryWatch(QObject):
 
         self._reading.start(read, self._on_read, self._on_read_failed)
 
-    def look_at_shared(self) -> None:
-        """Report changes copied from other stations, and read them."""
-        shared = self._logbook.shared()
-        if len(shared) == self._n_shared:
-            return
-        self._n_shared = len(shared)
-        text = " ".join(map(worded, shared[-MOST_SHOWN:]))
-        self._notifications.notify(SHARED, text, Tone.WARN)
-        self.refresh()
-
     def change(self, asked: object, change: Change) -> None:
         """Queue a change of the library, and enter it in the archive.
 
@@ -150,7 +131,6 @@ class LibraryWatch(QObject):
         """Cancel reading."""
         self._is_over = True
         self._timer.stop()
-        self._look.stop()
         self._reading.cancel()
 
     def _on_changed(self, asked: object) -> None:

@@ -96,12 +96,7 @@ def _deliver(options: argparse.Namespace) -> None:
         for fault in logbook.enter_owed():
             print(shown(str(fault)))
         copied = deliver(database, chain, server)
-        logbook.share_library(server)
-        shared = deliver(database, chain, server)
-    n_new = copied.n_new + shared.n_new
-    print(f"{n_new} entries are new, {copied.n_known} were there already.")
-    for each in logbook.shared:
-        print(shown(str(each)))
+    print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
 
 
 @printing

@@ -35,12 +35,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         "retire", help="retire an item; it stays in the archive"
     )
     returned = actions.add_parser("return", help="reactivate a retired item")
-    shared = actions.add_parser(
-        "share",
-        help="take over the newest changes of other stations, from the server set by "
-        "LIGHTPEN_ARCHIVE",
-    )
-    for action in (listed, added, changed, retired, returned, shared):
+    for action in (listed, added, changed, retired, returned):
         add_data(action, data_folder)
         action.add_argument("--json", action="store_true", help="print JSON")
     listed.add_argument("--all", action="store_true", help="include retired items")
@@ -57,11 +52,6 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
         _add_entries(action)
     for action in (added, changed, retired, returned):
         _add_author(action)
-    shared.add_argument(
-        "--supervisor",
-        metavar="NAME",
-        help="supervisor who signs, if the data folder has a supervisor password",
-    )
 
 
 def _add_entries(action: argparse.ArgumentParser) -> None:

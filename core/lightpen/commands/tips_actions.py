@@ -9,12 +9,8 @@ from typing import Any
 
 from msgspec import structs, to_builtins
 
-from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.logbook.shared_library import take_over
 from lightpen.archive.logbook.tip_status import folder_statuses
-from lightpen.archive.replication.exchange import deliver
-from lightpen.archive.replication.server import open_server
 from lightpen.commands.arguments import FORGOTTEN, data_of
 from lightpen.commands.console import Command, printing, shown
 from lightpen.commands.supervisor import supervisor_signature
@@ -105,32 +101,12 @@ def _set_retired(options: argparse.Namespace) -> None:
     _enter_and_print(options, known_item(library, kind, options.id), library)
 
 
-@printing
-def _share(options: argparse.Namespace) -> None:
-    data, address = data_of(options), server_address()
-    if not address:
-        raise UsageError("archive.no-server", variable=SERVER)
-    signature = supervisor_signature(options.supervisor)
-    with closing(Logbook(data)) as logbook, closing(open_server(address)) as server:
-        logbook.enter_owed()
-        deliver(logbook.database, logbook.chain, server)
-        taken = take_over(data, logbook.database, local_now(), server, signature)
-        faults = logbook.enter_owed()
-        deliver(logbook.database, logbook.chain, server)
-    for each in taken:
-        print(shown(str(each.message)))
-    for fault in faults:
-        print(shown(f"It is not in the archive yet: {fault}"))
-    print(f"{len(taken)} changes of other stations were taken over.")
-
-
 ACTIONS: dict[str, Command] = {
     "list": _list,
     "add": _add,
     "change": _change,
     "retire": _set_retired,
     "return": _set_retired,
-    "share": _share,
 }
 
 

@@ -5700,10 +5700,6 @@ mm</translation>
         <translation>请采集更多图像。</translation>
     </message>
     <message>
-        <source>Changes of other stations to the tip library that a supervisor has not signed yet: {n}.</source>
-        <translation>其他工位对测头库的更改中，主管尚未签署的有 {n} 项。</translation>
-    </message>
-    <message>
         <source>Check the part, its clamping and its cleanliness; then measure it again.</source>
         <translation>检查工件、装夹和清洁度，然后重新测量。</translation>
     </message>
@@ -8228,10 +8224,6 @@ mm</translation>
         <translation>本图像残差 {noise:.3f} px，其他图像 {usual:.3f} px。请检查 LED 是否被手指遮挡或有反光。</translation>
     </message>
     <message>
-        <source>Retired at another station: {kind} {id}, {by}.</source>
-        <translation>已在其他工位停用：{kind} {id}，{by}。</translation>
-    </message>
-    <message>
         <source>Ring, plate: form and out-of-plane deviation</source>
         <translation>圆环、平板：形状误差和面外偏差</translation>
     </message>
@@ -8270,14 +8262,6 @@ mm</translation>
     <message>
         <source>Swing: pen temperature</source>
         <translation>摆动：光笔温度</translation>
-    </message>
-    <message>
-        <source>Taken over from another station: {kind} {id}, {by}.</source>
-        <translation>已从其他工位接收：{kind} {id}，{by}。</translation>
-    </message>
-    <message>
-        <source>Taken over from another station: {kind} {id}, {by}. It replaces the earlier change by {before}.</source>
-        <translation>已从其他工位接收：{kind} {id}，{by}。它取代 {before} 较早的更改。</translation>
     </message>
     <message>
         <source>The GenTL producer {file} does not load: {why}. Choose the 64-bit producer of this camera for this system.</source>

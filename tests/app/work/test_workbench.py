@@ -17,7 +17,6 @@ from lightpen.cameras.worker_events import Connection
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import PenFile
 from lightpen.live.sources import sample_files
-from lightpen.messages import message
 from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
@@ -447,20 +446,6 @@ def test_a_newer_version_that_an_administrator_names_is_reported_at_the_start(
 
     found = [text for text in stage.sentences if "Ask IT for it." in text]
     assert [version in text for text in found] == ([True] if is_reported else [])
-
-
-def test_what_other_stations_shared_is_reported_once_and_read(stage: Stage) -> None:
-    library, notices = stage.workbench.library, stage.workbench.notifications
-    logbook = stage.workbench.run.logbook.opened()
-    raised: list[str] = []
-    notices.raised.connect(lambda text, tone: raised.append(text))
-    reported = message("library.share-waits", n=2)
-    logbook.shared += (reported,)
-
-    with stage.qtbot.waitSignal(library.changed):
-        library.look_at_shared()
-    library.look_at_shared()
-    assert raised == [str(reported)]
 
 
 def test_what_is_reported_after_shutting_down_begins_nothing(stage: Stage) -> None:

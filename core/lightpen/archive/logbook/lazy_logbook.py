@@ -69,11 +69,6 @@ class LazyLogbook:
             raise closed()
         return logbook
 
-    def shared(self) -> tuple[Message, ...]:
-        """Return the entries copied from other stations since the start."""
-        logbook = self._opened
-        return () if logbook is None else logbook.shared
-
     def close(self) -> None:
         """Close the archive; later entries are refused."""
         with self._lock:

@@ -42,14 +42,13 @@ from lightpen.archive.logbook.reinstating import (
     restored_result,
     with_change,
 )
-from lightpen.archive.logbook.shared_library import newer_elsewhere, take_over
 from lightpen.archive.replication.replication import Replicator
 from lightpen.archive.store.database import Database, open_file
-from lightpen.errors import AcceptanceError, ArchiveError, FileError, UsageError
+from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.formats.files import FOLDER, sha256, unreadable
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
-from lightpen.messages import Message, message
+from lightpen.messages import Message
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.entered_files import ARCHIVE, entered_files
 from lightpen.record.library.signing.account import OwedFile, forget_owed, owed_files
@@ -84,8 +83,6 @@ class Logbook:
 
     Several programs may have one of the same folder, which need not exist. All is
     delivered to the server at an address, if there is one, as soon as it answers.
-    ``shared`` are messages on what was taken over from the libraries of other
-    stations since the start, and on what waits for a supervisor.
     """
 
     def __init__(self, data: Path, server: str = "") -> None:
@@ -100,11 +97,9 @@ class Logbook:
             raise
         self._renew_lost_key()
         self._entered = ArchivedFiles(self.database, self.chain)
-        self.shared: tuple[Message, ...] = ()
         self._replicator: Replicator | None = None
         if server:
-            own = self.database, self.chain, server
-            self._replicator = Replicator(*own, self.share_library)
+            self._replicator = Replicator(self.database, self.chain, server)
 
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
@@ -203,24 +198,6 @@ class Logbook:
             return ReplicationState(None, fault)
         ends = {head.chain: head.number for head in heads(self.database)}
         return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), fault)
-
-    def share_library(self, server: Database) -> None:
-        """Take over newer changes of the libraries of other stations.
-
-        Where a supervisor must sign, only tell how much waits. A library that is
-        unreadable or was changed is reported where it is used.
-        """
-        with suppress(FileError, AcceptanceError, UsageError):
-            guard = self._results.supervision()
-            found = self._data, self.database, local_now(), server
-            if not guard.is_guarded:
-                taken = take_over(*found)
-                self.shared += tuple(each.message for each in taken)
-                if taken:
-                    self.enter_owed()
-            elif waiting := newer_elsewhere(*found):
-                notice = message("library.share-waits", n=len(waiting))
-                self.shared += () if notice in self.shared else (notice,)
 
     def close(self) -> None:
         """Close the archive."""

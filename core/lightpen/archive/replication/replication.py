@@ -6,11 +6,9 @@ as entries are copied in their order and known ones passed over, none is doubled
 
 The connection to the server is closed after each delivery: it has many stations to
 serve, and a line that is kept may be dead without either end knowing. At the first
-call the whole chain is compared, at each other its end. With each call, and every five
-minutes, the library is shared.
+call the whole chain is compared, at each other its end.
 """
 
-from collections.abc import Callable
 from contextlib import closing
 from threading import Event, Thread
 
@@ -22,29 +20,21 @@ from lightpen.errors import ArchiveError
 from lightpen.messages import Message
 
 AGAIN_S = 30.0  # after a server did not answer
-LOOK_S = 300.0  # interval of looking for shared changes
+LOOK_S = 300.0  # interval of looking for entries of other programs
 
 
 class Replicator:
     """Replicates the chain of a data folder to a server in its own thread.
 
-    For the address see `lightpen.archive.replication.server.open_server`; ``share``
-    takes over what other stations share with this one. The server has
-    ``n_delivered`` entries, None until it answered first; the fault is why the last
-    attempt failed.
+    For the address see `lightpen.archive.replication.server.open_server`. The server
+    has ``n_delivered`` entries, None until it answered first; the fault is why the
+    last attempt failed.
     """
 
-    def __init__(
-        self,
-        database: Database,
-        chain: str,
-        address: str,
-        share: Callable[[Database], None] = lambda server: None,
-    ) -> None:
+    def __init__(self, database: Database, chain: str, address: str) -> None:
         self._database = database
         self._chain = chain
         self._address = address
-        self._share = share
         self._is_due, self._is_ending = Event(), Event()
         self.n_delivered: int | None = None
         self.fault: Message | None = None
@@ -71,8 +61,6 @@ class Replicator:
                     if self.n_delivered is None:
                         require_same(self._database, self._chain, server)
                     copied = deliver(self._database, self._chain, server)
-                    if not self._is_ending.is_set():
-                        self._share(server)
                 self.n_delivered = copied.n_known + copied.n_new
                 self.fault = None
             except ArchiveError as error:

@@ -1,7 +1,6 @@
 """SQL of the tables on a server and of the rights of its roles.
 
-A station adds entries and reads its own, and the changes of the library of all; it can
-change nothing. A chain belongs to the
+A station adds entries and reads its own; it can change nothing. A chain belongs to the
 role that entered it first. Nothing on the server says how far a chain has come but the
 entries themselves, so that nothing there need ever be changed.
 """
@@ -57,14 +56,6 @@ GRANT SELECT, INSERT ON archive_writers, archive_entries, archive_records
     TO lightpen_station;
 GRANT SELECT ON archive_writers, archive_entries, archive_records TO lightpen_auditor;
 GRANT SELECT ON {VERSION_TABLE} TO lightpen_station, lightpen_auditor;
-
--- All stations see the changes of pens, tips and cones, and of other entries none.
-CREATE VIEW archive_library WITH (security_barrier) AS
-    SELECT chain, number, e.sha256, e.text, signature, r.text AS record
-    FROM archive_entries e JOIN archive_records r ON r.sha256 = record_sha256
-    WHERE kind = 'library';
-REVOKE ALL ON archive_library FROM PUBLIC;
-GRANT SELECT ON archive_library TO lightpen_station, lightpen_auditor;
 
 ALTER TABLE archive_writers ENABLE ROW LEVEL SECURITY;
 CREATE POLICY own ON archive_writers TO lightpen_station

@@ -122,22 +122,6 @@ def retire_item(
     return change_item(data, retired, by, now, before=item)
 
 
-def adopt_change(
-    data: Path, change: LibraryChange, signature: Signature | None
-) -> Library:
-    """Store a change of another station in this library; see `add_item`.
-
-    It keeps the time, station and operator of the original. If there is a password, a
-    supervisor of this station must sign.
-    """
-    item = _sensible(change.item)
-    by = Author(change.station, change.operator, change.reason, signature)
-    while True:
-        number = newest_number(data / LIBRARY) + 1
-        with suppress(NameTakenError):  # another program changed the library meanwhile
-            return _keep(data, number, item, by, change.at)
-
-
 def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
     """Return an item of a library, or raise `UsageError`."""
     found = library.item(kind, name)
