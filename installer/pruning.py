@@ -29,7 +29,7 @@ DROPPED = (
     "harvesters/test/*", "genicam/*.cti",  # a simulated camera
     "numpy/f2py/src/*", "numpy/_pyinstaller/*", "scipy/conftest.py",
     "*/_test_*.pyd", "numpy/*_tests.*.pyd", "numpy/_core/_simd.*",
-    "sqlalchemy/testing/*", "alembic/testing/*",
+    "sqlalchemy/testing/*",
     # Parts of libraries that nothing here imports.
     "pyqtgraph/colors/maps/*", "pyqtgraph/console/*", "pyqtgraph/dockarea/*",
     "pyqtgraph/examples/*", "pyqtgraph/flowchart/*", "pyqtgraph/icons/peegee/*.png",

@@ -17,7 +17,7 @@ PACKAGES = {
 }
 
 LONGEST_PAGE = 250  # lines; more belongs into presenters and controls
-GIVEN = {"main", "upgrade"}  # where a program starts; what Alembic looks for
+GIVEN = {"main"}  # where a program starts
 
 
 def names_given_twice(folders: Iterable[Path]) -> dict[str, list[str]]:

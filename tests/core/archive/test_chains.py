@@ -1,6 +1,5 @@
 """A chain grows by whole entries, in one order, and is copied without doubling."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
@@ -8,14 +7,12 @@ from datetime import timedelta
 from itertools import pairwise
 from pathlib import Path
 
-import pytest
 from msgspec import structs
-from sqlalchemy import update
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import entries_of, heads, records_of
+from lightpen.archive.chains.chains import entries_of, heads
 from lightpen.archive.chains.entries import FileHash, Kind
-from lightpen.archive.chains.growth import append, copy_entries, own_chain
+from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.history.queries import (
     EntryFilter,
     last_accepted,
@@ -23,8 +20,6 @@ from lightpen.archive.history.queries import (
     newest,
 )
 from lightpen.archive.store.database import open_file
-from lightpen.archive.store.tables import ENTRIES
-from lightpen.errors import ArchiveError
 from lightpen.record.library.entered_files import NOTHING_BEFORE
 
 N_EACH = 20
@@ -101,71 +96,9 @@ def test_two_programs_of_one_folder_share_a_chain(tmp_path: Path) -> None:
     )
 
 
-def test_a_copy_takes_each_entry_once(make_station: Callable[[str], Station]) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 3")
-    entries = here.enter(4)
-    records = records_of(here.database, entries)
-
-    first = copy_entries(there.database, here.chain, entries[:3], records)
-    again = copy_entries(there.database, here.chain, entries, records)
-
-    assert (first.n_new, first.n_known) == (3, 0)
-    assert (again.n_new, again.n_known) == (1, 3)
-    assert list(entries_of(there.database, here.chain)) == entries
-    assert records_of(there.database, entries) == records
-
-
-def test_a_copy_does_not_go_on_with_another_history(
-    make_station: Callable[[str], Station],
-) -> None:
-    here, nameless = make_station("Hall 2"), make_station("")
-    there = make_station("Hall 3")
-    entries = here.enter(3)
-    records = records_of(here.database, entries)
-    copy_entries(there.database, here.chain, entries[:2], records)
-    with there.database.writing() as connection:
-        connection.execute(
-            update(ENTRIES).where(ENTRIES.c.number == 2).values(sha256="0" * 64)
-        )
-
-    with pytest.raises(
-        ArchiveError, match="not continue with entry 2 of the station Hall 2"
-    ):
-        copy_entries(there.database, here.chain, entries, records)
-    with pytest.raises(
-        ArchiveError, match="not continue with entry 3 of the station Hall 2"
-    ):
-        copy_entries(there.database, here.chain, entries[2:], records)
-
-    (_, second) = nameless.enter(2)
-    records = records_of(nameless.database, [second])
-    reported = f"not continue with entry 2 of chain {nameless.chain[:8]}"
-    with pytest.raises(ArchiveError, match=reported):
-        copy_entries(there.database, nameless.chain, [second], records)
-
-
-def test_a_copy_refuses_a_record_that_is_not_the_one(
-    make_station: Callable[[str], Station],
-) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 3")
-    entries = here.enter(1)
-    changed = dict.fromkeys(records_of(here.database, entries), "{}")
-
-    with pytest.raises(ArchiveError, match="is missing or was modified"):
-        copy_entries(there.database, here.chain, entries, changed)
-    assert heads(there.database) == heads(make_station("Hall 3").database)
-
-
-def test_entries_are_found_by_pen_station_and_time(
-    make_station: Callable[[str], Station],
-) -> None:
-    here, other = make_station("Hall 2"), make_station("Hall 3")
-    entries = here.enter(5)
-    foreign = other.enter(3, first=10)
-    copy_entries(
-        *(here.database, other.chain, foreign, records_of(other.database, foreign))
-    )
-    database = here.database
+def test_entries_are_found_by_pen_station_and_time(station: Station) -> None:
+    database, entries = station.database, station.enter(5)
+    foreign = Station(database, station.chain, "Hall 3").enter(3, first=10)
 
     assert newest(database, EntryFilter(pen="LP-04"), 3) == tuple(reversed(foreign))
     assert newest(database, EntryFilter(station="Hall 2"), 9) == tuple(

@@ -1,6 +1,5 @@
 """A database is looked at before it is written to, and said to be what it is."""
 
-import shutil
 import sqlite3
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -10,39 +9,16 @@ from threading import Event
 from time import sleep
 
 import pytest
-from alembic.autogenerate import compare_metadata
-from alembic.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import inspect
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.checks.check import check_archive
 from lightpen.archive.store import database
 from lightpen.archive.store.database import (
-    MIGRATIONS,
-    VERSION,
     VERSION_TABLE,
     Database,
     look_into,
     open_file,
 )
-from lightpen.archive.store.tables import METADATA
 from lightpen.errors import ArchiveError, NoArchiveError
-
-
-def differences(database: Database) -> list[object]:
-    """Return in what the tables of a database are not those that are used."""
-    options = {"version_table": VERSION_TABLE}
-    with database.reading() as connection:
-        context = MigrationContext.configure(connection, opts=options)
-        return list(compare_metadata(context, METADATA))
-
-
-def test_a_new_archive_has_the_tables_that_the_migrations_lead_to(
-    station: Station,
-) -> None:
-    assert ScriptDirectory(str(MIGRATIONS)).get_current_head() == VERSION
-    assert differences(station.database) == []
 
 
 def test_an_archive_is_safe_against_a_power_cut(station: Station) -> None:
@@ -65,78 +41,6 @@ def test_an_archive_of_a_later_version_is_refused_and_untouched(tmp_path: Path) 
             opening(file)
     assert file.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
-
-
-MIGRATION = """
-import sqlalchemy as sa
-from alembic import op
-
-revision, down_revision = "2", "1"
-
-
-def upgrade():
-    op.add_column("archive_entries", sa.Column("shift", sa.Text))
-    op.execute({statement!r})
-"""
-
-
-def add_migration(
-    monkeypatch: pytest.MonkeyPatch, folder: Path, statement: str
-) -> None:
-    """Make this program a later version, whose tables have one more column."""
-    shutil.copytree(MIGRATIONS, folder)
-    script = MIGRATION.format(statement=statement)
-    (folder / "versions" / "v2_shift.py").write_text(script)
-    monkeypatch.setattr(database, "MIGRATIONS", folder)
-    monkeypatch.setattr(database, "VERSION", "2")
-
-
-def columns(archive: Database) -> list[str]:
-    return [
-        each["name"] for each in inspect(archive.engine).get_columns("archive_entries")
-    ]
-
-
-def test_an_archive_of_an_earlier_version_is_brought_up_to_date(
-    station: Station, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    station.enter(2)
-    station.database.close()
-    file = station.database.file
-    assert file is not None
-    fill = "UPDATE archive_entries SET shift = 'early'"
-    add_migration(monkeypatch, tmp_path / "migrations", fill)
-
-    with closing(look_into(file)) as archive:
-        assert "shift" not in columns(archive)
-        assert check_archive(archive).findings == ()
-    with closing(open_file(file)) as archive:
-        assert "shift" in columns(archive)
-        with archive.reading() as connection:
-            rows = connection.exec_driver_sql("SELECT shift FROM archive_entries")
-            assert rows.scalars().all() == ["early", "early"]
-        assert check_archive(archive).findings == ()
-    monkeypatch.undo()
-    with pytest.raises(ArchiveError, match="by a later version of the program"):
-        open_file(file)
-
-
-def test_an_archive_whose_migration_fails_stays_as_it_was(
-    station: Station, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    station.enter(2)
-    station.database.close()
-    file = station.database.file
-    assert file is not None
-    add_migration(monkeypatch, tmp_path / "migrations", "UPDATE nowhere SET x = 1")
-
-    with pytest.raises(ArchiveError, match="no such table: nowhere"):
-        open_file(file)
-
-    monkeypatch.undo()
-    with closing(open_file(file)) as archive:
-        assert "shift" not in columns(archive)
-        assert check_archive(archive).findings == ()
 
 
 def test_a_database_of_another_program_is_refused_and_untouched(tmp_path: Path) -> None:

@@ -2,21 +2,25 @@
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from benchmarks.postgres_server import Postgres
 from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains.chains import records_of
+from lightpen.archive.chains.chains import entries_of, heads, records_of
 from lightpen.archive.chains.entries import FileHash
-from lightpen.archive.chains.growth import append, own_chain
+from lightpen.archive.chains.growth import append, copy_entries, own_chain
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.replication.exchange import deliver, export_entries
-from lightpen.archive.store.database import open_file
+from lightpen.archive.replication.server import open_server
+from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import ArchiveError, NameTakenError
 from lightpen.record.library.entered_files import ARCHIVE
 
@@ -67,18 +71,75 @@ def test_an_export_replaces_no_file(station: Station, tmp_path: Path) -> None:
     assert file.read_text() == "mine"
 
 
-def test_a_server_with_another_last_entry_is_reported_though_nothing_is_new(
-    make_station: Callable[[str], Station],
+@pytest.fixture
+def server(postgres: Postgres) -> Iterator[Database]:
+    """A server as a station sees it."""
+    role = postgres.new_role(postgres.new_database(), "lightpen_station")
+    with closing(open_server(role)) as database:
+        yield database
+
+
+def test_a_copy_takes_each_entry_once(station: Station, server: Database) -> None:
+    entries = station.enter(4)
+    records = records_of(station.database, entries)
+
+    first = copy_entries(server, station.chain, entries[:3], records)
+    again = copy_entries(server, station.chain, entries, records)
+
+    assert (first.n_new, first.n_known) == (3, 0)
+    assert (again.n_new, again.n_known) == (1, 3)
+    assert list(entries_of(server, station.chain)) == entries
+    assert records_of(server, entries) == records
+
+
+def test_a_copy_does_not_go_on_with_another_history(
+    make_station: Callable[[str], Station], server: Database
 ) -> None:
-    here, server = make_station("Hall 2"), make_station("server")
-    here.enter(2)
-    assert deliver(here.database, here.chain, server.database).n_new == 2
+    here, nameless = make_station("Hall 2"), make_station("")
+    first, second, third = here.enter(3)
+    records = records_of(here.database, [first, second, third])
+    copy_entries(server, here.chain, [first, second], records)
+
+    other = replace(second, sha256="0" * 64)
+    with pytest.raises(
+        ArchiveError, match="not continue with entry 2 of the station Hall 2"
+    ):
+        copy_entries(server, here.chain, [other], records)
+    torn = replace(third, entry=structs.replace(third.entry, previous="0" * 64))
+    with pytest.raises(
+        ArchiveError, match="not continue with entry 3 of the station Hall 2"
+    ):
+        copy_entries(server, here.chain, [torn], records)
+
+    (_, second) = nameless.enter(2)
+    records = records_of(nameless.database, [second])
+    reported = f"not continue with entry 2 of chain {nameless.chain[:8]}"
+    with pytest.raises(ArchiveError, match=reported):
+        copy_entries(server, nameless.chain, [second], records)
+
+
+def test_a_copy_refuses_a_record_that_is_not_the_one(
+    station: Station, server: Database
+) -> None:
+    entries = station.enter(1)
+    changed = dict.fromkeys(records_of(station.database, entries), "{}")
+
+    with pytest.raises(ArchiveError, match="is missing or was modified"):
+        copy_entries(server, station.chain, entries, changed)
+    assert heads(server) == ()
+
+
+def test_a_server_with_another_last_entry_is_reported_though_nothing_is_new(
+    station: Station, server: Database
+) -> None:
+    station.enter(2)
+    assert deliver(station.database, station.chain, server).n_new == 2
     other = text("UPDATE archive_entries SET sha256 = 'another' WHERE number = 2")
-    with server.database.writing() as connection:
+    with station.database.writing() as connection:
         connection.execute(other)
 
     with pytest.raises(ArchiveError, match="Entry 2"):
-        deliver(here.database, here.chain, server.database)
+        deliver(station.database, station.chain, server)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")

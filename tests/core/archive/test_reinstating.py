@@ -8,8 +8,8 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from benchmarks.postgres_server import Postgres
 from msgspec import structs
-from tests.core.archive.conftest import Station
 from tests.core.archive.test_logbook import NAMES, checked, result
 
 from lightpen.archive.chains.chains import entries_of, records_of
@@ -26,6 +26,7 @@ from lightpen.archive.history.due import due_tips
 from lightpen.archive.history.history import lines, messages_on
 from lightpen.archive.history.queries import EntryFilter, last_accepted
 from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.replication.server import open_server
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.local_time import local_now
 from lightpen.model.limits import DueRule
@@ -335,24 +336,24 @@ def test_a_key_that_a_supervisor_approves_continues_the_chain(
 
 
 def test_a_key_that_was_replaced_signs_nothing_more(
-    data: Path, logbook: Logbook, make_station: Callable[[str], Station]
+    data: Path, logbook: Logbook, postgres: Postgres
 ) -> None:
     old = station_key(logbook.chain)
     assert old is not None
     renew_station_key(data, logbook.chain, None, local_now())
     logbook.enter_owed()
     *_, last = known = entries(logbook)
-    there = make_station("Hall 9").database
     records = records_of(logbook.database, known)
-    copy_entries(there, logbook.chain, known, records)
-
     head = ChainHead(logbook.chain, len(known), last.sha256, last.entry.since)
     entry = chained(head, structs.replace(last.entry.event, kind=Kind.NOTE))
     signature = old.public + old.sign(b"lightpen entry\n" + entry.sha256.encode())
-    with pytest.raises(ArchiveError, match="signed by a key that is not the station's"):
-        copy_entries(
-            there, logbook.chain, [replace(entry, signature=signature)], records
-        )
+    forged = replace(entry, signature=signature)
+
+    role = postgres.new_role(postgres.new_database(), "lightpen_station")
+    with closing(open_server(role)) as server:
+        copy_entries(server, logbook.chain, known, records)
+        with pytest.raises(ArchiveError, match="signed by a key that is not the stat"):
+            copy_entries(server, logbook.chain, [forged], records)
 
 
 def test_no_new_key_begins_where_the_limits_of_the_archive_are_gone(

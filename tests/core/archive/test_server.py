@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from datetime import timedelta
 from pathlib import Path
 
 import keyring
@@ -12,34 +11,13 @@ import pytest
 from benchmarks.postgres_server import PASSWORD, Postgres
 from keyring.backend import KeyringBackend
 from keyring.backends import fail
-from tests.core.archive.conftest import NOON, Station
-from tests.core.archive.test_database import add_migration, columns
+from tests.core.archive.conftest import Station
 
 from lightpen.archive.chains.chains import entries_of, heads, note_delivered, records_of
 from lightpen.archive.checks.check import check_archive
-from lightpen.archive.history.queries import EntryFilter, n_wanted
 from lightpen.archive.replication.exchange import deliver
 from lightpen.archive.replication.server import open_server
 from lightpen.errors import ArchiveError
-
-
-def test_a_server_of_an_earlier_version_is_brought_up_to_date(
-    station: Station,
-    postgres: Postgres,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
-    station.enter(2)
-    address = postgres.new_database()
-    with closing(open_server(address)) as server:
-        deliver(station.database, station.chain, server)
-    fill = "UPDATE archive_entries SET shift = 'early'"
-    add_migration(monkeypatch, tmp_path / "migrations", fill)
-
-    with closing(open_server(address)) as server:
-        assert "shift" in columns(server)
-        assert n_wanted(server, EntryFilter(begin=NOON + timedelta(minutes=1))) == 1
-        assert check_archive(server).findings == ()
 
 
 @pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])

@@ -1,9 +1,10 @@
 """Entries are signed by their station, and nobody else can continue its chain."""
 
-from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
+from benchmarks.postgres_server import Postgres
 from sqlalchemy import update
 from tests.core.archive.conftest import Station, accepted
 
@@ -11,6 +12,7 @@ from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
 from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.checks.check import check_archive
+from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError
 from lightpen.record.library.signing.keys import key_folder, make_station_key
@@ -32,20 +34,19 @@ def forged(station: Station, n: int) -> tuple[StoredEntry, dict[str, str]]:
 
 
 def test_nobody_else_continues_the_chain_of_a_station(
-    make_station: Callable[[str], Station],
+    station: Station, postgres: Postgres
 ) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 7")
-    there.enter(3)
-    known = list(entries_of(there.database, there.chain))
-    copy_entries(here.database, there.chain, known, records_of(there.database, known))
-
-    entry, records = forged(there, 3)
-    with pytest.raises(ArchiveError, match="signed by a key that is not the station's"):
-        copy_entries(here.database, there.chain, [entry], records)
+    known = station.enter(3)
+    role = postgres.new_role(postgres.new_database(), "lightpen_station")
+    entry, records = forged(station, 3)
     unsigned = replace(entry, signature="")
-    with pytest.raises(ArchiveError, match="missing or wrong"):
-        copy_entries(here.database, there.chain, [unsigned], records)
-    assert check_archive(here.database).findings == ()
+    with closing(open_server(role)) as there:
+        copy_entries(there, station.chain, known, records_of(station.database, known))
+        with pytest.raises(ArchiveError, match="signed by a key that is not the stat"):
+            copy_entries(there, station.chain, [entry], records)
+        with pytest.raises(ArchiveError, match="missing or wrong"):
+            copy_entries(there, station.chain, [unsigned], records)
+        assert check_archive(there).findings == ()
 
 
 def test_a_signature_that_was_changed_is_found(station: Station) -> None:

@@ -1,4 +1,4 @@
-"""The chains of a database: its own and copies of others, with their entries."""
+"""The chain of a file, and those of a server, with their entries."""
 
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
@@ -12,12 +12,12 @@ from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.record.library.signing.chain_keys import key_in
 
-AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
+AT_HOME = select(CHAINS.c.chain)
 BATCH = 200  # entries that are copied in one transaction
 
 
 def chain_at_home(database: Database) -> str | None:
-    """Return the own chain of a database, if it has begun."""
+    """Return the chain of a file, if it has begun; None of a server."""
     if database.file is None:
         return None
     with database.reading() as connection:
@@ -35,7 +35,7 @@ def heads(database: Database) -> tuple[ChainHead, ...]:
             .order_by(ENTRIES.c.chain)
         )
     else:
-        found = select(CHAINS).order_by(CHAINS.c.chain)
+        found = select(CHAINS)
     return tuple(
         ChainHead(row.chain, row.number, row.sha256) for row in database.rows(found)
     )
@@ -105,38 +105,17 @@ def entries_of_limits(database: Database, chain: str) -> tuple[StoredEntry, ...]
     return read_entries(database, of_limits(chain))
 
 
-class ArchivedFiles:
-    """The paths of the result files and swings in a chain.
-
-    Entries never change, so only new ones are read again.
-    """
-
-    def __init__(self, database: Database, chain: str) -> None:
-        self._database, self._chain = database, chain
-        self._n_read = 0
-        self._results = set[str]()
-        self._kinds: dict[str, str] = {}  # of the last entry of a swing
-
-    def read(self) -> None:
-        """Read the entries added since the last call."""
-        wanted = (
-            select(ENTRIES.c.number, ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)
-            .where(ENTRIES.c.chain == self._chain, ENTRIES.c.number > self._n_read)
-            .order_by(ENTRIES.c.number)
-        )
-        for row in self._database.rows(wanted):
-            self._results.add(row.result)
-            self._kinds[row.swing] = row.kind
-            self._n_read = row.number
-
-    def __contains__(self, place: str) -> bool:
-        """Return whether a folder was entered, by the entries read.
-
-        A swing whose result was revoked was not: it may still be abandoned.
-        """
-        revoked = Kind.TAKEN_BACK.value
-        is_swing = self._kinds.get(searchable(place), revoked) != revoked
-        return is_swing or searchable(place) in self._results
+def is_swing_entered(database: Database, chain: str, place: str) -> bool:
+    """Return whether a swing was entered; if its result was revoked, it was not."""
+    last = (
+        select(ENTRIES.c.kind)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.swing == searchable(place))
+        .order_by(ENTRIES.c.number.desc())
+        .limit(1)
+    )
+    with database.reading() as connection:
+        kind = connection.execute(last).scalar_one_or_none()
+    return kind not in (None, Kind.TAKEN_BACK.value)
 
 
 def head_in(connection: Connection, chain: str) -> ChainHead:

@@ -29,14 +29,9 @@ from lightpen.archive.store.tables import CHAIN_WRITERS, CHAINS, ENTRIES, RECORD
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
-from lightpen.record.library.entered_files import NOTHING_BEFORE
-from lightpen.record.library.signing.account import (
-    head_file,
-    remember_head,
-    remembered_head,
-)
+from lightpen.record.library.entered_files import NOTHING_BEFORE, require_remembered
+from lightpen.record.library.signing.account import remember_head
 from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
-from lightpen.record.library.signing.keys import chain_of, make_station_key
 from lightpen.record.library.signing.station import station_name
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
@@ -51,25 +46,26 @@ class CopyResult:
 
 
 def own_chain(database: Database) -> str:
-    """Return the own chain of a database; the first call begins it.
+    """Return the chain of a file; the first call begins it.
 
     With it begins its station key.
     """
     with database.writing() as connection:
         chain = connection.execute(AT_HOME).scalar_one_or_none()
         if chain is None:
+            assert database.file is not None
             try:
-                chain = _new_chain(database)
+                chain = station_name(database.file.parent)
             except FileError as error:
                 raise ArchiveError(error.message) from error
-            _begin(connection, chain, is_own=True)
+            _begin(connection, chain)
     return chain
 
 
 def append(
     database: Database, chain: str, event: Event, record: str | None = None
 ) -> StoredEntry | None:
-    """Append an entry to the own chain of a database.
+    """Append an entry to the chain of a file.
 
     When this returns, the entry is durable; when it raises or is killed, it is stored
     whole or not at all. Of two programs that enter the same result file, or that the
@@ -79,7 +75,7 @@ def append(
     with database.writing() as connection:
         if _is_entered(connection, chain, event):
             return None
-        _require_remembered(connection, chain, database)
+        _require_remembered(connection, chain, database.name)
         head = head_in(connection, chain)
         entry = chained(head, event)
         signature = entry_signature(head, event, entry.sha256)
@@ -92,23 +88,22 @@ def append(
 
 
 def copy_entries(
-    database: Database,
+    server: Database,
     chain: str,
     entries: Iterable[StoredEntry],
     records: Mapping[str, str],
 ) -> CopyResult:
-    """Let the copy of a chain grow by entries, in their order; known ones are passed.
+    """Let the copy on a server grow by entries, in their order; known ones are passed.
 
-    The own chain of a database grows by `append` alone. Raises `ArchiveError` if they
-    do not continue the copy, are not signed by the station of the chain, or the copy
-    says otherwise.
+    Raises `ArchiveError` if they do not continue the copy, are not signed by the
+    station of the chain, or the copy says otherwise.
     """
-    with database.writing() as connection:
-        if _is_server(connection):
-            connection.execute(select(func.pg_advisory_xact_lock(int(chain[:15], 16))))
+    known_chain = select(CHAIN_WRITERS.c.chain).where(CHAIN_WRITERS.c.chain == chain)
+    with server.writing() as connection:
+        connection.execute(select(func.pg_advisory_xact_lock(int(chain[:15], 16))))
         head = head_in(connection, chain)
-        if head.number == 0 and not _is_known(connection, chain):
-            _begin(connection, chain, is_own=False)
+        if head.number == 0 and connection.execute(known_chain).first() is None:
+            connection.execute(insert(CHAIN_WRITERS).values(chain=chain))
         known, new = _parted(entries, head.number)
         _require_same(connection, chain, known)
         _require_next(head, new)
@@ -130,17 +125,12 @@ def adopt_entries(
     Raises `ArchiveError` if they do not continue the chain, are not signed by its
     station, or the own chain is another one.
     """
-    empty = delete(CHAINS).where(
-        CHAINS.c.is_own, CHAINS.c.number == 0, CHAINS.c.chain != chain
-    )
+    empty = delete(CHAINS).where(CHAINS.c.number == 0, CHAINS.c.chain != chain)
     with database.writing() as connection:
         connection.execute(empty)
         home = connection.execute(AT_HOME).scalar_one_or_none()
         if home is None:
-            if not _is_known(connection, chain):
-                _begin(connection, chain, is_own=True)
-            own = update(CHAINS).where(CHAINS.c.chain == chain).values(is_own=True)
-            connection.execute(own)
+            _begin(connection, chain)
         elif home != chain:
             raise ArchiveError(_forked(entries[0]))
         _require_next(head_in(connection, chain), list(entries))
@@ -150,38 +140,17 @@ def adopt_entries(
     remember_head(chain, entries[-1].entry.number, entries[-1].sha256)
 
 
-def forgotten(database: Database, chain: str) -> Message | None:
-    """Return that a chain lacks the last entry that this user account remembers."""
-    with database.reading() as connection:
-        return _forgotten(connection, chain, database)
+def _require_remembered(connection: Connection, chain: str, name: str) -> None:
+    def hash_of(number: int) -> str | None:
+        wanted = select(ENTRIES.c.sha256).where(
+            ENTRIES.c.chain == chain, ENTRIES.c.number == number
+        )
+        return connection.execute(wanted).scalar_one_or_none()
 
-
-def _require_remembered(connection: Connection, chain: str, database: Database) -> None:
-    finding = _forgotten(connection, chain, database)
-    if finding is not None:
-        raise ArchiveError(finding)
-
-
-def _forgotten(
-    connection: Connection, chain: str, database: Database
-) -> Message | None:
     try:
-        head = remembered_head(chain)
+        require_remembered(name, chain, hash_of)
     except FileError as error:
-        return error.message
-    if head is None:
-        return None
-    there = select(ENTRIES.c.sha256).where(
-        ENTRIES.c.chain == chain, ENTRIES.c.number == head.number
-    )
-    if connection.execute(there).scalar_one_or_none() == head.sha256:
-        return None
-    return message(
-        "archive.rolled-back",
-        archive=database.name,
-        number=head.number,
-        memory=head_file(chain),
-    )
+        raise ArchiveError(error.message) from error
 
 
 def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
@@ -196,27 +165,9 @@ def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
     return connection.execute(wanted).one_or_none() is not None
 
 
-def _is_known(connection: Connection, chain: str) -> bool:
-    table = CHAIN_WRITERS if _is_server(connection) else CHAINS
-    wanted = select(table.c.chain).where(table.c.chain == chain)
-    return connection.execute(wanted).one_or_none() is not None
-
-
-def _new_chain(database: Database) -> str:
-    """Return the name of the station key with which a chain begins."""
-    if database.file is None:
-        return chain_of(make_station_key().public)
-    return station_name(database.file.parent)
-
-
-def _begin(connection: Connection, chain: str, *, is_own: bool) -> None:
-    if _is_server(connection):
-        connection.execute(insert(CHAIN_WRITERS).values(chain=chain))
-        return
+def _begin(connection: Connection, chain: str) -> None:
     connection.execute(
-        insert(CHAINS).values(
-            chain=chain, is_own=is_own, number=0, sha256=NOTHING_BEFORE, delivered=0
-        )
+        insert(CHAINS).values(chain=chain, number=0, sha256=NOTHING_BEFORE, delivered=0)
     )
 
 

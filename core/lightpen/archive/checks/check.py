@@ -10,7 +10,6 @@ from sqlalchemy import Row, exists, select, text
 
 from lightpen.archive.chains.chains import chain_at_home, heads
 from lightpen.archive.chains.entries import SHORT, ChainHead, named_entry, text_sha256
-from lightpen.archive.chains.growth import forgotten
 from lightpen.archive.chains.rows import searchable, sound_entry
 from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.checks.check_notes import check_notes
@@ -53,7 +52,9 @@ def check_archive(
     ends, home = heads(database), chain_at_home(database)
     n_all = max(1, sum(head.number for head in ends))
     files = FilesCheck(data)
-    stages = [_damage(database), _rolled_back(database, home, data)]
+    stages = [_damage(database)]
+    if data is not None:
+        stages.append(_rolled_back(data))
     n_before = 0
     for head in ends:
         start, share = n_before / n_all, head.number / n_all
@@ -109,19 +110,13 @@ def _damage(database: Database) -> Iterator[Message]:
             yield message("archive.file-damaged", file=database.name, what=str(found))
 
 
-def _rolled_back(
-    database: Database, home: str | None, data: Path | None
-) -> Iterator[Message]:
+def _rolled_back(data: Path) -> Iterator[Message]:
     """Yield that the archive lacks what this user account remembers of the folder."""
-    finding = None if home is None else forgotten(database, home)
-    if finding is not None:
-        yield finding
-    elif data is not None:
-        try:
-            entered_files(data)
-        except FileError as error:
-            if error.message.code == ROLLED_BACK:  # the rest is found below
-                yield error.message
+    try:
+        entered_files(data)
+    except FileError as error:
+        if error.message.code == ROLLED_BACK:  # the rest is found below
+            yield error.message
 
 
 def _walked(

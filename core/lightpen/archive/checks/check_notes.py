@@ -11,10 +11,10 @@ from pathlib import Path
 from msgspec import Struct
 
 from lightpen.archive.chains.chains import (
-    ArchivedFiles,
     batch_of,
     chain_at_home,
     entries_of_limits,
+    entry_of_result,
     heads,
     records_of,
 )
@@ -69,15 +69,16 @@ def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
 
 
 def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]:
-    entered, results = ArchivedFiles(database, home), FolderArchive(data)
-    entered.read()
+    results = FolderArchive(data)
     files = (*results.all_files(), *library_files(data), *station_files(data))
     owed = {each.place for each in owed_files(home)}
     for file in files:
         place = results.place_of(file)
-        if place not in entered and place in owed:
+        if entry_of_result(database, home, place) is not None:
+            continue
+        if place in owed:
             yield message("archive.file-owed", file=printable(place))
-        elif place not in entered:
+        else:
             yield message("archive.file-not-entered", file=printable(place))
 
 

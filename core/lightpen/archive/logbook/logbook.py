@@ -20,9 +20,9 @@ from threading import Lock
 from msgspec import structs
 
 from lightpen.archive.chains.chains import (
-    ArchivedFiles,
     entry_of_result,
     heads,
+    is_swing_entered,
     records_of,
 )
 from lightpen.archive.chains.entries import Event, Kind, StoredEntry, this_program
@@ -96,7 +96,6 @@ class Logbook:
             self.database.close()
             raise
         self._renew_lost_key()
-        self._entered = ArchivedFiles(self.database, self.chain)
         self._replicator: Replicator | None = None
         if server:
             self._replicator = Replicator(self.database, self.chain, server)
@@ -110,7 +109,6 @@ class Logbook:
         could not be entered is tried again next time; the returned messages say why.
         """
         with self._lock:
-            self._entered.read()
             owed, swings, faults = (*self._owed(),), (*self._abandoned(),), []
             n_all = len(owed) + len(swings)
             steps = (
@@ -238,7 +236,8 @@ class Logbook:
     def _abandoned(self) -> Iterator[Path]:
         """Yield the abandoned swings that have no entry."""
         for folder in _set_aside(self._data / RECORDS):
-            if self._results.place_of(folder) not in self._entered:
+            place = self._results.place_of(folder)
+            if not is_swing_entered(self.database, self.chain, place):
                 yield folder
 
     def _enter_file(self, owed: OwedFile) -> None:

@@ -10,12 +10,7 @@ from hashlib import sha256
 
 from sqlalchemy import select, text
 
-from lightpen.archive.chains.chains import (
-    chain_at_home,
-    chain_head,
-    delivered_number,
-    heads,
-)
+from lightpen.archive.chains.chains import chain_at_home, chain_head, delivered_number
 from lightpen.archive.chains.entries import SHORT
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.store.database import Database
@@ -47,17 +42,13 @@ def check_server(database: Database, server: Database) -> ServerCheckResult:
     A server may show a station its own chain alone.
     """
     checked = check_archive(server)
-    here, there = _numbers(database), _numbers(server)
-    home = chain_at_home(database)
+    home = chain_at_home(database) or ""
+    here, there = (chain_head(each, home).number for each in (database, server))
     found = [message("archive.on-server", finding=each) for each in checked.findings]
-    for chain in here:
-        if chain == home or chain in there:
-            found += _findings(database, chain, server)
-    own = home or ""
     return ServerCheckResult(
         n_entries=checked.n_entries,
-        n_waiting=max(0, here.get(own, 0) - there.get(own, 0)),
-        findings=tuple(found),
+        n_waiting=max(0, here - there),
+        findings=(*found, *_findings(database, home, server)),
     )
 
 
@@ -99,17 +90,11 @@ def _findings(database: Database, chain: str, server: Database) -> Iterator[Mess
     different = first_difference(database, chain, server, min(here, there))
     if different is not None:
         yield message("archive.server-differs", number=different, chain=chain[:SHORT])
-    if chain != chain_at_home(database):
-        return
     if different is None and there > here:
         yield message("archive.server-ahead", here=here, there=there)
     delivered = delivered_number(database, chain)
     if there < delivered:
         yield message("archive.server-lost", first=there + 1, last=delivered)
-
-
-def _numbers(database: Database) -> dict[str, int]:
-    return {head.chain: head.number for head in heads(database)}
 
 
 def _block_hashes(database: Database, chain: str, end: int) -> list[str]:

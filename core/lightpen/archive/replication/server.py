@@ -11,7 +11,7 @@ from sqlalchemy import create_engine, event
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
 
-from lightpen.archive.store.database import Database, known_version, update_tables
+from lightpen.archive.store.database import Database, known_version
 from lightpen.errors import ArchiveError
 from lightpen.messages import printable
 
@@ -52,7 +52,7 @@ def open_server(address: str) -> Database:
     if known_version(database) is None:
         database.close()
         raise ArchiveError("archive.server-empty", name=database.name)
-    return update_tables(database)
+    return database
 
 
 def server_url(address: str) -> URL:

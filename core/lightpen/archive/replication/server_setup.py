@@ -40,8 +40,7 @@ CREATE INDEX archive_verdicts ON archive_entries (at_us)
 ALTER TABLE archive_records
     ADD CONSTRAINT record_hash
         CHECK (sha256 = encode(sha256(convert_to(text, 'UTF8')), 'hex'));
-CREATE TABLE {VERSION_TABLE} (version_num VARCHAR(32) NOT NULL,
-    CONSTRAINT {VERSION_TABLE}_pkc PRIMARY KEY (version_num));
+CREATE TABLE {VERSION_TABLE} (version_num VARCHAR(32) PRIMARY KEY);
 INSERT INTO {VERSION_TABLE} VALUES ('{VERSION}');
 
 DO $$ BEGIN

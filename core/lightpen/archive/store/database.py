@@ -1,8 +1,7 @@
 """The database of an archive: a file of SQLite, or a server of PostgreSQL.
 
-It is examined before anything is written: one of another program, or of a later
-version of this one, stays as it is. A new file gets the tables as they are now; what is
-of an earlier version is brought up to date by the steps in the folder ``migrations``.
+It is examined before anything is written: one of another program, or of another
+version of this one, stays as it is. A new file gets the tables as they are now.
 """
 
 import socket
@@ -22,7 +21,6 @@ from sqlalchemy import (
     Engine,
     Executable,
     MetaData,
-    PrimaryKeyConstraint,
     Row,
     String,
     Table,
@@ -31,7 +29,6 @@ from sqlalchemy import (
     insert,
     inspect,
     select,
-    text,
 )
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import QueuePool
@@ -43,10 +40,8 @@ from lightpen.formats.files import A_FILE, unreadable
 from lightpen.messages import printable
 from lightpen.record.library.numbered_files import make_folder
 
-VERSION = "1"  # of the tables, as the last of the migrations says
+VERSION = "1"  # of the tables
 VERSION_TABLE = "archive_version"
-MIGRATIONS = Path(__file__).parent.with_name("migrations")
-MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
 LONGEST_FAREWELL_S = 2  # for its users at closing
 MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish writing
@@ -55,10 +50,7 @@ PAUSE_S = 0.02  # between two attempts where SQLite does not retry
 LONGEST_ANSWER_S = 120.0
 
 _VERSION = Table(
-    VERSION_TABLE,
-    MetaData(),
-    Column("version_num", String(32), nullable=False),
-    PrimaryKeyConstraint("version_num", name=f"{VERSION_TABLE}_pkc"),  # as Alembic's
+    VERSION_TABLE, MetaData(), Column("version_num", String(32), primary_key=True)
 )
 
 
@@ -131,7 +123,7 @@ def open_file(path: Path) -> Database:
             connection.execute("PRAGMA synchronous = FULL")
             return connection
 
-    return update_tables(Database(_sqlite_engine(connect), name, path))
+    return _with_tables(Database(_sqlite_engine(connect), name, path))
 
 
 def look_into(path: Path) -> Database:
@@ -215,7 +207,7 @@ def _begin(connection: Connection) -> None:
 def known_version(database: Database) -> str | None:
     """Return the version of a database; None if it is empty.
 
-    Raises `ArchiveError` if it is of another program or of a later version of this one,
+    Raises `ArchiveError` if it is of another program or of another version of this one,
     and closes it.
     """
     try:
@@ -223,7 +215,7 @@ def known_version(database: Database) -> str | None:
             found = _found_version(connection)
             if found is None and inspect(connection).get_table_names():
                 raise ArchiveError("archive.of-other-program", name=database.name)
-        if found and not (found.isdecimal() and int(found) <= int(VERSION)):
+        if found not in (None, VERSION):
             raise ArchiveError("archive.later-version", name=database.name)
     except ArchiveError:
         database.close()
@@ -231,13 +223,14 @@ def known_version(database: Database) -> str | None:
     return found
 
 
-def update_tables(database: Database) -> Database:
-    """Make the tables, or update those of an earlier version; close it on failure."""
-    known_version(database)
+def _with_tables(database: Database) -> Database:
+    """Make the tables of a new file; close it on failure."""
     try:
         with database.writing() as connection:
-            if _found_version(connection) != VERSION:
-                _make_or_migrate(connection)
+            if _found_version(connection) is None:
+                for tables in (METADATA, _VERSION.metadata):
+                    tables.create_all(connection, checkfirst=False)
+                connection.execute(insert(_VERSION).values(version_num=VERSION))
     except ArchiveError:
         database.close()
         raise
@@ -270,35 +263,6 @@ def _found_version(connection: Connection) -> str | None:
     if not inspect(connection).has_table(VERSION_TABLE):
         return None
     return connection.execute(select(_VERSION.c.version_num)).scalar_one_or_none()
-
-
-def _make_or_migrate(connection: Connection) -> None:
-    """Create or migrate the tables, unless another process has done so."""
-    if connection.dialect.name == "postgresql":
-        connection.execute(text(f"SELECT pg_advisory_xact_lock({MIGRATING})"))
-    found = _found_version(connection)
-    if found is None:
-        for tables in (METADATA, _VERSION.metadata):
-            tables.create_all(connection, checkfirst=False)
-        connection.execute(insert(_VERSION).values(version_num=VERSION))
-    elif found != VERSION:
-        _migrate(connection, found)
-
-
-def _migrate(connection: Connection, found: str) -> None:
-    # Imported here: it takes 0.5 s, only at the first start of a later version.
-    from alembic.migration import MigrationContext
-    from alembic.operations import Operations
-    from alembic.script import ScriptDirectory
-
-    script = ScriptDirectory(str(MIGRATIONS))
-    context = MigrationContext.configure(
-        connection, opts={"version_table": VERSION_TABLE}
-    )
-    with Operations.context(context):
-        for step in reversed(list(script.iterate_revisions("head", found))):
-            step.module.upgrade()
-    context.stamp(script, "head")
 
 
 @contextmanager

@@ -21,11 +21,10 @@ from sqlalchemy import (
 
 METADATA = MetaData()
 
-CHAINS = Table(  # of a file
+CHAINS = Table(  # of a file: its own
     "archive_chains",
     METADATA,
     Column("chain", String(32), primary_key=True),
-    Column("is_own", Boolean, nullable=False),
     Column("number", Integer, nullable=False),
     Column("sha256", String(64), nullable=False),
     Column("delivered", Integer, nullable=False),  # entries that a server was given

@@ -7,7 +7,7 @@ the note in the user account. All others are not entered: they are passed over.
 """
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -230,8 +230,12 @@ def entered_files(data: Path) -> EnteredFiles:
     data = data.absolute()
     with _reader:
         reading = _read(data)
-        _require_remembered(data, reading.found.chain, reading.hashes)
-        return reading.found
+        found, hashes = reading.found, reading.hashes
+        require_remembered(
+            *(data / ARCHIVE, found.chain),
+            lambda number: hashes[number - 1] if number <= len(hashes) else None,
+        )
+        return found
 
 
 def _read(data: Path) -> _Reading:
@@ -240,16 +244,16 @@ def _read(data: Path) -> _Reading:
         if not file.is_file():
             return _Reading(data, known_station_name(data))
         with closing(_connected(file)) as connection:
-            own = "SELECT chain FROM archive_chains WHERE is_own"
-            row = (
-                connection.execute(own).fetchone() if _has_tables(connection) else None
-            )
-            if row is None:
+            rows = _chains(connection)
+            if not rows:
                 return _Reading(data, known_station_name(data))
-            _require_own(data, row[0])
+            if len(rows) > 1:
+                raise sqlite3.DatabaseError("it has several chains")
+            ((chain,),) = rows
+            _require_own(data, chain)
             reading = _readings.get(data)
-            if reading is None or not _is_continued(connection, reading, row[0]):
-                reading = _Reading(data, row[0])
+            if reading is None or not _is_continued(connection, reading, chain):
+                reading = _Reading(data, chain)
             _readings.pop(data, None)  # unless the rest is sound
             reading.go_on(connection)
             _readings[data] = reading
@@ -259,9 +263,11 @@ def _read(data: Path) -> _Reading:
         raise FileError("archive.unusable", name=name, reason=str(error)) from error
 
 
-def _has_tables(connection: sqlite3.Connection) -> bool:
-    wanted = "SELECT 1 FROM sqlite_master WHERE name = 'archive_chains'"
-    return connection.execute(wanted).fetchone() is not None
+def _chains(connection: sqlite3.Connection) -> list[Any]:
+    tables = "SELECT 1 FROM sqlite_master WHERE name = 'archive_chains'"
+    if connection.execute(tables).fetchone() is None:
+        return []
+    return connection.execute("SELECT chain FROM archive_chains").fetchall()
 
 
 def _connected(file: Path) -> sqlite3.Connection:
@@ -294,19 +300,24 @@ def _require_own(data: Path, chain: str) -> None:
     named = known_station_name(data)
     is_known = remembered_head(chain) is not None or station_key(chain) is not None
     if named not in ("", chain) and not is_known:
-        _require_remembered(data, named, [])
+        require_remembered(data / ARCHIVE, named, lambda number: None)
 
 
-def _require_remembered(data: Path, chain: str, hashes: list[str]) -> None:
+def require_remembered(
+    archive: Path | str, chain: str, hash_of: Callable[[int], str | None]
+) -> None:
+    """Refuse an archive that lacks the last entry that this user account remembers.
+
+    ``hash_of`` returns the SHA-256 of the entry of a number, None without one.
+    """
     head = remembered_head(chain) if chain else None
-    if head is None or hashes[head.number - 1 : head.number] == [head.sha256]:
-        return
-    raise FileError(
-        "archive.rolled-back",
-        archive=data / ARCHIVE,
-        number=head.number,
-        memory=head_file(chain),
-    )
+    if head is not None and hash_of(head.number) != head.sha256:
+        raise FileError(
+            "archive.rolled-back",
+            archive=archive,
+            number=head.number,
+            memory=head_file(chain),
+        )
 
 
 def write_counted(
