@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -23,7 +24,8 @@ from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
 from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
-from lightpen.archive.chains.growth import append, copy_entries, own_chain
+from lightpen.archive.chains.growth import adopt_entries, append, own_chain
+from lightpen.archive.chains.signatures import entry_signature
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
 from lightpen.archive.logbook.logbook import Logbook
@@ -119,10 +121,12 @@ def _fill(database: Database, chain: str) -> None:
     for first in range(0, N_ENTRIES, BATCH):
         entries = []
         for n in range(first, first + BATCH):
-            entry = chained(head, _event(n, SHORT_RECORD))
+            event = _event(n, SHORT_RECORD)
+            entry = chained(head, event)
+            signature = entry_signature(head, event, entry.sha256)
+            entries.append(replace(entry, signature=signature))
             head = ChainHead(chain, n + 1, entry.sha256, entry.entry.since)
-            entries.append(entry)
-        copy_entries(database, chain, entries, records)
+        adopt_entries(database, chain, entries, records)
 
 
 def _milliseconds(acts: Iterable[Callable[[], object]]) -> list[float]:

@@ -81,6 +81,7 @@ def test_a_file_that_a_program_writes_during_a_check_is_looked_at_again(
     [
         ("text", "replace(text, 'Ann', 'Bob')"),
         ("text", "CAST(text AS BLOB)"),
+        ("signature", "CAST(signature AS BLOB)"),
         ("station", "'Hall 9'"),
         ("since_us", "since_us + 1"),
         ("sha256", f"'{'0' * 64}'"),
@@ -141,6 +142,12 @@ def test_a_changed_record_is_named_by_its_entry(archive: Path) -> None:
     assert any(
         "entry 4 of chain" in each and "changed" in each for each in findings(archive)
     )
+
+
+def test_a_record_that_is_no_text_is_named_by_its_entry(archive: Path) -> None:
+    change(archive, "UPDATE archive_records SET text = CAST(text AS BLOB)")
+
+    assert any("entry 4 of chain" in each for each in findings(archive))
 
 
 def test_a_record_that_was_taken_out_is_named_by_its_entry(archive: Path) -> None:

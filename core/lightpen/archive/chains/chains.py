@@ -87,7 +87,8 @@ def records_of(database: Database, entries: Sequence[StoredEntry]) -> dict[str, 
     """Return the records that entries refer to, by their hash."""
     names = [each.entry.event.record_sha256 for each in entries]
     wanted = select(RECORDS).where(RECORDS.c.sha256.in_([n for n in names if n]))
-    return {row.sha256: row.text for row in database.rows(wanted)}
+    rows = database.rows(wanted)
+    return {row.sha256: row.text for row in rows if isinstance(row.text, str)}
 
 
 def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry | None:

@@ -147,8 +147,10 @@ def written(entry: Entry) -> StoredEntry:
     return StoredEntry(entry, text, text_sha256(text))
 
 
-def read_entry(text: str, signature: str = "") -> StoredEntry:
+def read_entry(text: object, signature: object = "") -> StoredEntry:
     """Return an entry with its signature, or raise `DamagedError`."""
+    if not (isinstance(text, str) and isinstance(signature, str)):
+        raise DamagedError("It is no text.")  # SQLite stores any value anywhere
     try:
         data = text.encode("utf-8", "surrogateescape")
     except UnicodeEncodeError as error:  # half of a character

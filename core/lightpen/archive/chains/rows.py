@@ -43,8 +43,6 @@ def columns_of(entry: StoredEntry) -> dict[str, Any]:
 def sound_entry(row: Row[Any]) -> StoredEntry | None:
     """Return the entry in a row with all columns, unless anything in it was changed."""
     columns = {column.name: row._mapping[column] for column in ENTRIES.c}
-    if not isinstance(columns["text"], str):
-        return None
     try:
         entry = read_entry(columns["text"], columns["signature"])
     except DamagedError:
