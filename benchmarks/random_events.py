@@ -179,7 +179,7 @@ class RandomUser(QObject):
     def _act(self, root: QWidget) -> None:
         chance = self._random.random()
         if chance < 0.05 and root is self._wizard.window:
-            root.go_to(self._random.randrange(len(root.pages())))
+            root.go_to(self._random.randrange(len(root.steps())))
             return
         control = self._control_in(root)
         middle = control.rect().center()

@@ -93,6 +93,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._pages: list[Page] = []
         self._questions: list[list[AskingBar]] = []
         self._later = later
+        self._wanted: int | None = None  # page that was chosen before it was made
         self._is_painted = False
         self._settings = settings
         self._notifications = notifications
@@ -116,7 +117,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self.setCentralWidget(self._arranged())
 
         # Connections
-        self._sidebar.step_chosen.connect(self.go_to)
+        self._sidebar.step_chosen.connect(self._on_step_chosen)
         self._sidebar.operator_view_chosen.connect(self._operator_action.toggle)
         self._sidebar.help_chosen.connect(self._on_help_triggered)
         self._sidebar.options_chosen.connect(self._show_options)
@@ -167,7 +168,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Show a page, or say why it is locked."""
         if index == self._now:
             return
-        asked = self.pages()[index]
+        asked = self._page_at(index)
         why_closed = asked.why_closed()
         if why_closed:
             self._action_bar.set_status(
@@ -196,7 +197,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
 
     def advance(self) -> None:
         """Show the page after this one."""
-        if self._now + 1 < len(self.pages()):
+        if self._now + 1 < len(self.steps()):
             self.go_to(self._now + 1)
 
     def press_main(self) -> None:
@@ -327,6 +328,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Make the pages while the window answers between them."""
         if self._make_page():
             QTimer.singleShot(0, self._make_more)
+            if self._wanted is not None and self._wanted < len(self._pages):
+                self._on_step_chosen(self._wanted)
         elif self.isVisible():
             self.completed.emit()
 
@@ -342,6 +345,12 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             self._add_page(page)
         self._refresh()
         return page is not None
+
+    def _page_at(self, index: int) -> Page:
+        """Return a page, made now if it has not been."""
+        while index >= len(self._pages) and self._make_page():
+            pass
+        return self._pages[index]
 
     def _end_tab_order(self) -> None:
         """Let the Tab key reach the main button after the pages, then the steps."""
@@ -487,6 +496,13 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         menu = self._options
         corner = self._sidebar.options_corner()
         menu.popup(corner - QPoint(0, menu.sizeHint().height()))
+
+    def _on_step_chosen(self, index: int) -> None:
+        """Show the page of a step, as soon as it is made."""
+        is_made = index < len(self._pages) or not self._is_painted
+        self._wanted = None if is_made else index
+        if is_made:
+            self.go_to(index)
 
     def _on_main_pressed(self) -> None:
         if not is_refusing(self.page()):

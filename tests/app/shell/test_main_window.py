@@ -706,6 +706,29 @@ def test_later_pages_are_made_after_the_paint_and_named_before(
     assert [step.state for step in window.steps()].count(StepState.NOW) == 1
 
 
+def test_a_step_chosen_before_its_page_is_made_waits_for_it_alone(
+    qtbot: QtBot, settings: Settings
+) -> None:
+    made = [Leaf("Start")]
+
+    def more() -> Iterator[Page]:
+        for name in list(step_titles().values())[1:]:
+            made.append(Leaf(name))
+            yield made[-1]
+
+    window = MainWindow(
+        made[:1], settings, Preferences(), Notifications(), later=more()
+    )
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitUntil(lambda: len(made) == 2)
+    qtbot.mouseClick(window.findChildren(StepButton)[3], Qt.MouseButton.LeftButton)
+    assert (len(made), window.page()) == (2, made[0])
+
+    qtbot.waitUntil(lambda: window.page() is made[-1])
+    assert len(made) == 4
+
+
 def test_pages_made_later_come_before_the_main_button_for_the_tab_key(
     qtbot: QtBot, settings: Settings, press: Callable[[Key], None]
 ) -> None:
