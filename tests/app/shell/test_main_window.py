@@ -722,7 +722,7 @@ def test_a_step_chosen_before_its_page_is_made_waits_for_it_alone(
     qtbot.addWidget(window)
     window.show()
     qtbot.waitUntil(lambda: len(made) == 2)
-    qtbot.mouseClick(window.findChildren(StepButton)[3], Qt.MouseButton.LeftButton)
+    window.findChildren(StepButton)[3].click()
     assert (len(made), window.page()) == (2, made[0])
 
     qtbot.waitUntil(lambda: window.page() is made[-1])
