@@ -709,24 +709,25 @@ def test_later_pages_are_made_after_the_paint_and_named_before(
 def test_a_step_chosen_before_its_page_is_made_waits_for_it_alone(
     qtbot: QtBot, settings: Settings
 ) -> None:
-    made = [Leaf("Start")]
+    names = list(step_titles().values())
+    made, shown = [Leaf("Start")], list[Page]()
 
     def more() -> Iterator[Page]:
-        for name in list(step_titles().values())[1:]:
+        for name in names[1:]:
             made.append(Leaf(name))
             yield made[-1]
+            if len(made) == 2:
+                window.findChildren(StepButton)[3].click()
+            shown.append(window.page())
 
     window = MainWindow(
         made[:1], settings, Preferences(), Notifications(), later=more()
     )
     qtbot.addWidget(window)
-    window.show()
-    qtbot.waitUntil(lambda: len(made) == 2)
-    window.findChildren(StepButton)[3].click()
-    assert (len(made), window.page()) == (2, made[0])
+    with qtbot.waitSignal(window.completed):
+        window.show()
 
-    qtbot.waitUntil(lambda: window.page() is made[-1])
-    assert len(made) == 4
+    assert shown == [made[0], made[0], *[made[3]] * (len(names) - 3)]
 
 
 def test_pages_made_later_come_before_the_main_button_for_the_tab_key(
