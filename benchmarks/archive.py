@@ -1,10 +1,9 @@
-"""The archive with 100,000 entries, and changed byte by byte.
+"""The archive with 100,000 entries.
 
 Usage: python benchmarks/archive.py
 """
 
 import json
-import random
 import statistics
 import subprocess
 import sys
@@ -19,7 +18,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.hostile_records import make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
@@ -28,29 +26,18 @@ from lightpen.archive.chains.growth import adopt_entries, append, own_chain
 from lightpen.archive.chains.signatures import entry_signature
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import Database, look_into, open_file
-from lightpen.errors import ArchiveError
+from lightpen.archive.store.database import Database, open_file
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
-from lightpen.record.swings.reading import open_record, record_files
 
 N_ENTRIES, N_TIPS = 100_000, 40
 RECORD = "{" + " " * 280_000 + "}"  # as long as that of 300 images
 SHORT_RECORD = '{"frames": []}'
 BATCH = 5000
 N_TIMED = 50
-N_FLIPS = 1000
-SEED = 7
 START = datetime(2026, 1, 2, 8, tzinfo=UTC)
 MAX_APPEND_MS, MAX_LAST_MS, MAX_OPEN_MS, MAX_CHECK_S = 20.0, 5.0, 500.0, 60.0
 MAX_BLOCKED_MS = 50.0
-
-
-def archive_rows() -> list[Row]:
-    """Return how fast the archive is, and which changes of it are found."""
-    return [*_speed_rows(), _changed_row()]
 
 
 def _event(n: int, record: str) -> Event:
@@ -66,7 +53,8 @@ def _event(n: int, record: str) -> Event:
     )
 
 
-def _speed_rows() -> list[Row]:
+def archive_rows() -> list[Row]:
+    """Return how fast the archive is."""
     with _folder() as folder, closing(open_file(folder / ARCHIVE)) as database:
         chain = own_chain(database)
         _fill(database, chain)
@@ -146,46 +134,6 @@ def _at_most(what: str, times: list[float], limit: float) -> Row:
         f"{limit:g} ms",
         met=median <= limit,
     )
-
-
-def _changed_row() -> Row:
-    """Return how many changes of archive, result, swing or image are found."""
-    rng = random.Random(SEED)
-    n_found = 0
-    with _folder() as folder:
-        files = _data_files(folder)
-        for _ in range(N_FLIPS):
-            path = rng.choices(files, [file.stat().st_size for file in files])[0]
-            whole = path.read_bytes()
-            changed = bytearray(whole)
-            changed[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
-            path.write_bytes(changed)
-            n_found += _is_found(folder)
-            path.write_bytes(whole)
-    return Row(
-        "archive, a bit changed anywhere in result, swing or image: found",
-        f"{n_found} of {N_FLIPS}",
-        "all",
-        met=n_found == N_FLIPS,
-    )
-
-
-def _data_files(folder: Path) -> list[Path]:
-    """Enter a result and its swing, and return all files that are vouched for."""
-    data = make_data(folder)
-    swing = open_record(data.swing)
-    results = FolderArchive(folder)
-    with closing(Logbook(folder)) as logbook:
-        logbook.enter_owed()
-    return [*results.all_files(), *record_files(swing)]
-
-
-def _is_found(folder: Path) -> bool:
-    try:
-        with closing(look_into(folder / ARCHIVE)) as database:
-            return bool(check_archive(database, folder).findings)
-    except ArchiveError:
-        return True
 
 
 @contextmanager

@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -29,8 +30,11 @@ from benchmarks.hostile_records import NAMES, make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
+from lightpen.archive.checks.check import check_file
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.formats.files import write_whole
 from lightpen.record.folder.data_folder import OLDEST, sweep_leftovers
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import Record, open_record
@@ -172,6 +176,14 @@ def _result_is_one(data: Path, reported: list[str]) -> bool:
     return not reported or (x == y and x >= float(reported[-1]))
 
 
+def _accepted_is_not_accused(data: Path, reported: list[str]) -> bool:
+    """Check that the next start enters what is owed, and nothing is found changed."""
+    with closing(Logbook(data)) as logbook:
+        faults = logbook.enter_owed()
+    findings = check_file(data / ARCHIVE, data, lambda fraction: None).findings
+    return not (faults or findings) and _result_is_one(data, reported)
+
+
 def _taken_back_is_one_step(data: Path, reported: list[str]) -> bool:
     """Check that the tip that stays is in forceor the reported one beside it."""
     found = FolderArchive(data).in_force(NAMES.pen, NAMES.tip)
@@ -207,7 +219,7 @@ CHECKS: dict[str, Check] = {
     "swing": _swings_are_whole,
     "resume": _swings_are_whole,
     "take out": _taken_out_is_one_edit,
-    "accept": _result_is_one,
+    "accept": _accepted_is_not_accused,
     "take back": _taken_back_is_one_step,
     "settings": _settings_are_one,
     "json": _json_is_one,

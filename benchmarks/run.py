@@ -17,14 +17,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.archive import archive_rows
-from benchmarks.archive_plant import plant_rows
 from benchmarks.camera_calibrations import camera_calibration_rows
 from benchmarks.cramer_rao import cramer_rao_rows
 from benchmarks.discoveries import discovery_rows
 from benchmarks.guided import guided_rows
 from benchmarks.hard_scene import hard_scene_rows
-from benchmarks.honest_histories import honest_row
-from benchmarks.hostile import hostile_rows
+from benchmarks.hostile_files import hostile_file_rows
+from benchmarks.hostile_kills import hostile_kill_rows
+from benchmarks.hostile_records import hostile_record_rows
 from benchmarks.image_sets import data_folder
 from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
@@ -69,10 +69,12 @@ SECTIONS: dict[str, Section] = {
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),
     "killed": lambda workers, data: killed_rows(),
-    "hostile": lambda workers, data: hostile_rows(),
+    "hostile": lambda workers, data: [
+        *hostile_file_rows(),
+        *hostile_record_rows(),
+        *hostile_kill_rows(),
+    ],
     "archive": lambda workers, data: archive_rows(),
-    "honest": lambda workers, data: [honest_row()],
-    "plant": lambda workers, data: plant_rows(),
     "view": lambda workers, data: plant_view_rows(),
     "start": lambda workers, data: start_rows(),
     "idle": lambda workers, data: idle_rows(),

@@ -10,6 +10,7 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import count
@@ -20,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.hostile_records import IMAGE, NAMES
 from msgspec import structs
 
+from lightpen.archive.logbook.logbook import Logbook
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import write_whole
 from lightpen.formats.pen_files import PEN_FILE
@@ -85,14 +87,16 @@ def take_out(data: Path) -> None:
 
 
 def accept(data: Path) -> None:
-    """Put one tip after the other in force."""
+    """Put one tip after the other in force, and enter each in the archive."""
     archive = FolderArchive(data)
     before = archive.in_force(NAMES.pen, NAMES.tip)
     assert before is not None
     start = int(before.tip_pen[0])
-    for n in count(start + 1):
-        archive.store(_with_tip(before, float(n)))
-        tell(n)
+    with closing(Logbook(data)) as logbook:
+        for n in count(start + 1):
+            archive.store(_with_tip(before, float(n)))
+            logbook.enter_owed()
+            tell(n)
 
 
 def _with_tip(result: Result, x: float) -> Result:
