@@ -29,7 +29,7 @@ from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.entered_files import entered_files
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.opening import data_folder_of
-from lightpen.record.results.results import TipChange, has_head, parse_result
+from lightpen.record.results.results import CALIBRATION, TipChange, parse_result
 from lightpen.record.swings.names import Names
 
 WHAT = message("file.calibration")
@@ -178,7 +178,7 @@ def read_calibration(path: Path) -> CalibrationFile:
 def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
     """Return the calibration that a file holds, or raise `UsageError`."""
     digest = sha256(data).hexdigest()
-    if has_head(data):
+    if CALIBRATION in data:
         result = parse_result(data, path, Path)
         return CalibrationFile(
             path,

@@ -11,7 +11,6 @@ from typing import Annotated, TypeAlias
 from msgspec import Meta, Struct
 
 from lightpen.errors import FileError
-from lightpen.formats import upgrades
 from lightpen.formats.files import MEGABYTE
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
@@ -20,7 +19,7 @@ from lightpen.formats.own_json import (
     require_usual,
     with_checksum,
 )
-from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
+from lightpen.formats.stored_format import LaterFormatError, parse_stored
 from lightpen.messages import message
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.entered_files import write_counted
@@ -75,7 +74,7 @@ class LimitsChange(Struct, omit_defaults=True, kw_only=True):
 def read_limits_change(content: bytes, file: Path) -> LimitsChange:
     """Return the content of a file of limits, whether it counts or not."""
     try:
-        return parse_upgraded(content, LimitsChange, upgrades.LIMITS)
+        return parse_stored(content, LimitsChange)
     except LaterFormatError as error:
         raise FileError("limits.later-version", file=file) from error
     except DamagedError as error:

@@ -11,12 +11,11 @@ import numpy as np
 from msgspec import structs
 
 from lightpen.errors import FileError, NameTakenError, UsageError
-from lightpen.formats import upgrades
 from lightpen.formats.files import MEGABYTE, create_whole, read_bytes
 from lightpen.formats.image_headers import read_image_header
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import with_checksum
-from lightpen.formats.upgrades import newest_format
+from lightpen.formats.stored_format import FORMAT
 from lightpen.messages import Message, message, printable
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
 from lightpen.record.library.entered_files import write_counted
@@ -171,7 +170,7 @@ def _keep(data: Path, number: int, item: AnyItem, by: Author, now: datetime) -> 
         key = require_supervisor(supervision, signature)
         supervisor = signature.name.strip()
     change = LibraryChange(
-        format=newest_format(upgrades.LIBRARY),
+        format=FORMAT,
         at=now,
         item=item,
         station=by.station,

@@ -12,8 +12,7 @@ from pathlib import Path
 from msgspec import structs
 
 from lightpen.errors import AcceptanceError, NameTakenError
-from lightpen.formats import upgrades
-from lightpen.formats.upgrades import newest_format
+from lightpen.formats.stored_format import FORMAT
 from lightpen.model.limits import LIMITS, StationLimits
 from lightpen.record.library.entered_files import entered_files
 from lightpen.record.library.guard_files import (
@@ -139,9 +138,7 @@ def renew_station_key(
 
 
 def _change(now: datetime, signature: Signature) -> LimitsChange:
-    return LimitsChange(
-        format=newest_format(upgrades.LIMITS), at=now, supervisor=signature.name.strip()
-    )
+    return LimitsChange(format=FORMAT, at=now, supervisor=signature.name.strip())
 
 
 def _write(

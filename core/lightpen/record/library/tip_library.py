@@ -19,7 +19,6 @@ from msgspec import Meta, Struct, to_builtins
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats import upgrades
 from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.json_records import Plain
 from lightpen.formats.own_json import (
@@ -29,7 +28,7 @@ from lightpen.formats.own_json import (
     ZonedTime,
     require_usual,
 )
-from lightpen.formats.upgrades import LaterFormatError, parse_upgraded
+from lightpen.formats.stored_format import LaterFormatError, parse_stored
 from lightpen.measuring.artefacts import Artefact, ArtefactKind
 from lightpen.measuring.plan import Side
 from lightpen.messages import Message, message
@@ -317,13 +316,8 @@ def read_change(file: Path) -> LibraryChange:
     Raises `FileError` if it is damaged, or of a later version of the program.
     """
     try:
-        return parse_change(read_bytes(file, WHAT, MEGABYTE))
+        return parse_stored(read_bytes(file, WHAT, MEGABYTE), LibraryChange)
     except LaterFormatError as error:
         raise FileError("library.later-version", file=file) from error
     except DamagedError as error:
         raise FileError("library.damaged", file=file) from error
-
-
-def parse_change(content: bytes) -> LibraryChange:
-    """Return the change that a file of the library of any station holds."""
-    return parse_upgraded(content, LibraryChange, upgrades.LIBRARY)

@@ -36,15 +36,13 @@ from lightpen.formats.own_json import (
     require_usual,
     with_checksum,
 )
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.formats.upgrades import (
-    RESULT,
-    WITHDRAWAL,
+from lightpen.formats.stored_format import (
+    FORMAT,
     LaterFormatError,
-    newest_format,
-    parse_upgraded,
-    upgraded,
+    parse_stored,
+    require_format,
 )
+from lightpen.formats.stored_messages import StoredMessage
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 
@@ -198,7 +196,7 @@ def result_bytes(result: Result, record: str) -> bytes:
     names = result.names
     rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
     head = _Head(
-        format=newest_format(RESULT),
+        format=FORMAT,
         accepted=result.accepted,
         station=names.station,
         operator=names.operator,
@@ -223,19 +221,14 @@ def result_bytes(result: Result, record: str) -> bytes:
 
 def withdrawal_bytes(withdrawal: Withdrawal) -> bytes:
     """Return a revocation as JSON."""
-    entries = {"format": newest_format(WITHDRAWAL), **to_builtins(withdrawal)}
+    entries = {"format": FORMAT, **to_builtins(withdrawal)}
     return with_checksum(json_bytes(entries))
 
 
-def has_head(start: bytes) -> bool:
-    """Return whether the start of a result, as much as was read, has its head."""
-    return CALIBRATION in start
-
-
-def parse_heading(start: bytes, file: Path) -> ResultHeading:
-    """Parse the heading of a result file from its beginning or its whole content."""
+def parse_heading(content: bytes, file: Path) -> ResultHeading:
+    """Parse the heading of a result file."""
     try:
-        return parse_checked(head_of(start), ResultHeading)
+        return parse_checked(head_of(content), ResultHeading)
     except DamagedError as error:
         raise _damaged(file) from error
 
@@ -243,9 +236,9 @@ def parse_heading(start: bytes, file: Path) -> ResultHeading:
 def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
     """Parse a revocation."""
     try:
-        return parse_upgraded(data, Withdrawal, WITHDRAWAL)
+        return parse_stored(data, Withdrawal)
     except LaterFormatError as error:
-        raise _of_later_version(file, error.number, WITHDRAWAL) from error
+        raise _of_later_version(file, error.number) from error
     except DamagedError as error:
         raise _damaged(file) from error
 
@@ -259,7 +252,8 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
         head = head_of(data)
         parse_checked(head, ResultHeading)
         whole = parse_own_json(data, dict[str, Any])
-        entries = in_shape(upgraded(whole, RESULT), _Whole)
+        require_format(whole)
+        entries = in_shape(whole, _Whole)
         if sha256(data[len(head) - 1 :]).hexdigest() != entries.calibration_sha256:
             raise DamagedError("The checksum of the calibration is another one.")
         return Result(
@@ -285,7 +279,7 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
             restores=entries.restores,
         )
     except LaterFormatError as error:
-        raise _of_later_version(file, error.number, RESULT) from error
+        raise _of_later_version(file, error.number) from error
     except DamagedError as error:
         raise _damaged(file) from error
 
@@ -300,7 +294,5 @@ def _damaged(file: Path) -> FileError:
     return FileError("results.damaged", file=file)
 
 
-def _of_later_version(file: Path, number: int, kind: str) -> FileError:
-    return FileError(
-        "results.later-version", file=file, number=number, known=newest_format(kind)
-    )
+def _of_later_version(file: Path, number: int) -> FileError:
+    return FileError("results.later-version", file=file, number=number, known=FORMAT)

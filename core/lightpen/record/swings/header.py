@@ -6,13 +6,12 @@ files it names. Header and copies each have their checksum.
 
 import json
 from collections.abc import Mapping
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Self
 
 import numpy as np
-from msgspec import Struct, field, to_builtins
+from msgspec import Struct, to_builtins
 from msgspec.structs import replace
 
 from lightpen.arrays import FloatArray
@@ -32,12 +31,7 @@ from lightpen.formats.own_json import (
 )
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.rig_files import RIG_FILE
-from lightpen.formats.upgrades import (
-    SWING,
-    LaterFormatError,
-    newest_format,
-    parse_upgraded,
-)
+from lightpen.formats.stored_format import FORMAT, LaterFormatError, parse_stored
 from lightpen.messages import Message, message
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.assumed import recorded_assumptions
@@ -81,7 +75,7 @@ class RigCopies(Struct, frozen=True):
 class Header(Struct, frozen=True, kw_only=True):
     """Conditions of the capture of a swing."""
 
-    format: int = field(default_factory=partial(newest_format, SWING))
+    format: int = FORMAT
     created: ZonedTime
     program: str = ""
     station: str = ""
@@ -149,11 +143,10 @@ def read_header(folder: Path) -> Header:
     path = folder / HEADER
     data = read_bytes(path, message("file.header"), HEADER_LIMIT)
     try:
-        header = parse_upgraded(data, Header, SWING)
+        header = parse_stored(data, Header)
     except LaterFormatError as error:
-        known = newest_format(SWING)
         raise FileError(
-            "record.later-version", path=path, number=error.number, known=known
+            "record.later-version", path=path, number=error.number, known=FORMAT
         ) from error
     except DamagedError as error:
         raise damaged_file(path) from error

@@ -26,7 +26,6 @@ from lightpen.errors import FileError
 from lightpen.estimation.reports.calibration_record import SpotRecord
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.own_json import with_checksum
-from lightpen.formats.upgrades import RESULT, UPGRADES, Entries, newest_format
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import CALIBRATION, END, Result
 from lightpen.record.swings.names import Names
@@ -89,12 +88,6 @@ def rewrite(file: Path, entries: dict[str, Any]) -> None:
     head["calibration_sha256"] = sha256(rest).hexdigest()
     sealed = with_checksum(json.dumps(head).encode())
     put_in(file.parents[1], file, sealed.removesuffix(b"}") + rest)
-
-
-def with_hall_as_station(old: Entries) -> Entries:
-    """Upgrade results of a format that had other names for station and method."""
-    calibration = {**old["calibration"], "method": old["calibration"]["by"]}
-    return {**old, "station": old["hall"], "calibration": calibration}
 
 
 def with_flipped_bit(content: bytes, bit: int) -> bytes:
@@ -344,37 +337,6 @@ def test_a_result_that_could_not_be_read_again_is_not_put_in_force(
 
     assert x_in_force(archive) == 1.0
     assert len(files_of(archive)) == 1
-
-
-def test_a_result_of_an_earlier_format_is_read_by_its_upgrade(
-    archive: FolderArchive, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    archive.store(result(3.0))
-    (file,) = files_of(archive)
-    calibration = entries_of(file)["calibration"]
-    method = calibration.pop("method")
-    old = {"hall": "Halle 3", "station": None}
-    rewrite(file, old | {"calibration": calibration | {"by": method}})
-    with pytest.raises(FileError, match=r"000001\.json is damaged"):
-        archive.in_force("LP-04", "T-10")
-
-    monkeypatch.setitem(UPGRADES, RESULT, (*UPGRADES[RESULT], with_hall_as_station))
-
-    assert in_force(archive).names == NAMES
-    archive.store(result(6.0))
-    formats = [entries_of(each)["format"] for each in files_of(archive)]
-    assert formats == [newest_format(RESULT) - 1, newest_format(RESULT)]
-    assert x_in_force(archive) == 2.0
-
-
-def test_a_result_that_its_upgrade_does_not_fit_is_damaged(
-    archive: FolderArchive, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    archive.store(result(3.0))
-    monkeypatch.setitem(UPGRADES, RESULT, (*UPGRADES[RESULT], with_hall_as_station))
-
-    with pytest.raises(FileError, match=r"000001\.json is damaged"):
-        archive.in_force("LP-04", "T-10")
 
 
 def test_a_result_that_another_program_wrote_anew_is_reported(

@@ -10,14 +10,12 @@ import pytest
 from benchmarks.small_records import small_record
 
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.stored_format import FORMAT
 from lightpen.formats.stored_messages import StoredMessage
-from lightpen.formats.upgrades import newest_format
 from lightpen.model.origin import Origin
 from lightpen.record.results.results import (
-    CALIBRATION,
     Result,
     TipChange,
-    has_head,
     parse_heading,
     parse_result,
     result_bytes,
@@ -54,14 +52,11 @@ RESULT = Result(
 )
 
 
-def test_the_head_tells_whose_it_is_and_needs_no_more_of_the_file() -> None:
+def test_the_head_tells_whose_it_is() -> None:
     written = result_bytes(RESULT, "records/1")
-    length = written.index(CALIBRATION) + len(CALIBRATION)
 
-    assert has_head(written[:length])
-    assert not has_head(written[: length - 1])
-    heading = parse_heading(written[:length], FILE)
-    assert heading.format == newest_format("result")
+    heading = parse_heading(written, FILE)
+    assert heading.format == FORMAT
     assert (heading.pen, heading.tip) == ("LP-04", "T-10")
     assert heading.record == "records/1"
     assert list(json.loads(written))[-2:] == ["checksum", "calibration"]

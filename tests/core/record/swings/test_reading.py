@@ -21,7 +21,6 @@ from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
-from lightpen.formats.upgrades import SWING, UPGRADES, newest_format
 from lightpen.model.origin import Origin
 from lightpen.record.swings.header import FileCopy, Header, header_copies
 from lightpen.record.swings.interrupted import find_unfinished
@@ -240,22 +239,6 @@ def test_a_record_of_another_format_is_refused(
     rewrite_header(folder, format=number)
 
     with pytest.raises(FileError, match=sentence):
-        open_record(folder)
-
-
-def test_a_record_of_an_earlier_format_is_read_by_its_upgrade(
-    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = recorded(tmp_path / "swing", header, 1)
-    before, newest = UPGRADES[SWING], newest_format(SWING)
-    monkeypatch.setitem(UPGRADES, SWING, (*before, lambda old: {**old, "cone": "C-9"}))
-
-    assert open_record(folder).header.cone == "C-9"
-    assert newest_format(SWING) == newest + 1
-
-    without_socket = (*before, lambda old: {**old, "cone": old["socket"]})
-    monkeypatch.setitem(UPGRADES, SWING, without_socket)
-    with pytest.raises(FileError, match=r"header\.json is damaged"):
         open_record(folder)
 
 
