@@ -5,7 +5,7 @@ differ from what is there are refused.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 from sqlalchemy.dialects import postgresql
@@ -35,14 +35,6 @@ from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
 from lightpen.record.library.signing.station import station_name
 
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
-
-
-@dataclass(frozen=True)
-class CopyResult:
-    """Numbers of new and of known entries when entries are copied."""
-
-    n_new: int
-    n_known: int
 
 
 def own_chain(database: Database) -> str:
@@ -92,11 +84,11 @@ def copy_entries(
     chain: str,
     entries: Iterable[StoredEntry],
     records: Mapping[str, str],
-) -> CopyResult:
-    """Let the copy on a server grow by entries, in their order; known ones are passed.
+) -> int:
+    """Let the copy on a server grow by entries, in their order; return how many.
 
-    Raises `ArchiveError` if they do not continue the copy, are not signed by the
-    station of the chain, or the copy says otherwise.
+    Those that another program delivered meanwhile are passed. Raises `ArchiveError` if
+    they do not continue the copy, or are not signed by the station of the chain.
     """
     known_chain = select(CHAIN_WRITERS.c.chain).where(CHAIN_WRITERS.c.chain == chain)
     with server.writing() as connection:
@@ -104,14 +96,13 @@ def copy_entries(
         head = head_in(connection, chain)
         if head.number == 0 and connection.execute(known_chain).first() is None:
             connection.execute(insert(CHAIN_WRITERS).values(chain=chain))
-        known, new = _parted(entries, head.number)
-        _require_same(connection, chain, known)
+        new = [each for each in entries if each.entry.number > head.number]
         _require_next(head, new)
         if new:
             _require_signed(connection, chain, new)
         _keep_records(connection, _named(new, records))
         _put(connection, chain, new)
-    return CopyResult(len(new), len(known))
+    return len(new)
 
 
 def adopt_entries(
@@ -197,28 +188,6 @@ def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
     if new:  # on a server, another role may have stored one invisible to this one
         put = postgresql.insert(RECORDS).on_conflict_do_nothing()
         connection.execute(put if _is_server(connection) else insert(RECORDS), new)
-
-
-def _parted(
-    entries: Iterable[StoredEntry], number: int
-) -> tuple[list[StoredEntry], list[StoredEntry]]:
-    """Return the entries up to a number, and the others."""
-    known: list[StoredEntry] = []
-    new: list[StoredEntry] = []
-    for each in entries:
-        (known if each.entry.number <= number else new).append(each)
-    return known, new
-
-
-def _require_same(connection: Connection, chain: str, known: list[StoredEntry]) -> None:
-    numbers = [each.entry.number for each in known]
-    wanted = select(ENTRIES.c.number, ENTRIES.c.sha256).where(
-        ENTRIES.c.chain == chain, ENTRIES.c.number.in_(numbers)
-    )
-    there = {row.number: row.sha256 for row in connection.execute(wanted)}
-    for each in known:
-        if there.get(each.entry.number) != each.sha256:
-            raise ArchiveError(_forked(each))
 
 
 def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:

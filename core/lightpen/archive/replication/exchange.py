@@ -11,6 +11,7 @@ and the checksum of all lines before it.
 import json
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from lightpen.archive.chains.chains import (
     note_delivered,
     records_of,
 )
-from lightpen.archive.chains.growth import CopyResult, copy_entries
+from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.replication.comparison import require_continued
 from lightpen.archive.store.database import Database
 from lightpen.errors import FileError, NameTakenError
@@ -32,20 +33,29 @@ FORMAT = 1
 DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
 
 
-def deliver(database: Database, chain: str, server: Database) -> CopyResult:
+@dataclass(frozen=True)
+class Delivery:
+    """Numbers of entries that a server got now, and had before."""
+
+    n_new: int
+    n_known: int
+
+
+def deliver(database: Database, chain: str, server: Database) -> Delivery:
     """Copy the entries of a chain that a server lacks.
 
     Raises `ArchiveError` if it does not answer, is ahead of this chain, or holds other
     entries of it.
     """
     require_continued(database, chain, server)
-    known = chain_head(server, chain).number
-    n_new, last = 0, max(0, known - 1)  # the last that it has is compared
+    known = last = chain_head(server, chain).number
+    n_new = 0
+    note_delivered(database, chain, last)
     while batch := batch_of(database, chain, last)[:DELIVERED]:
-        n_new += copy_entries(server, chain, batch, records_of(database, batch)).n_new
+        n_new += copy_entries(server, chain, batch, records_of(database, batch))
         last = batch[-1].entry.number
         note_delivered(database, chain, last)
-    return CopyResult(n_new, known)
+    return Delivery(n_new, known)
 
 
 def export_entries(database: Database, path: Path) -> int:
