@@ -68,6 +68,13 @@ def result_blocks(calibration_file: CalibrationFile) -> Iterable[Block]:
     yield heading(translate("paper", "Result"))
     title = translate("paper", "In the pen frame")
     yield from table(_number_columns(title, AXES), rows, strong=(0, 1))
+    yield paragraph(
+        translate(
+            "paper",
+            "The tip is the effective one, in the scale of the LED file: min over x, c "
+            "of sum |R_i x + T_i - c|\xb2 over the swing.",
+        )
+    )
     cone = np.array(calibration.cone_cam_mm)
     cone_u = np.array(calibration.cone_expanded_uncertainty_mm)
     title = translate("paper", "In the camera frame")

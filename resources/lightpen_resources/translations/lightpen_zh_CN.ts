@@ -10276,6 +10276,10 @@ mm</translation>
         <translation>光笔坐标系</translation>
     </message>
     <message>
+        <source>The tip is the effective one, in the scale of the LED file: min over x, c of sum |R_i x + T_i - c|² over the swing.</source>
+        <translation>测头为有效测头，以 LED 文件的尺度表示：对 x、c 取整个摆动中 |R_i x + T_i - c|² 之和的最小值。</translation>
+    </message>
+    <message>
         <source>In the camera frame</source>
         <translation>相机坐标系</translation>
     </message>

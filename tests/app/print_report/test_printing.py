@@ -56,6 +56,15 @@ def test_every_page_says_of_what_it_is_and_how_many_there_are(
     assert pages[-1].count("— End of report —") == 1
 
 
+def test_the_report_says_by_its_formula_which_tip_it_states(
+    result: Result, printed: Printed, words: Words
+) -> None:
+    reported = " ".join(" ".join(page) for page in words(printed(result)))
+
+    formula = "min over x, c of sum |R_i x + T_i - c|\xb2"
+    assert formula.replace(" ", "") in reported.replace(" ", "")
+
+
 def test_a_tip_that_passed_before_a_live_camera_has_no_mark(
     result: Result, printed: Printed
 ) -> None:
