@@ -20,7 +20,6 @@ from lightpen_app.steps.start.assumptions_panel import AssumptionsDialog
 from lightpen_app.steps.start.item_form import ItemForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
-from lightpen_app.steps.start.newcomer_panel import Introduction
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FRAME, fitted_place
 from lightpen_app.work.workbench import Workbench
@@ -48,7 +47,6 @@ MADE: dict[str, Made] = {
     "part of the sensor": lambda _: PartDialog(paper_camera()),
     "assumptions": lambda _: AssumptionsDialog(),
     "limits": lambda _: LimitsDialog(),
-    "introduction": lambda _: Introduction(),
     "library": library,
     "library form": library_form,
 }

@@ -25,6 +25,7 @@ from tests.app.walks import (
     page_text,
     read_out,
     result_on_disk,
+    set_up,
     watch_the_swing,
 )
 
@@ -59,6 +60,8 @@ BEST_FIT = "tip_in_leds_csv_frame_bestfit"
 
 @pytest.mark.slow
 def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
+    _check_round(walker)
+    set_up(walker)
     _check_round(walker)
     for name, text in {**NAMES, **FEW}.items():
         walker.enter(name, text)
@@ -110,6 +113,7 @@ def test_a_recorded_swing_gives_its_tip(
 ) -> None:
     folder = shared_data / "swing-clean"
     walker = open_wizard(replace(around, scene=Scene()))
+    set_up(walker)
     for name, text in NAMES.items():
         walker.click_into(name, text)
     walker.click("Continue to the camera")

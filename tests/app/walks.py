@@ -9,6 +9,7 @@ from subprocess import CompletedProcess
 from typing import TYPE_CHECKING
 
 import numpy as np
+from PySide6.QtCore import Qt
 
 from lightpen.arrays import FloatArray
 from lightpen.model.origin import Origin
@@ -45,6 +46,15 @@ class ReadOut:
     @property
     def u(self) -> FloatArray:
         return np.array(self.numbers[3:], dtype=np.float64)
+
+
+def set_up(walker: "Walker") -> None:
+    """Come from the first view to all fields of a station."""
+    walker.until(lambda: bool(walker.workbench.selection.preparation.names.station))
+    walker.tab_to("Set up my station")
+    walker.press(Qt.Key.Key_Return)
+    walker.tab_to("More")
+    walker.press(Qt.Key.Key_Return)
 
 
 def watch_the_swing(walker: "Walker") -> None:

@@ -137,7 +137,7 @@ def _draw_pen(
     painter.setPen(thick)
     painter.drawLine(seat, QPointF(*leds.mean(axis=0)))
     painter.setBrush(QColor(colors.muted))
-    painter.drawPolygon(_body(leds))
+    painter.drawPolygon(body_outline(leds))
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(colors.window))
     radius = max(0.03 * size, 2.0)
@@ -153,10 +153,10 @@ def _draw_outline(
     painter.setPen(QPen(color, 2, Qt.PenStyle.DashLine))
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.drawLine(seat, QPointF(*leds.mean(axis=0)))
-    painter.drawPolygon(_body(leds))
+    painter.drawPolygon(body_outline(leds))
 
 
-def _body(leds: FloatArray) -> QPolygonF:
+def body_outline(leds: FloatArray) -> QPolygonF:
     """Return the outline of what holds the LEDs (L, 2)."""
     corners = cv2.convexHull(leds.astype(np.float32))[:, 0]
     return QPolygonF([QPointF(x, y) for x, y in corners.tolist()])

@@ -76,7 +76,7 @@ class ChosenFiles(QObject):
             begin()
 
         self._withdraw()
-        self._read(self._write_samples, on_read, SourceChoice())
+        self._read(self._write_samples, on_read, brings_source=True)
 
     def use_files(self, files: FilesBeside) -> None:
         """Select the files beside recorded images once they are read."""
@@ -108,16 +108,20 @@ class ChosenFiles(QObject):
         self,
         function: Callable[[Report], OpenedFiles],
         take: Callable[[OpenedFiles], None],
-        source: SourceChoice | None = None,
+        *,
+        brings_source: bool = False,
     ) -> None:
         self._cancel()
         self._job = job = Job(function, self)
-        source = source or self._selection.preparation.source
+        source = self._selection.preparation.source
 
         def on_read(opened: OpenedFiles) -> None:
             self._job = None
-            take(_of_source(opened, source, self._selection.preparation))
-            self._show_faults(*map(worded, opened.faults))
+            faults = opened.faults
+            if not brings_source:
+                opened = _of_source(opened, source, self._selection.preparation)
+            take(opened)
+            self._show_faults(*map(worded, faults))
 
         job.start(on_read, self._on_failed)
 

@@ -1,5 +1,7 @@
 """The selection of a station, stored, and limited by its supervisors."""
 
+import getpass
+import platform
 from dataclasses import replace
 
 from PySide6.QtCore import QObject, Signal
@@ -16,6 +18,8 @@ from lightpen_app.work.stations import FilePaths, preparation_of, station_of
 
 # Nothing that is chosen for a trial is remembered.
 TRIAL = Names("Trial", "Trainee", "SIM-1", "T-1", "C-1", 10.0)
+
+FIRST_CONE = "C-1"
 
 
 def trial_of(preparation: Preparation) -> Preparation:
@@ -36,6 +40,14 @@ def trial_of(preparation: Preparation) -> Preparation:
 def is_trial_ready(preparation: Preparation) -> bool:
     """Return whether a trial can begin."""
     return preparation.names == TRIAL and not preparation.missing_inputs()
+
+
+def account_name() -> str:
+    """Return the name of the user's account; empty if the system has none."""
+    try:
+        return getpass.getuser()
+    except (ImportError, KeyError, OSError):
+        return ""
 
 
 class Selection(QObject):
@@ -92,6 +104,20 @@ class Selection(QObject):
         self._remember_last()
         self.station_changed.emit(station.files)
         self._follow(before)
+
+    def begin_station(self) -> None:
+        """Begin a station by what the computer tells; it has no image source yet."""
+        names = Names(platform.node() or "1", account_name(), cone=FIRST_CONE)
+        before = self._preparation.with_source(NO_SOURCE)
+        self.observe(replace(before, names=names))
+
+    def open_last_station(self) -> None:
+        """Restore the last station, or begin the first one."""
+        name = self._settings.last_station()
+        if name:
+            self.choose_station(name)
+        else:
+            self.begin_station()
 
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""

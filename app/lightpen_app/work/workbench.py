@@ -104,7 +104,7 @@ class Workbench(QObject):
         self._read_supervision()
         self.library.refresh()
         self.folder_watch.start()
-        self.selection.choose_station(self.settings.last_station())
+        self.selection.open_last_station()
         self.files.start()
         self.camera.open()
 

@@ -1788,73 +1788,6 @@
     </message>
 </context>
 <context>
-    <name>Introduction</name>
-    <message>
-        <source>What is this?</source>
-        <translation>这是什么？</translation>
-    </message>
-    <message>
-        <source>Where is the tip of the pen?</source>
-        <translation>光笔的测头在哪里？</translation>
-    </message>
-    <message>
-        <source>The pen carries LEDs that a camera observes. To measure points with the tip, the position of the tip relative to the LEDs must be known. The calibration determines this position.</source>
-        <translation>光笔上装有相机可见的 LED。要用测头测量，必须知道测头相对于 LED 的位置。标定就是确定这个位置。</translation>
-    </message>
-    <message>
-        <source>The tip rests in a cone while the pen is tilted to all sides. The only point of the pen that does not move is the tip centre.</source>
-        <translation>测头放在锥孔中，光笔向各个方向倾斜。光笔上唯一不动的点就是测头中心。</translation>
-    </message>
-    <message>
-        <source>select the pen and the tip.</source>
-        <translation>选择光笔和测头。</translation>
-    </message>
-    <message>
-        <source>check exposure and focus of the images.</source>
-        <translation>检查图像的曝光和对焦。</translation>
-    </message>
-    <message>
-        <source>check that the LED file belongs to this pen.</source>
-        <translation>检查 LED 文件是否属于这支光笔。</translation>
-    </message>
-    <message>
-        <source>tilt the pen as the arrow shows; no key is needed.</source>
-        <translation>按箭头倾斜光笔，无需按键。</translation>
-    </message>
-    <message>
-        <source>check the uncertainty of the tip, and accept it.</source>
-        <translation>检查测头的不确定度，然后接受。</translation>
-    </message>
-    <message>
-        <source>Start</source>
-        <translation>开始</translation>
-    </message>
-    <message>
-        <source>Camera</source>
-        <translation>相机</translation>
-    </message>
-    <message>
-        <source>LEDs</source>
-        <translation>LED</translation>
-    </message>
-    <message>
-        <source>Swing</source>
-        <translation>摆动</translation>
-    </message>
-    <message>
-        <source>Review</source>
-        <translation>复核</translation>
-    </message>
-    <message>
-        <source>Close</source>
-        <translation>关闭</translation>
-    </message>
-    <message>
-        <source>Try it with a simulated pen</source>
-        <translation>用模拟光笔试一试</translation>
-    </message>
-</context>
-<context>
     <name>ItemButton</name>
     <message>
         <source>Tip library...</source>
@@ -3112,33 +3045,6 @@
     <message>
         <source>Ball diameter</source>
         <translation>测球直径</translation>
-    </message>
-</context>
-<context>
-    <name>NewcomerPanel</name>
-    <message>
-        <source>New here?</source>
-        <translation>第一次使用？</translation>
-    </message>
-    <message>
-        <source>Try the whole procedure without a pen or a camera. Simulated results are stored apart from real tips.</source>
-        <translation>无需光笔和相机即可体验全部流程。模拟结果与真实测头分开保存。</translation>
-    </message>
-    <message>
-        <source>Try it with a simulated pen</source>
-        <translation>用模拟光笔试一试</translation>
-    </message>
-    <message>
-        <source>What is this?</source>
-        <translation>这是什么？</translation>
-    </message>
-    <message>
-        <source>Play the demo</source>
-        <translation>播放演示</translation>
-    </message>
-    <message>
-        <source>Opens another window that runs through all steps automatically.</source>
-        <translation>在另一窗口中自动走完所有步骤。</translation>
     </message>
 </context>
 <context>
@@ -4419,8 +4325,16 @@ needed</source>
 <context>
     <name>SetupView</name>
     <message>
+        <source>More</source>
+        <translation>更多</translation>
+    </message>
+    <message>
         <source>Show the tips of this station</source>
         <translation>显示本工位的测头</translation>
+    </message>
+    <message>
+        <source>Other ways to begin</source>
+        <translation>其他开始方式</translation>
     </message>
 </context>
 <context>
@@ -4584,6 +4498,10 @@ needed</source>
         <translation>开始</translation>
     </message>
     <message>
+        <source>Where is the tip of the pen?</source>
+        <translation>光笔的测头在哪里？</translation>
+    </message>
+    <message>
         <source>Set up station</source>
         <translation>设置工位</translation>
     </message>
@@ -4592,8 +4510,16 @@ needed</source>
         <translation>选择测头，将其放入锥孔，然后开始摆动。</translation>
     </message>
     <message>
+        <source>The tip rests in a cone while the pen is tilted to all sides; a camera observes the LEDs of the pen. The only point of the pen that does not move is the tip centre.</source>
+        <translation>测头停在锥孔中，光笔向各个方向倾斜；相机观察光笔的 LED。光笔上唯一不动的点就是测头中心。</translation>
+    </message>
+    <message>
         <source>Enter what you are calibrating. Entries are saved for this station.</source>
         <translation>填写标定对象。所填内容按工位保存。</translation>
+    </message>
+    <message>
+        <source>Choose how to begin.</source>
+        <translation>请选择如何开始。</translation>
     </message>
     <message>
         <source>Tip {0} is retired. Choose another tip, or reactivate it in the tip library.</source>
@@ -5571,6 +5497,37 @@ mm</translation>
     <message>
         <source>PEN DETECTED</source>
         <translation>已检测到光笔</translation>
+    </message>
+</context>
+<context>
+    <name>WelcomeView</name>
+    <message>
+        <source>Folder of the recorded images</source>
+        <translation>录制图像的文件夹</translation>
+    </message>
+    <message>
+        <source>Try it with a simulated pen</source>
+        <translation>用模拟光笔试一试</translation>
+    </message>
+    <message>
+        <source>The whole procedure without pen, camera or any entry.</source>
+        <translation>无需光笔、相机或任何输入即可体验整个流程。</translation>
+    </message>
+    <message>
+        <source>Calibrate from recorded images</source>
+        <translation>用已记录的图像标定</translation>
+    </message>
+    <message>
+        <source>Choose a folder. Files of camera and LEDs in it are found.</source>
+        <translation>选择一个文件夹，其中的内参文件和 LED 文件会自动找到。</translation>
+    </message>
+    <message>
+        <source>Set up my station</source>
+        <translation>设置我的工位</translation>
+    </message>
+    <message>
+        <source>Enter pen and tip, and choose the camera.</source>
+        <translation>输入光笔和测头，并选择相机。</translation>
     </message>
 </context>
 <context>

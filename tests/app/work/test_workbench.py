@@ -195,7 +195,8 @@ def test_a_first_start_has_no_source_until_one_is_chosen(
     qtbot.waitUntil(lambda: not first.files.is_reading)
     now = first.selection.preparation
 
-    assert now.names == Names()
+    assert (now.names.pen, now.names.tip, now.names.cone) == ("", "", "C-1")
+    assert now.names.station
     assert now.camera is not None
     assert (now.camera.width, now.camera.height) == (1224, 1024)
     assert now.leds_missing_inputs() == ()

@@ -18,6 +18,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.tooltips import set_tooltip
+from lightpen_app.look.words import shortened
 from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
@@ -25,6 +26,8 @@ from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
+
+LONGEST_LABEL = 32  # letters of a camera on a button
 
 
 class SourcePanel(Translated, QGroupBox):
@@ -183,7 +186,8 @@ class SourcePanel(Translated, QGroupBox):
 
     def _offer(self, source: Source, device: FoundDevice) -> PushButton:
         button, choice = PushButton(), SourceChoice(source.key, device.place)
-        button.setText(f"{device.label} ({worded(source.name)})")
+        button.setText(shortened(device.label, LONGEST_LABEL))
+        set_tooltip(button, f"{device.label}, {worded(source.name)}")
         button.clicked.connect(lambda: self._choose(choice))
         return button
 

@@ -142,6 +142,14 @@ class NamesForm(Translated, QWidget):
         """List the stations that are known."""
         self._station.set_known(names)
 
+    def set_more(self, more: bool) -> None:
+        """Show also what has a default: station, operator, cone, nominal centre."""
+        self._place.setVisible(more)
+        self._nominal_tip.setVisible(more)
+        cone = self._cone, self._lists[ItemKind.CONE], self._labels[self._cone]
+        for each in (*cone, self._labels[self._nominal_tip]):
+            each.setVisible(more)
+
     def set_choices(self, kind: ItemKind, choices: Sequence[ItemChoice]) -> None:
         """List the items of the library that can be chosen."""
         self._lists[kind].set_choices(choices)

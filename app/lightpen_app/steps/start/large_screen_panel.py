@@ -1,4 +1,4 @@
-"""Panel of Start on a very large screen: trend of the tip, or an introduction."""
+"""Panel of Start on a very large screen: trend of the tip."""
 
 from typing import TYPE_CHECKING
 
@@ -6,7 +6,6 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.work.job import LatestJob, Report
 
@@ -18,7 +17,7 @@ LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
 
 
 class LargeScreenPanel(QWidget):
-    """Shows the trend of a tip, or an introduction without one."""
+    """Shows the trend of a tip that has one."""
 
     def __init__(self, logbook: LazyLogbook) -> None:
         super().__init__()
@@ -27,12 +26,10 @@ class LargeScreenPanel(QWidget):
 
         # Widgets
         self._trend = LazyWidget(_make_trend)
-        self._pictures = LazyWidget(_make_pictures)
 
         # Layout
-        vertical_layout(self, self._trend, self._pictures, spacing=-1)
-        for each in (self._trend, self._pictures):
-            each.hide()
+        vertical_layout(self, self._trend, spacing=-1)
+        self._trend.hide()
 
     def set_value(self, pen: str, tip: str, *, is_simulated: bool) -> None:
         """Show another tip; one without a name has no trend."""
@@ -62,7 +59,6 @@ class LargeScreenPanel(QWidget):
         if trend is not None and has_trend:
             self._trend.content().set_value(trend)
         self._trend.setVisible(has_trend)
-        self._pictures.setVisible(not has_trend)
 
 
 def _make_trend() -> "TrendPanel":
@@ -71,9 +67,3 @@ def _make_trend() -> "TrendPanel":
     from lightpen_app.widgets.trend_panel import TrendPanel
 
     return TrendPanel()
-
-
-def _make_pictures() -> Pictures:
-    pictures = Pictures()
-    pictures.set_very_large()
-    return pictures

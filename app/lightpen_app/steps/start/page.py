@@ -5,6 +5,7 @@ from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 from typing_extensions import override
 
+from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
@@ -20,15 +21,18 @@ from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsControl
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.setup_view import SetupView
+from lightpen_app.steps.start.welcome_view import WelcomeView
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.work.selection import is_trial_ready
+from lightpen_app.work.selection import TRIAL, is_trial_ready
 from lightpen_app.work.workbench import Workbench
+
+DAY, SETUP, WELCOME = range(3)  # the views
 
 
 class StartPage(ResponsiveLayout, Page):
-    """Shows the day page; before a station is set up, and on request, its set-up."""
+    """Shows the day page; on request the set-up; before all, how to begin."""
 
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
@@ -47,6 +51,7 @@ class StartPage(ResponsiveLayout, Page):
         self._day = DayView()
         is_known = bool(workbench.selection.stations())
         self._setup = setup = SetupView(workbench, is_known=is_known)
+        self._welcome = WelcomeView()
         self._result = LastResultPanel(workbench.around.now)
         self._large = LargeScreenPanel(workbench.run.logbook)
         self._views = QStackedWidget()
@@ -69,18 +74,21 @@ class StartPage(ResponsiveLayout, Page):
         fill(self._day.side, self._result, 1)
         content = QWidget()
         vertical_layout(content, (self._day, 1), (self._large, 1))
-        for each in (content, setup):
+        for each in (content, setup, self._welcome):
             scroll = PageScroll()
             scroll.setWidget(each)
             self._views.addWidget(scroll)
-        self.show_setup()
+        self._views.setCurrentIndex(SETUP if is_known else WELCOME)
 
         # Connections
         setup.names.station_entered.connect(self.show_missing_input)
         setup.limits.all_requested.connect(self._all_limits.open)
-        setup.newcomer.trial_requested.connect(
+        setup.welcome_requested.connect(self.show_welcome)
+        self._welcome.trial_requested.connect(
             lambda: self._chosen_files.use_trial(self._begin_trial)
         )
+        self._welcome.images_chosen.connect(self._begin_station)
+        self._welcome.station_requested.connect(self._begin_station)
         setup.folder.change_requested.connect(self.data_folder_requested)
         setup.done.connect(self.show_day)
         self._day.setup_requested.connect(self.show_setup)
@@ -101,16 +109,28 @@ class StartPage(ResponsiveLayout, Page):
     @property
     def is_day(self) -> bool:
         """Whether the day page is shown, and not the set-up of the station."""
-        return self._views.currentIndex() == 0
+        return self._views.currentIndex() == DAY
+
+    @property
+    def _is_welcome(self) -> bool:
+        return self._views.currentIndex() == WELCOME
 
     @override
     def heading(self) -> str:
+        if self._is_welcome:
+            return self.tr("Where is the tip of the pen?")
         return self.title() if self.is_day else self.tr("Set up station")
 
     @override
     def lead(self) -> str:
         if self.is_day:
             return self.tr("Choose a tip, seat it in the cone and start the swing.")
+        if self._is_welcome:
+            return self.tr(
+                "The tip rests in a cone while the pen is tilted to all sides; a "
+                "camera observes the LEDs of the pen. The only point of the pen that "
+                "does not move is the tip centre."
+            )
         return self.tr(
             "Enter what you are calibrating. Entries are saved for this station."
         )
@@ -122,6 +142,8 @@ class StartPage(ResponsiveLayout, Page):
     @override
     def main_action(self) -> MainAction:
         why_not = self._entries.why_not_on()
+        if self._is_welcome:
+            why_not = self.tr("Choose how to begin.")
         if not self.is_day:
             return MainAction(self.tr("Continue to the camera"), why_not)
         action = self._control.main_action()
@@ -137,13 +159,17 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def show_missing_input(self) -> None:
+        if self._is_welcome:
+            self._welcome.trial.setFocus()
+            return
         missing_inputs = self._entries.typed().start_missing_inputs()
         if missing_inputs:
             self.show_setup()
-            self._setup.names.focus_missing_input(missing_inputs[0])
 
     @override
     def first_control(self) -> QWidget | None:
+        if self._is_welcome:
+            return self._welcome.trial
         return self._day.first_control() if self.is_day else None
 
     @override
@@ -168,16 +194,27 @@ class StartPage(ResponsiveLayout, Page):
 
     def show_day(self) -> None:
         """Show the tips of the station."""
-        self._views.setCurrentIndex(0)
+        self._views.setCurrentIndex(DAY)
         if self.isVisible():
             self._day.first_control().setFocus()
         self._refresh()
 
     def show_setup(self) -> None:
         """Show the settings page."""
-        self._views.setCurrentIndex(1)
+        self._views.setCurrentIndex(SETUP)
+        missing = self._entries.typed().start_missing_inputs()
+        first = missing[0] if missing else MissingInput.STATION
+        if first not in (MissingInput.PEN, MissingInput.TIP):
+            self._setup.set_more(True)
         if self.isVisible():
-            self._setup.names.focus_missing_input(MissingInput.STATION)
+            self._setup.names.focus_missing_input(first)
+        self._refresh()
+
+    def show_welcome(self) -> None:
+        """Show how to begin."""
+        self._views.setCurrentIndex(WELCOME)
+        if self.isVisible():
+            self._welcome.trial.setFocus()
         self._refresh()
 
     @override
@@ -185,6 +222,7 @@ class StartPage(ResponsiveLayout, Page):
         is_narrow = self._room.is_narrow
         self._day.set_narrow(is_narrow)
         self._setup.set_narrow(is_narrow)
+        self._welcome.set_narrow(is_narrow)
         self._result.set_room(self._room)
         self._large.setVisible(self._room.is_very_large)
         self._last.show_trend()
@@ -233,15 +271,26 @@ class StartPage(ResponsiveLayout, Page):
 
     def _begin_trial(self) -> None:
         if not self._camera.live.is_open:
-            self.show_setup()  # until there is an image; the day page shows none
+            self.show_welcome()  # until there is an image; the day page shows none
             self._camera.open()
         elif is_trial_ready(self._selection.preparation) and self.isVisible():
             self.step_requested.emit("swing")
 
+    def _begin_station(self, images: str = "") -> None:
+        """Set up a station, with recorded images or without a source."""
+        names = self._selection.preparation.names
+        if names.station in ("", TRIAL.station):
+            self._selection.begin_station()
+        if images:
+            source = SourceChoice(SourceKind.RECORDED, images)
+            chosen = self._selection.preparation.with_source(source)
+            self._selection.set_preparation(chosen)
+        self.show_setup()
+
     def _show_trial(self) -> None:
         is_on = self._run.status.state is not None
         why_not = self.tr("A swing is in progress.") if is_on else ""
-        self._setup.newcomer.set_why_not(why_not)
+        self._welcome.trial.set_why_not(why_not)
 
     def _on_verification_requested(self) -> None:
         self._entries.settle()

@@ -1,15 +1,14 @@
 """Somebody who has never seen the program: explained, tried out, and guided."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from PySide6.QtCore import QProcess, Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QFileDialog
 
 from lightpen.model.origin import Origin
-from lightpen_app.steps.start import newcomer_panel
-from lightpen_app.steps.start.newcomer_panel import Introduction
-from lightpen_app.widgets.pen_in_space import PenInSpace
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
 
     walker.until(is_swinging)
     assert reasons <= {
-        "Enter the name of the station.",
+        "Enter the serial number of the pen.",
         "No image received from the camera yet.",
         "Swing the pen first.",
     }
@@ -43,6 +42,7 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
     assert settings.stations() == ()  # nobody wants it back at the next start
     walker.window.go_to(0)
     walker.click("Set up station...")
+    walker.click("Other ways to begin")
     assert not walker.control("Try it with a simulated pen").isEnabled()
 
 
@@ -65,48 +65,62 @@ def test_enter_goes_to_the_first_field_that_is_missing(
     open_wizard: "OpenWizard",
 ) -> None:
     walker = open_wizard()
+    walker.click("Set up my station")
+    walker.click("More")
+    walker.tab_to("Station")
     walked = []
-    for name in ("Hall 9", "Ann", "LP-9", "T-9"):
+    for name in ("Hall 9", "LP-9"):
+        walker.press(Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
         walker.type(name)
         walker.press(Qt.Key.Key_Return)
         focused = QApplication.focusWidget()
         assert focused is not None
         walked.append(focused.accessibleName())
 
-    assert walked == ["Operator", "Pen serial number", "Probe tip", "Cone"]
-    walker.type("C-9")
+    assert walked == ["Pen serial number", "Probe tip"]
+    walker.type("T-9")
     walker.press(Qt.Key.Key_Return)
     walker.until_shows("Camera")
 
 
 @pytest.mark.slow
-def test_the_introduction_shows_pen_and_cone_and_leads_to_the_trial(
-    open_wizard: "OpenWizard",
+def test_for_recorded_images_only_pen_and_tip_are_asked(
+    open_wizard: "OpenWizard", tmp_path: Path
 ) -> None:
     walker = open_wizard()
-    walker.click("What is this?")
-    (introduction,) = walker.window.findChildren(Introduction)
+    selection = walker.workbench.selection
+    walker.until(lambda: bool(selection.preparation.names.station))
+    walker.click("Calibrate from recorded images")
+    (dialog,) = walker.window.findChildren(QFileDialog)
+    dialog.fileSelected.emit(str(tmp_path))
+    dialog.close()
 
-    pictures = introduction.findChildren(PenInSpace)
-    reported = " ".join(label.text() for label in introduction.findChildren(QLabel))
-    assert [each.value() is not None for each in pictures] == [True, True]
-    assert all(
-        step in reported for step in ("Start", "Camera", "LEDs", "Swing", "Review")
-    )
-
-    introduction.accept()
-
-    walker.until_shows("Swing")
+    walker.until_says("Set up station")
+    assert selection.preparation.source == SourceChoice("recorded", str(tmp_path))
+    assert not walker.offers("Station")
+    assert walker.offers("Probe tip")
 
 
 @pytest.mark.slow
-def test_the_demo_is_played_in_a_window_of_its_own(
-    open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
+def test_a_station_is_set_up_by_pen_and_tip_and_simulates_nothing(
+    open_wizard: "OpenWizard",
 ) -> None:
-    started: list[tuple[object, ...]] = []
-    monkeypatch.setattr(QProcess, "startDetached", lambda *words: started.append(words))
     walker = open_wizard()
+    walker.until(lambda: bool(walker.workbench.selection.preparation.names.station))
+    assert not walker.tells("SIMULATED")
+    walker.click("Try it with a simulated pen")
+    walker.until_shows("Swing")
+    walker.window.go_to(0)
+    walker.click("Set up station...")
+    walker.click("Other ways to begin")
+    walker.click("Set up my station")
 
-    walker.click("Play the demo")
-
-    assert started == [newcomer_panel.DEMO]
+    names = walker.workbench.selection.preparation.names
+    assert (names.pen, names.tip, names.cone) == ("", "", "C-1")
+    assert names.station != "Trial"
+    assert not walker.tells("SIMULATED")
+    walker.type("LP-9")
+    walker.enter("Probe tip", "T-9")
+    walker.press(Qt.Key.Key_Return)
+    walker.until_shows("Camera")
+    assert walker.tells("Choose your camera.")

@@ -1,0 +1,186 @@
+"""The first view of a new user: three cards with a picture each."""
+
+import math
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen.model.posture import Posture
+from lightpen.simulator.swings import PAPER_TIP, paper_pen
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, text_label
+from lightpen_app.widgets.pen_in_space import (
+    DisplayedPosture,
+    PenInSpace,
+    body_outline,
+    seen_from_behind,
+)
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+
+LEAST_HEIGHT, LARGEST_HEIGHT = 10 * GRID, 22 * GRID  # px, of a picture
+WORDS_HEIGHT = 21 * GRID  # px, with the margins
+LEANING = Posture(math.radians(25), math.radians(200), math.radians(15))
+RIGHT = Posture(math.radians(25), 0.0, math.radians(-15))
+SHOWN = DisplayedPosture(paper_pen(), np.array(PAPER_TIP), LEANING, RIGHT)
+Draw: TypeAlias = Callable[[QPainter, QRectF, Colors], None]
+
+
+class WelcomeView(Translated, QWidget):
+    """Offers a trial, recorded images, or the set-up of a station."""
+
+    trial_requested = Signal()  # calibrate a simulated pen
+    images_chosen = Signal(str)  # folder of recorded images
+    station_requested = Signal()  # set up a station
+
+    def __init__(self) -> None:
+        super().__init__()
+
+        # Widgets
+        pen = PenInSpace()
+        pen.set_value(SHOWN)
+        self.trial = _Card(pen)
+        self._images = _Card(_Drawing(_draw_images))
+        self._station = _Card(_Drawing(_draw_station))
+
+        # Layout
+        layout = vertical_layout(self)
+        self._cards = self.trial, self._images, self._station
+        cards = ((each, 1) for each in self._cards)
+        horizontal_layout(layout, *cards, spacing=3 * GRID)
+        layout.addStretch(1)
+
+        # Connections
+        self.trial.clicked.connect(self.trial_requested)
+        self._images.clicked.connect(self._on_images_clicked)
+        self._station.clicked.connect(self.station_requested)
+
+        self._retranslate()
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Use smaller pictures where there is little width."""
+        for card in self._cards:
+            card.set_narrow(narrow)
+
+    def _on_images_clicked(self) -> None:
+        dialog = QFileDialog(self, self.tr("Folder of the recorded images"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.fileSelected.connect(self.images_chosen)
+        dialog.open()
+
+    def _retranslate(self) -> None:
+        self.trial.set_words(
+            self.tr("Try it with a simulated pen"),
+            self.tr("The whole procedure without pen, camera or any entry."),
+        )
+        self._images.set_words(
+            self.tr("Calibrate from recorded images"),
+            self.tr("Choose a folder. Files of camera and LEDs in it are found."),
+        )
+        self._station.set_words(
+            self.tr("Set up my station"),
+            self.tr("Enter pen and tip, and choose the camera."),
+        )
+
+
+class _Card(PushButton):
+    """A large button: picture, title and words."""
+
+    def __init__(self, picture: QWidget) -> None:
+        super().__init__()
+        expanding = QSizePolicy.Policy.Expanding
+        picture.setSizePolicy(expanding, expanding)
+        self._picture = picture
+        self._title = text_label(TextSize.LEAD)
+        self._words = text_label(TextSize.BODY, Tone.QUIET)
+        vertical_layout(self, picture, self._title, self._words, 1, margins=2 * GRID)
+        for each in (picture, self._title, self._words):
+            each.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    def set_words(self, title: str, words: str) -> None:
+        """Set title and words."""
+        self.setAccessibleName(title)
+        self._title.setText(title)
+        self._words.setText(words)
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Set the size of the picture, and by it the card's."""
+        height = LEAST_HEIGHT if narrow else LARGEST_HEIGHT
+        self._picture.setFixedHeight(height)
+        self.setFixedHeight(height + WORDS_HEIGHT)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(20 * GRID, self.minimumHeight())
+
+
+class _Drawing(QWidget):
+    """A picture drawn in the colours of the window."""
+
+    def __init__(self, draw: Draw) -> None:
+        super().__init__()
+        self._draw = draw
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._draw(painter, QRectF(self.rect()), colors_of(self.palette()))
+
+
+def _draw_images(painter: QPainter, box: QRectF, colors: Colors) -> None:
+    """Draw a pile of three images with the LEDs of the pen."""
+    size = 0.66 * min(box.width() / 1.3, box.height())
+    frame = QRectF(0.0, 0.0, 1.3 * size, size)
+    frame.moveCenter(box.center())
+    for step in (-1, 0, 1):
+        image = frame.translated(0.14 * size * step, 0.14 * size * step)
+        painter.setPen(QPen(QColor(colors.raised), 2))
+        painter.setBrush(QColor(colors.muted))
+        painter.drawRect(image)
+    _draw_leds(painter, image, colors.raised)
+
+
+def _draw_station(painter: QPainter, box: QRectF, colors: Colors) -> None:
+    """Draw a camera on its stand that sees the LEDs of the pen."""
+    size = min(box.width() / 2.2, box.height())
+    center = box.center()
+    camera = QRectF(center.x() - size, center.y() - 0.3 * size, 0.42 * size, 0.3 * size)
+    lens = QPointF(camera.right() + 0.08 * size, camera.center().y())
+    pen = QRectF(center.x() + 0.15 * size, box.top(), 0.8 * size, box.height())
+    painter.setPen(QPen(QColor(colors.muted), 0.04 * size))
+    for foot in (-0.2, 0.0, 0.2):
+        bottom = QPointF(camera.center().x() + foot * size, center.y() + 0.45 * size)
+        painter.drawLine(QPointF(camera.center().x(), camera.bottom()), bottom)
+    painter.setPen(QPen(QColor(colors.edge), 1, Qt.PenStyle.DashLine))
+    for corner in (pen.topLeft(), pen.bottomLeft()):
+        painter.drawLine(lens, corner + QPointF(0.2 * size, 0.0))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colors.muted))
+    painter.drawRoundedRect(camera, 4, 4)
+    painter.drawEllipse(lens, 0.1 * size, 0.12 * size)
+    _draw_leds(painter, pen, colors.raised, body=colors.muted)
+
+
+def _draw_leds(painter: QPainter, box: QRectF, color: str, body: str = "") -> None:
+    """Draw the LEDs of the pen in the middle of a box, and its body in a colour."""
+    leds = seen_from_behind(SHOWN, LEANING) * (1, -1)
+    middle, extent = (leds.max(axis=0) + leds.min(axis=0)) / 2, np.ptp(leds, axis=0)
+    scale = 0.7 * float(min(np.array([box.width(), box.height()]) / extent))
+    leds = (leds - middle) * scale + box.center().toTuple()
+    if body:
+        pen = QPen(QColor(body), 14)
+        pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+        painter.setPen(pen)
+        painter.setBrush(QColor(body))
+        painter.drawPolygon(body_outline(leds))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(color))
+    for x, y in leds.tolist():
+        painter.drawEllipse(QPointF(x, y), 4, 4)
