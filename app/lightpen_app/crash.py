@@ -120,17 +120,17 @@ def _without_home(text: str) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the program and its libraries."""
+    """Return the versions of the program, first, and of its libraries."""
     # Imported here, as it imports an e-mail library and would delay the start.
     from importlib.metadata import PackageNotFoundError, version
 
-    found = {"Python": platform.python_version(), "Qt": qVersion()}
+    found: dict[str, str] = {}
     for package in PACKAGES:
         try:
             found[package] = version(package)
         except PackageNotFoundError:
             continue
-    return found
+    return found | {"Python": platform.python_version(), "Qt": qVersion()}
 
 
 def _circumstances(now: datetime) -> str:

@@ -86,6 +86,7 @@ def test_a_report_says_what_happened_where_and_with_which_versions(
     text = Path(blocker.args[0]).read_text("utf-8")
     assert "RuntimeError: the bug" in text
     assert "raise_and_report" in text
+    assert next(iter(versions())) == "lightpen"
     for name, number in versions().items():
         assert f"{name}: {number}" in text
 

@@ -10074,7 +10074,7 @@ mm</translation>
     </message>
     <message>
         <source>Measured</source>
-        <translation>测得值</translation>
+        <translation>测量时间</translation>
     </message>
     <message>
         <source>Computed</source>
