@@ -45,15 +45,13 @@ def verification_rows(workers: Workers, data: Path | None) -> list[Row]:
     share = float(np.mean(workers.map(count, list(range(N_PARTS)))))
     low, high = SHARE_LIMITS
     whole = verified()
-    assessment = whole.state.assessment
-    is_passed = assessment is not None and assessment.is_accepted
     return [
         *rows,
         Row(
             "verified by the simulated operator: cone, ring, length, without a key",
             f"{whole.seconds:.0f} s",
             f"{LONGEST:.0f} s",
-            met=whole.is_done and is_passed and whole.seconds <= LONGEST,
+            met=whole.is_done and whole.is_accepted and whole.seconds <= LONGEST,
         ),
         Row(
             f"{N_PARTS * N_CALIBRATIONS * N_TOUCHES} touches: in their 95 % ellipsoid",

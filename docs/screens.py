@@ -99,7 +99,7 @@ N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 N_RECEIVED = 1240  # images, by the camera
-CHOICES = VerificationChoices((FIXED_POINT.kind,), (FixedPointOptions(6, n_frames=5),))
+CHOICES = VerificationChoices(FIXED_POINT.kind, (FixedPointOptions(6, n_frames=5),))
 PART_CHOICES = VerificationChoices(
     options=(PartOptions(plate_plan().limited_to({"top", "hole 1", "dome"})),)
 )

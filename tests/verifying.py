@@ -42,10 +42,11 @@ RING = Artefact(ArtefactKind.RING, 31.751, 0.001)
 LENGTH = Artefact(ArtefactKind.LENGTH, 150.0, 0.001)
 ARTEFACTS = artefact_plan("Ring and bar", [RING, LENGTH], {FeatureKind.CIRCLE: 10})
 CHOICES = VerificationChoices(
-    (FIXED_POINT.kind, PART.kind),
+    FIXED_POINT.kind,
     (FixedPointOptions(4, n_frames=3), PartOptions(ARTEFACTS)),
     n_frames=3,
 )
+PART_CHOICES = replace(CHOICES, kind=PART.kind)
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
 TABLE = Hold((0.0, 80.0, 0.0))
 BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))

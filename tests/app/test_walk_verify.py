@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QApplication, QListWidget
-from tests.accepted_tip import Hold, accept_tip, leant
+from tests.accepted_tip import accept_tip, leant
 from tests.app.room import scrolled_sideways
 from tests.verifying import TIMEOUT, Verifier
 
@@ -19,7 +19,6 @@ from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.drift import DRIFT, VISIT_POINTS
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.registry import TASKS
 from lightpen_app.widgets.fitted_window import FRAME
@@ -159,18 +158,14 @@ def test_the_pen_is_shown_over_its_swings_and_no_file_is_made_that_is_no_better(
 
 @pytest.fixture
 def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
-    """Somebody was killed amid a verification by fixed point and witness."""
+    """Somebody was killed amid a tip check."""
     folder, copy = (
         known.workbench.folder,
         tmp_path / "reinstated from the earlier calibration.",
     )
     kept = folder / SIMULATED / VERIFICATIONS
     verifier = Verifier(folder, known.workbench.selection.preparation)
-    kinds = (FIXED_POINT.kind, DRIFT.kind)
-    verifier.come(VerificationChoices(kinds, FIVE, n_frames=2))
-    for _ in range(VISIT_POINTS):
-        verifier.touch(Hold(tilt=0.0))
-        verifier.see(verifier.holder.away())
+    verifier.come(VerificationChoices(FIXED_POINT.kind, FIVE, n_frames=2))
     verifier.touch(*leant(5)[:2])
     shutil.copytree(kept, copy)
     verifier.runner.shut_down()
@@ -194,9 +189,8 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker.click("Let the simulated operator probe")
     walker.until(lambda: walker.main_button().text() == "Measure a part")
 
-    walker.until_tells("The drift reference stays within")
     kinds = [each["verification"] for each in records(walker)]
-    assert kinds == [FIXED_POINT.kind, DRIFT.kind, CONCLUSION]
+    assert kinds == [FIXED_POINT.kind, CONCLUSION]
     walker.click_step("Start")
     walker.until(lambda: not walker.says("Interrupted verification"))
 

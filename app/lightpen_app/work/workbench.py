@@ -14,7 +14,6 @@ from lightpen.record.folder.data_folder import sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.streaming.points import points_of
-from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
@@ -156,8 +155,7 @@ class Workbench(QObject):
     def _update_runners(self) -> None:
         chosen, choices = self.selection.preparation, self.selection.choices
         self.run.runner.ask(lambda workflow: workflow.choose(chosen))
-        drift = {DRIFT.kind} & {*choices.kinds}
-        part = replace(choices, kinds=(*drift, PART.kind))
+        part = replace(choices, kind=PART.kind)
         self.verification.runner.ask(lambda workflow: workflow.choose(chosen, choices))
         self.measuring.runner.ask(lambda workflow: workflow.choose(chosen, part))
         self.streaming.choose(chosen)

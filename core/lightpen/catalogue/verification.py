@@ -3,7 +3,6 @@
 MESSAGES = {
     "verification.no-supervisor": "The tip is outside the limits. {why} Only a supervisor can accept it, with a reason.",
     "verification.other-file": "{path} is not a {what}, or was modified after it was written. Give the original JSON file.",
-    "verification.no-task": "No task is selected. Select at least one.",
     "verification.no-tip": "Tip {tip} of pen {pen} has no accepted calibration. Calibrate it and accept the result; then it can be verified.",
     "verification.no-rig-folders": "{place} contains no images of two cameras. Give a folder that contains one folder per camera, named as in the rig file: {names}.",
     "verification.other-number-of-cameras": "{place} contains the images of {n_given} cameras; the verification uses {n_cameras}. Give the intrinsics file or the rig file of these images.",

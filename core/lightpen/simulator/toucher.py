@@ -36,7 +36,7 @@ class ProbingOperator:
     def follow(self, setup: SessionSetup, state: SessionState) -> None:
         """React to a state of the verification; reseat a lifted tip."""
         task, operator = state.task(setup), self._operator
-        n_runs = len(state.runs) + len(state.visits)
+        n_runs = len(state.runs)
         options = None if task is None else setup.choices.options_of(task)
         wanted = _TouchGoal(task, options, n_runs, len(state.touches))
         is_lifted = operator.doing in (HandActivity.LIFTED, HandActivity.ABSENT)

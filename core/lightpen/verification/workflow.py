@@ -34,7 +34,6 @@ from lightpen.verification.session.session import (
     SessionTransition,
     end_task,
     setup_of,
-    touched_anew,
     with_moved_part,
     with_other_choices,
     without_last_touch,
@@ -57,7 +56,6 @@ from lightpen.verification.storage.resuming import (
 )
 from lightpen.verification.storage.session_files import SessionKeeping
 from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.registry import AnyTask
 
 ANOTHER = message("verification.another-under-way")
 NOT_READY = message("verification.not-ready")
@@ -149,15 +147,6 @@ class VerificationWorkflow:
         self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here))
         self._read_tip()
-
-    def touch_anew(self, task: AnyTask) -> None:
-        """Repeat one task; its previous result stays in the archive."""
-        status, setup, state = self._status, self._status.setup, self._status.state
-        if setup is not None and state is not None:
-            if task is PART:
-                setup = replace(setup, choices=setup.choices.with_moves(()))
-            self._publish(replace(status, setup=setup, accepted_by=""))
-            self._touch_again(touched_anew(state, task))
 
     def undo(self) -> None:
         """Take back the last point of the current run; its images do not count."""
@@ -255,7 +244,7 @@ class VerificationWorkflow:
         self._live.begin(before.lamps)
         lamp_drift = self._live.lamp_drift(before.setup)
         try:
-            self._keeping.take_over(path, before, lamp_drift)
+            self._keeping.take_over(path, before)
         except FileError as error:
             self._on_not_resumed(error.message)
             return
@@ -274,8 +263,8 @@ class VerificationWorkflow:
                 refusal=self._why_not(before.tip),
             )
         )
-        self._keep()
-        self._conclude_done()
+        if self._status.is_done:
+            self._conclude(is_written=bool(before.files))
         self._publish(self._status)
 
     def cancel(self) -> None:
@@ -321,7 +310,7 @@ class VerificationWorkflow:
         header = record_header(
             preparation,
             {
-                "verification": "" if status.task is None else status.task.kind,
+                "verification": self._choices.kind,
                 "tip_file": tip.tip_file.path.name,
                 "tip_sha256": tip.tip_file.sha256,
             },
@@ -329,27 +318,15 @@ class VerificationWorkflow:
         return new_record(self._keeping.root(tip), tip.names, header)
 
     def _become(self, transition: SessionTransition) -> None:
-        before, state = self._status.state, transition.state
-        finished = transition.finished
-        self._status = replace(self._status, state=state)
+        before, setup = self._status.state, self._status.setup
+        self._status = replace(self._status, state=transition.state)
         happened = event_kinds(before, transition)
-        if finished is not None:
-            tip, setup = self._status.tip, self._status.setup
-            assert tip is not None
-            assert setup is not None
+        if transition.finished is not None and setup is not None:
             lamp_drift = self._live.lamp_drift(setup)
-            self._keeping.add_task(finished, tip, lamp_drift)
             self._status = replace(self._status, lamp_drift=lamp_drift)
             happened.append(ending(self._status))
-        self._keep()
-        if finished is not None:
-            self._conclude_done()
+            self._conclude()
         self._publish(self._status, *happened)
-
-    def _touch_again(self, state: SessionState) -> None:
-        """Continue with another state, in which points have to be probed again."""
-        self._keeping.forget_but(state)
-        self._publish(replace(self._status, state=with_pen_at_rest(state)))
 
     def _rested(self) -> VerificationStatus:
         """Return the status for a pen that may have been put down."""
@@ -366,22 +343,29 @@ class VerificationWorkflow:
         self._choices = choices
         if self._status.reading is ReadingState.IMAGES:
             self.cancel()  # they use the previous choices
-        status, setup, state = self._status, self._status.setup, self._status.state
-        if setup is None or state is None:
+        status, tip, setup = self._status, self._status.tip, self._status.setup
+        if tip is None or setup is None:
             return
-        before = state
-        setup, state = with_other_choices(setup, state, choices)
-        refusal = self._why_not(status.tip)
-        self._status = replace(status, setup=setup, state=state, refusal=refusal)
-        is_measured_again = self._keeping.add_again(before, state)
-        if is_measured_again:
-            self._status = replace(self._status, accepted_by="")
-        if state.touching is not before.touching:
-            self._touch_again(state)
-        self._keep()
-        if is_measured_again:
-            self._conclude_done()
-        self._publish(self._status)
+        if choices.kind != setup.choices.kind:
+            self._begin(tip)
+            return
+        setup = with_other_choices(setup, choices)
+        refusal = self._why_not(tip)
+        self._publish(replace(status, setup=setup, refusal=refusal))
+
+    def _begin(self, tip: CurrentTip) -> None:
+        """Begin the next verification with a tip."""
+        self._give_up()
+        self._publish(
+            VerificationStatus(
+                tip=tip,
+                setup=setup_of(tip, self._choices),
+                state=with_pen_at_rest(SessionState()),
+                region=tip.region,
+                is_here=self._status.is_here,
+                refusal=self._why_not(tip),
+            )
+        )
 
     def _read_tip(self) -> None:
         preparation = self._preparation
@@ -399,15 +383,9 @@ class VerificationWorkflow:
     def _on_tip_read(self, tip: CurrentTip) -> None:
         status = replace(self._status, reading=ReadingState.NOTHING)
         if status.tip is None or not tip.is_like(status.tip):
-            self._give_up()
-            status = VerificationStatus(
-                tip=tip,
-                setup=setup_of(tip, self._choices),
-                state=with_pen_at_rest(SessionState()),
-                region=tip.region,
-                is_here=status.is_here,
-            )
-        self._publish(replace(status, refusal=self._why_not(tip)))
+            self._begin(tip)
+        else:
+            self._publish(replace(status, refusal=self._why_not(tip)))
 
     def _on_no_tip(self, why: Message) -> None:
         self._give_up()
@@ -435,19 +413,15 @@ class VerificationWorkflow:
 
     # Records
 
-    def _keep(self) -> None:
-        """Store the results of tasks, unless a later visit will add to their U."""
-        self._keeping.settle(self._status)
-        self._write()
-
-    def _conclude_done(self) -> None:
-        """Conclude a verification when all selected tasks are complete."""
+    def _conclude(self, *, is_written: bool = False) -> None:
+        """Write the result of the task, unless it is, and what becomes of the tip."""
         found = self._status.assessment
-        if self._status.is_done and found is not None:
-            is_kept = found.is_accepted
-            outcome = TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED
-            self._keeping.conclude(self._status, outcome)
-            self._write()
+        is_kept = found is not None and found.is_accepted
+        if not is_written:
+            self._keeping.add_task(self._status)
+        outcome = TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED
+        self._keeping.conclude(self._status, outcome)
+        self._write()
 
     def _give_up(self) -> None:
         """Conclude an incomplete verification."""

@@ -25,7 +25,6 @@ from lightpen.verification.storage.checkpoint import (
     find_interrupted,
 )
 from lightpen.verification.storage.resuming import abandon_interrupted
-from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import missing_input_text, origin_text
 from lightpen_app.look.sentences import worded
@@ -276,12 +275,9 @@ class InterruptedControl(QObject):
         self._settle()
         self._go_to_station(under_way.names.station)
         selection.set_preparation(replace(selection.preparation, names=under_way.names))
-        chosen, is_part = selection.choices, PART.kind in under_way.choices.kinds
-        kinds = under_way.choices.kinds
-        if is_part:
-            is_drift_checked = DRIFT.kind in kinds
-            kinds = chosen.with_task(DRIFT, is_chosen=is_drift_checked).kinds
-        again = replace(under_way.choices, kinds=kinds, limits=chosen.limits)
+        chosen, is_part = selection.choices, under_way.choices.task is PART
+        kind = chosen.kind if is_part else under_way.choices.kind
+        again = replace(under_way.choices, kind=kind, limits=chosen.limits)
         selection.set_choices(again.with_moves(()))  # as in the session
         missing_inputs = selection.preparation.missing_inputs()
         if missing_inputs:

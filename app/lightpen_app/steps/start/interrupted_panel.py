@@ -98,10 +98,8 @@ class VerificationRow(InterruptedItem):
             return "" if fault is None else breakable(worded(fault))
         names = under_way.names
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-        done = self.tr("verification, {0} of {1} tasks").format(
-            under_way.n_done, len(under_way.choices.kinds)
-        )
-        return PARTED.join(filter(None, (*called, done)))
+        task = worded(under_way.choices.task.title)
+        return PARTED.join(filter(None, (*called, task)))
 
 
 class InterruptedPanel(Translated, QGroupBox):

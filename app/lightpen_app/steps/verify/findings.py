@@ -52,7 +52,7 @@ class TaskPicture:
 
 def posture_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> DialValue:
     """Return the postures of the pen at the points of a task, and the present one."""
-    progress, found = state.progress(setup, task), state.found.get(task.kind)
+    progress, found = state.progress(setup, task), state.found_by(task)
     points = [*chain.from_iterable(progress.runs), *progress.points]
     if found is not None and not points:
         points = list(found.probed)
@@ -177,7 +177,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
     def set_value(self, setup: SessionSetup | None, state: SessionState | None) -> None:
         """Show a session; None for none."""
         tables: tuple[ResultTable, ...] = ()
-        is_found = state is not None and self._task.kind in state.found
+        is_found = state is not None and state.done is self._task
         if is_found is not self._is_found:
             self._is_found = is_found
             self._use_room()
@@ -194,7 +194,7 @@ class TaskFinding(ResponsiveLayout, QWidget):
     def _figures(
         self, setup: SessionSetup, state: SessionState
     ) -> tuple[ResultTable, ...]:
-        task, found = self._task, state.found.get(self._task.kind)
+        task, found = self._task, state.found_by(self._task)
         if found is not None:
             return task.tables(found, setup.conditions)
         options = setup.choices.options_of(task)

@@ -8,7 +8,6 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.assessment import VerificationAssessment
-from lightpen.verification.tasks.drift import DRIFT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen_app.look.quantities import number_text
@@ -28,7 +27,7 @@ from lightpen_app.work.workbench import Workbench
 class MeasurePresenter(VerifyPresenter):
     """Computes the view from the status of runner, camera and station."""
 
-    tasks = PART, DRIFT
+    tasks = (PART,)
 
     @override
     def view(self) -> VerifyView:

@@ -113,7 +113,7 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
     def _planned(self) -> PlannedFeature | None:
         state = self._status.state
-        if state is None or PART.kind in state.found:
+        if state is None or state.done is not None:
             return None
         return planned_at(self._options(), len(state.runs))
 

@@ -173,11 +173,11 @@ class VerifyPresenter(QObject):
     def _title(self, task: AnyTask) -> StatusMessage:
         """Return the name of a task, with its progress if selected."""
         status, name = self._status, worded(task.title)
-        found = None if status.state is None else status.state.found.get(task.kind)
+        found = None if status.state is None else status.state.found_by(task)
         if found is not None:
             grade = found.assessment.grade
             far, mark = self._grade_text(grade), GRADE_MARKS[grade]
-        elif status.setup is not None and task.kind not in status.setup.choices.kinds:
+        elif status.setup is not None and task is not status.setup.choices.task:
             return StatusMessage(name)
         elif task is status.task:
             far, mark = self.tr("now"), (Sign.PLAY, Tone.ACTIVE)
@@ -263,10 +263,8 @@ class VerifyPresenter(QObject):
             return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
         if task is None and status.assessment is not None:
             grade = status.assessment.grade
-            leading = self.tasks[0]
-            rule = worded(
-                leading.rule_of(setup.choices.options_of(leading), setup.choices.limits)
-            )
+            leading, limits = setup.choices.task, setup.choices.limits
+            rule = worded(leading.rule_of(setup.choices.options_of(leading), limits))
             why = f"{worded(status.assessment.reason)} {rule}"
             return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
         if self._live.connection is not Connection.STREAMING:

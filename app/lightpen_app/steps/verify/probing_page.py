@@ -35,7 +35,6 @@ SOUNDS: dict[SessionEventKind, Sound] = {
     SessionEventKind.RECORDED: Sound.KEPT,
     SessionEventKind.BROKEN_OFF: Sound.LOST,
     SessionEventKind.KNOWN: Sound.LOST,
-    SessionEventKind.FINISHED: Sound.FIELD_FULL,
     SessionEventKind.DONE: Sound.DONE,
     SessionEventKind.FAILED: Sound.FAILED,
 }
@@ -157,7 +156,7 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def unsaved(self) -> str:
         state = self._runner.status.state
-        if state is None or not (state.touches or state.runs or state.visits):
+        if state is None or not (state.touches or state.runs):
             return ""
         return self.tr(
             "The work is not finished. The points of the current task are lost; "

@@ -1,10 +1,10 @@
-"""Verification tasks of a station, with artefacts and limits."""
+"""The task of a verification at a station, with options and limits."""
 
 from dataclasses import dataclass, field, replace
 
 from msgspec import structs
 
-from lightpen.messages import Message, message
+from lightpen.messages import Message
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.probing.probing import FAST
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
@@ -15,23 +15,24 @@ from lightpen.verification.tasks.registry import (
     AnyOptions,
     AnyTask,
     TaskKind,
+    task_of,
 )
 from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
 
 
 @dataclass(frozen=True)
 class VerificationChoices:
-    """Selected tasks and their options."""
+    """The selected task, and the options of all."""
 
-    kinds: tuple[TaskKind, ...] = (FIXED_POINT.kind,)  # in their order
+    kind: TaskKind = FIXED_POINT.kind
     options: tuple[AnyOptions, ...] = ()  # that differ from the defaults
     n_frames: int = FAST  # images of a point
     limits: VerificationLimits = field(default_factory=VerificationLimits)
 
     @property
-    def tasks(self) -> tuple[AnyTask, ...]:
-        """The tasks that are chosen."""
-        return tuple(task for task in ALL_TASKS if task.kind in self.kinds)
+    def task(self) -> AnyTask:
+        """The task that is chosen."""
+        return task_of(self.kind)
 
     def options_of(self, task: VerificationTask[OptionsT, FoundT]) -> OptionsT:
         """Return the options of a task."""
@@ -56,14 +57,6 @@ class VerificationChoices:
             return self
         return self.with_options(structs.replace(options, moves=moves))
 
-    def with_task(self, task: AnyTask, *, is_chosen: bool) -> "VerificationChoices":
-        """Return a copy with a task selected or not."""
-        kinds = {*self.kinds, task.kind} if is_chosen else {*self.kinds} - {task.kind}
-        return replace(self, kinds=tuple(t.kind for t in ALL_TASKS if t.kind in kinds))
-
     def missing(self, ball_diameter: float | None) -> Message | None:
         """Return the missing entry, with a ball of this diameter, mm."""
-        if not self.kinds:
-            return message("verification.no-task")
-        each = (t.missing(self.options_of(t), ball_diameter) for t in self.tasks)
-        return next(filter(None, each), None)
+        return self.task.missing(self.options_of(self.task), ball_diameter)

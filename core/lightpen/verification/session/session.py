@@ -1,9 +1,8 @@
-"""A whole verification in one go, without a key: the tasks one after the other.
+"""A verification without a key.
 
-`advance_session` takes the state and what the next image shows. Each task ends
-automatically when its points suffice, and the next begins when the pen moves on; live
-images and recorded ones go through the same steps. Points that can be none of the task
-are dropped with a message.
+`advance_session` takes the state and what the next image shows. The task ends
+automatically when its points suffice; live images and recorded ones go through the
+same steps. Points that can be none of the task are dropped with a message.
 """
 
 from collections.abc import Sequence
@@ -13,7 +12,6 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import CalibrationError
 from lightpen.messages import message
 from lightpen.verification.probing.current_tip import CurrentTip
-from lightpen.verification.probing.drift_reference import judged_with
 from lightpen.verification.probing.probing import (
     ProbingEvent,
     ProbingEventKind,
@@ -24,25 +22,15 @@ from lightpen.verification.probing.probing import (
 from lightpen.verification.probing.sources import require_leds_fit
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import (
-    RunsOfTask,
     SessionSetup,
     SessionState,
-    n_visits,
-    with_drift,
     without_touches,
 )
-from lightpen.verification.tasks.drift import DRIFT, MIN_VISITS, Drift, measure_drift
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import with_move
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen.verification.tasks.registry import AnyTask
-from lightpen.verification.tasks.task import (
-    Found,
-    Points,
-    Runs,
-    Screening,
-    without_last,
-)
+from lightpen.verification.tasks.task import Points, Runs, Screening, without_last
 
 BROKEN_OFF = message("session.broken-off")
 
@@ -86,8 +74,7 @@ def advance_session(
         state = _with_run(setup, state, task)
     except CalibrationError as error:
         state = replace(state, fault=error.message)
-    is_finished = task.kind in state.found
-    return SessionTransition(state, events, task if is_finished else None)
+    return SessionTransition(state, events, state.done)
 
 
 def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
@@ -95,14 +82,11 @@ def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
     task = state.task(setup)
     if task is None:
         return SessionTransition(state)
-    before = state.runs_of(task)
-    runs = _numbered((*before, state.touches) if state.touches else before)
+    runs = (*state.runs, state.touches) if state.touches else state.runs
     try:
         ended = _done(setup, state, task, runs)
     except CalibrationError as error:
         return SessionTransition(replace(state, fault=error.message))
-    if task is DRIFT and state.touches:
-        ended = replace(ended, visits=(*state.visits, state.touches))
     return SessionTransition(ended, finished=task)
 
 
@@ -146,44 +130,6 @@ def touch_again(
     return state
 
 
-def measure(setup: SessionSetup, task: AnyTask, runs: Runs) -> Found:
-    """Return the result of a task from its points."""
-    found: Found = task.measure(runs, setup.conditions, setup.choices.options_of(task))
-    return found
-
-
-def measure_with_drift(setup: SessionSetup, done: RunsOfTask) -> Found:
-    """Return the result of a task, with the motion of the camera."""
-    by = with_drift(setup if done.setup is None else done.setup, done.drift)
-    found = measure(by, done.task, done.runs)
-    return replace(found, assessment=judged_with(found.assessment, done.lamps))
-
-
-def with_found(state: SessionState, done: RunsOfTask, found: Found) -> SessionState:
-    """Return the session with a task's result; the next begins when the pen moves."""
-    kind = done.task.kind
-    return replace(
-        without_touches(state),
-        found={**state.found, kind: found},
-        measured={**state.measured, kind: done},
-        pending=() if done.task is DRIFT else state.pending,
-    )
-
-
-def touched_anew(state: SessionState, task: AnyTask) -> SessionState:
-    """Return the session with one task reset and no points of the current one.
-
-    The drift reference is visited once more after it.
-    """
-    undone = {task.kind, DRIFT.kind}
-    return replace(
-        without_touches(state),
-        found={kind: each for kind, each in state.found.items() if kind not in undone},
-        visits=() if task is DRIFT else state.visits,
-        pending=tuple(each for each in state.pending if each.task is not task),
-    )
-
-
 def without_last_touch(state: SessionState) -> SessionState:
     """Return the session without the last point of the current run."""
     touching = replace(
@@ -206,25 +152,11 @@ def with_moved_part(setup: SessionSetup, state: SessionState) -> SessionSetup:
 
 
 def with_other_choices(
-    setup: SessionSetup, state: SessionState, choices: VerificationChoices
-) -> tuple[SessionSetup, SessionState]:
-    """Return a verification that continues with other choices.
-
-    Where another task is to be probed now, the points at hand are forgotten, and the
-    state has another `touching`.
-    """
-    at_hand = state.task(setup)
-    choices = choices.with_moves(setup.choices.options_of(PART).moves)
-    setup = replace(setup, choices=choices)
-    now = state.task(setup)
-    if now is not at_hand:
-        state = without_touches(state)
-    if now is not None and DRIFT.kind in state.found:  # it was of others
-        found = {k: each for k, each in state.found.items() if k != DRIFT.kind}
-        state = replace(without_touches(state), found=found)
-    if not state.awaits_drift(setup):
-        state = replace(state, pending=())
-    return setup, state
+    setup: SessionSetup, choices: VerificationChoices
+) -> SessionSetup:
+    """Return the setup of a session that continues with other options of its task."""
+    moves = setup.choices.options_of(PART).moves
+    return replace(setup, choices=choices.with_moves(moves))
 
 
 def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> ProbingRules:
@@ -276,54 +208,21 @@ def _suffices(setup: SessionSetup, state: SessionState, task: AnyTask) -> bool:
 
 def _with_run(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:
     """End a run, and with the last of them the task."""
-    if task is DRIFT:
-        return _with_visit(setup, state)
     runs = (*state.runs, state.touches)
-    if len(runs) >= task.n_runs(setup.choices.options_of(task)):
-        return _done(setup, state, task, _numbered(runs))
     options = setup.choices.options_of(task)
+    if len(runs) >= task.n_runs(options):
+        return _done(setup, state, task, runs)
     (task.check or task.measure)(_numbered(runs), setup.conditions, options)
     return replace(without_touches(state), runs=runs)
 
 
 def _done(
-    setup: SessionSetup, state: SessionState, task: AnyTask, runs: Runs
+    setup: SessionSetup, state: SessionState, task: AnyTask, runs: Sequence[Points]
 ) -> SessionState:
-    """Measure a task; the next visit of the cone adds the drift to its U."""
-    if task is DRIFT:
-        state = _after_visit(setup, state, runs)
-    found = measure(setup, task, runs)
-    if task is not DRIFT and state.awaits_drift(setup):
-        done = RunsOfTask(task, runs)
-        state = replace(state, pending=(*state.pending, done))
-    return with_found(state, RunsOfTask(task, runs, setup), found)
-
-
-def _with_visit(setup: SessionSetup, state: SessionState) -> SessionState:
-    """End a visit of the cone, and with the last of them the task."""
-    visits = (*state.visits, state.touches)
-    runs = _numbered(visits)
-    if len(visits) >= n_visits(setup.choices):
-        return replace(_done(setup, state, DRIFT, runs), visits=visits)
-    return replace(without_touches(_after_visit(setup, state, runs)), visits=visits)
-
-
-def _after_visit(
-    setup: SessionSetup, state: SessionState, visits: Runs
-) -> SessionState:
-    """Include the motion of the cone since the last visit in the results."""
-    if len(visits) < MIN_VISITS:
-        return state
-    around = measure_drift(visits[-MIN_VISITS:], setup.conditions)
-    return _counting(setup, state, around)
-
-
-def _counting(setup: SessionSetup, state: SessionState, drift: Drift) -> SessionState:
-    """Include a drift in the results since the last visit."""
-    for each in state.pending:
-        done = replace(each, setup=each.setup or setup, drift=drift)
-        state = with_found(state, done, measure_with_drift(setup, done))
-    return replace(state, pending=())
+    """Measure a task."""
+    options = setup.choices.options_of(task)
+    found = task.measure(_numbered(runs), setup.conditions, options)
+    return replace(without_touches(state), runs=(), done=task, found=found)
 
 
 def _numbered(runs: Sequence[Points]) -> Runs:

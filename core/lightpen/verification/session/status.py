@@ -36,7 +36,6 @@ class SessionEventKind(StrEnum):
     RECORDED = "recorded"
     BROKEN_OFF = "broken off"
     KNOWN = "known"
-    FINISHED = "finished"  # one task of several
     DONE = "done"
     FAILED = "failed"  # done, with something found against the tip
 
@@ -52,7 +51,7 @@ class VerificationStatus:
     began: datetime | None = None  # when its first image came
     files: tuple[Path, ...] = ()  # results
     reading: ReadingState = ReadingState.NOTHING
-    lamp_drift: LampDrift | None = None  # up to the last finished task
+    lamp_drift: LampDrift | None = None  # up to the end of the task
     is_here: bool = False  # an operator is present
     is_paused: bool = False
     accepted_by: str = ""  # supervisor, despite findings
@@ -60,7 +59,7 @@ class VerificationStatus:
 
     @property
     def task(self) -> AnyTask | None:
-        """Task to probe; None when all are complete or none is possible."""
+        """Task to probe; None when it is complete or none is possible."""
         if self.setup is None or self.state is None:
             return None
         return self.state.task(self.setup)
@@ -73,14 +72,14 @@ class VerificationStatus:
 
     @property
     def is_done(self) -> bool:
-        """Whether all selected tasks are complete."""
-        return self.state is not None and self.state.is_begun and self.task is None
+        """Whether the task is complete."""
+        return self.state is not None and self.state.done is not None
 
     @property
     def assessment(self) -> VerificationAssessment | None:
-        """The worst finding so far."""
-        found = None if self.state is None else self.state.assessment
-        return None if found is None else judged_with(found, self.lamp_drift)
+        """What was found; a drift first, as it explains the rest."""
+        found = None if self.state is None else self.state.found
+        return None if found is None else judged_with(found.assessment, self.lamp_drift)
 
 
 class VerificationListener(Protocol):
@@ -119,7 +118,6 @@ def event_kinds(
 
 def ending(status: VerificationStatus) -> SessionEventKind:
     """Return the event of a completed task."""
-    if status.task is not None or status.assessment is None:
-        return SessionEventKind.FINISHED
-    is_refused = status.assessment.grade is Grade.REPEAT
+    found = status.assessment
+    is_refused = found is not None and found.grade is Grade.REPEAT
     return SessionEventKind.FAILED if is_refused else SessionEventKind.DONE

@@ -42,7 +42,6 @@ from lightpen.record.library.numbered_files import make_folder, numbered_files
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names, folder_name
 from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.registry import TaskKind
 
 SUFFIX, LOCK, DAMAGED = ".json", ".lock", ".damaged"
 WHAT = message("file.under-way")
@@ -51,9 +50,8 @@ WHAT = message("file.under-way")
 class CountingRun(Struct, frozen=True):
     """A run of live touches that counts."""
 
-    task: TaskKind
     folder: str  # of its record, in the folder of touches
-    is_last: bool = False  # its task ended with it
+    is_last: bool = False  # the task ended with it
 
 
 class VerificationCheckpoint(Struct, frozen=True):
@@ -68,16 +66,9 @@ class VerificationCheckpoint(Struct, frozen=True):
     seen_by: tuple[Digest, ...]  # of the camera files
     choices: VerificationChoices
     runs: tuple[CountingRun, ...] = ()  # in order of time
-    files: tuple[str, ...] = ()  # records that were written
-    unwritten: tuple[TaskKind, ...] = ()  # tasks done without record
 
     def __post_init__(self) -> None:
         require_usual(self.began)
-
-    @property
-    def n_done(self) -> int:
-        """Number of completed tasks."""
-        return len({run.task for run in self.runs if run.is_last})
 
 
 @dataclass(frozen=True)
@@ -168,20 +159,18 @@ def find_interrupted(data: Path) -> tuple[InterruptedVerification, ...]:
 
 
 @dataclass(frozen=True)
-class UnlistedRecords:
-    """Records and their tasks that a checkpoint does not name, the oldest first."""
+class SessionRecords:
+    """Records of a verification with their tasks, the oldest first."""
 
     files: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
 
 
-def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRecords:
+def written_since(folder: Path, under_way: VerificationCheckpoint) -> SessionRecords:
     """Return the files written after the file of a verification."""
     session = under_way.began.isoformat(timespec="seconds")
     since: list[tuple[str, str]] = []
     for file in numbered_files(folder):
-        if file.name in under_way.files:
-            break
         try:
             record = parse_own_json(read_bytes(file, WHAT, LARGEST_RECORD), _OfSession)
         except (FileError, DamagedError):
@@ -190,7 +179,7 @@ def written_since(folder: Path, under_way: VerificationCheckpoint) -> UnlistedRe
             break
         if record.session == session:
             since.insert(0, (file.name, record.verification))
-    return UnlistedRecords(*zip(*since, strict=True)) if since else UnlistedRecords()
+    return SessionRecords(*zip(*since, strict=True)) if since else SessionRecords()
 
 
 class _OfSession(Struct):

@@ -6,7 +6,7 @@ excluded. So a run can be read like any recorded images, and a crash leaves comp
 data.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,11 +45,9 @@ from lightpen.verification.session.session import (
 from lightpen.verification.session.session_state import (
     SessionSetup,
     SessionState,
-    n_done,
     with_drift,
 )
 from lightpen.verification.storage.checkpoint import CountingRun
-from lightpen.verification.tasks.registry import AnyTask
 
 CONCLUDED = "concluded"
 NOT_COUNTED = "not counted"
@@ -89,25 +87,19 @@ class PointImages:
         """The accepted runs in order of time, the current one included."""
         return self._runs if self._open is None else (*self._runs, self._open)
 
-    def records(self, task: AnyTask) -> tuple[PointRecord, ...]:
-        """Return the runs of a task that are done."""
-        return tuple(self._records[r.folder] for r in self._runs if r.task == task.kind)
+    @property
+    def records(self) -> tuple[PointRecord, ...]:
+        """The runs that are done."""
+        return tuple(self._records[run.folder] for run in self._runs)
 
     def keep(
-        self,
-        frame: Frame,
-        seen: PenDetection,
-        task: AnyTask,
-        approach: FloatArray | None = None,
+        self, frame: Frame, seen: PenDetection, approach: FloatArray | None = None
     ) -> str:
         """Put an image on the disk, and return its name in the record."""
         if self._writer is None:
             new = self._begin()
             self._writer = RecordWriter.create(new.folder, new.header, is_swing=False)
-            self._folder, self._open = (
-                new.folder,
-                CountingRun(task.kind, new.folder.name),
-            )
+            self._folder, self._open = (new.folder, CountingRun(new.folder.name))
         others = frame.others[: len(seen.others)]
         number = self._writer.append(
             frame.image,
@@ -130,7 +122,8 @@ class PointImages:
     def follow(self, before: SessionState, transition: SessionTransition) -> None:
         """Remove images that no longer count, and end a completed run."""
         state = transition.state
-        has_ended = transition.finished is not None or n_done(state) > n_done(before)
+        is_last = transition.finished is not None
+        has_ended = is_last or len(state.runs) > len(before.runs)
         counting = before if has_ended else state
         touching = counting.touching
         names = {frame.name for still in touching.taken for frame in still.frames}
@@ -145,18 +138,18 @@ class PointImages:
             self._touch += 1
         self._take_out([name for name in self._numbers if name not in names])
         if has_ended:
-            self._end(is_last=transition.finished is not None)
+            self._end(is_last=is_last)
 
-    def forget_but(self, kinds: Collection[str]) -> None:
-        """Discard the current run, and the runs of all but some tasks."""
+    def begin(self) -> None:
+        """Discard the current run, and begin with the first of another session."""
         with suppress(FileError):  # it stays interrupted
             self._close(DISCARDED)
         self._open = None
-        self._runs = tuple(run for run in self._runs if run.task in kinds)
+        self._runs = ()
 
     def take_over(self, runs: Sequence[CountingRun], folder: Path) -> None:
         """Continue after interrupted runs in the folder of all records."""
-        self.forget_but(())
+        self.begin()
         done = []
         for run in runs:
             record = open_record(folder / run.folder)
@@ -278,4 +271,4 @@ class LivePoints:
             return str(frame.seq)
         tip_cam = seen.rotation @ setup.instrument.tip_pen + seen.translation
         approach = approach_of(rules, state.touching, tip_cam)
-        return self._images.keep(frame, seen, task, approach)
+        return self._images.keep(frame, seen, approach)

@@ -48,7 +48,6 @@ from lightpen.verification.tasks.probed_point import (
     StillFrames,
     measure_touches,
 )
-from lightpen.verification.tasks.registry import task_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,6 @@ class ResumedVerification:
     setup: SessionSetup
     state: SessionState
     files: tuple[Path, ...]  # records written of it
-    unwritten: tuple[str, ...]  # tasks done without record
     lamps: LampObservations  # in the images of touches
 
 
@@ -81,10 +79,10 @@ def resume_verification(
     _require_same(tip, under_way)
     root = _root(data, under_way)
     setup, state = setup_of(tip, under_way.choices), SessionState()
+    task = under_way.choices.task
     lamps, cameras = LampObservations(), setup.instrument.rig.cameras
     for n, run in enumerate(under_way.runs, start=1):
         record = open_record(root / TOUCHES / run.folder)
-        task = task_of(run.task)
         scans = task.scans(under_way.choices.options_of(task), len(state.runs))
         held = _held_in(record, under_way.choices.frames_of(task), scans=scans)
         lamps = lamps.then(_lamps_in(record, setup))
@@ -96,9 +94,8 @@ def resume_verification(
             state = touch_again(drifted, state, held)
         report(n / len(under_way.runs))
     since = written_since(root, under_way)
-    files = tuple(root / name for name in (*under_way.files, *since.files))
-    unwritten = tuple(task for task in under_way.unwritten if task not in since.kinds)
-    return ResumedVerification(under_way, tip, setup, state, files, unwritten, lamps)
+    files = tuple(root / name for name in since.files)
+    return ResumedVerification(under_way, tip, setup, state, files, lamps)
 
 
 def abandon_interrupted(
@@ -119,7 +116,7 @@ def abandon_interrupted(
             if open_record(root / TOUCHES / run.folder).verdict is None:
                 discard_swing(root / TOUCHES / run.folder)
     files = []
-    for name in (*under_way.files, *written_since(root, under_way).files):
+    for name in written_since(root, under_way).files:
         with suppress(FileError):
             files.append(hashed(root / name))
     record = conclusion_record(

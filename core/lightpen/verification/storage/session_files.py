@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,6 @@ from lightpen.record.folder.outcome import TrialOutcome
 from lightpen.record.folder.verifications import TOUCHES
 from lightpen.record.library.signing.keys import SigningKey
 from lightpen.verification.probing.current_tip import CurrentTip
-from lightpen.verification.probing.drift_reference import LampDrift
-from lightpen.verification.session.session_state import SessionState
 from lightpen.verification.session.status import VerificationStatus
 from lightpen.verification.storage.checkpoint import (
     CheckpointFile,
@@ -30,20 +28,8 @@ from lightpen.verification.storage.verification_files import (
     task_record,
     verifications_folder,
 )
-from lightpen.verification.tasks.drift import DRIFT
-from lightpen.verification.tasks.registry import AnyTask, task_of
-from lightpen.verification.tasks.task import Found
 
 _logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class CompletedTask:
-    """A task that is done: with which tip, by which images."""
-
-    task: AnyTask
-    tip: CurrentTip
-    images: TaskImages
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +38,6 @@ class PendingRecord:
 
     record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]  # by files before
     is_simulated: bool
-    task: AnyTask | None = None  # None for a conclusion
     ends: CheckpointFile | None = None  # that this record concludes
     supervisor: SigningKey | None = None  # whom the record names
 
@@ -85,8 +70,6 @@ class SessionKeeping:
         self.images = PointImages(new_record)
         self._files: list[Path] = []  # of the current session
         self._waiting: list[tuple[PendingRecord, list[Path]]] = []  # with its files
-        self._unkept: tuple[CompletedTask, ...] = ()  # whose drift is not known yet
-        self._done: dict[str, CompletedTask] = {}
         self._file: CheckpointFile | None = None  # of the verification under way
 
     @property
@@ -104,53 +87,22 @@ class SessionKeeping:
         is_simulated = tip.origin is Origin.SIMULATED
         return verifications_folder(self._data, is_simulated=is_simulated)
 
-    def add_task(
-        self, task: AnyTask, tip: CurrentTip, lamp_drift: LampDrift | None
-    ) -> None:
-        """Store the result of live touches once its drift is known."""
-        self._keep(self._live_task(task, tip, lamp_drift))
-
-    def _live_task(
-        self, task: AnyTask, tip: CurrentTip, lamp_drift: LampDrift | None
-    ) -> CompletedTask:
-        records = self.images.records(task)
-        images = TaskImages(tip.origin, lamp_drift=lamp_drift, records=records)
-        return CompletedTask(task, tip, images)
-
-    def add_again(self, before: SessionState, state: SessionState) -> bool:
-        """Store results of points measured again; return whether there are any."""
-        again = [
-            kind
-            for kind, found in state.found.items()
-            if before.found.get(kind, found) is not found
-        ]
-        for kind in again:
-            self._keep(self._done[kind])
-        return bool(again)
-
-    def _keep(self, done: CompletedTask) -> None:
-        self._done[done.task.kind] = done
-        others = (each for each in self._unkept if each.task is not done.task)
-        self._unkept = (*others, done)
-
-    def settle(self, status: VerificationStatus) -> None:
-        """Queue the results, except those whose U depends on a later visit."""
-        state = status.state
-        if state is None:
+    def add_task(self, status: VerificationStatus) -> None:
+        """Have the result of a complete task written, now or as soon as it can be."""
+        setup, state, tip = status.setup, status.state, status.tip
+        if setup is None or state is None or state.found is None or tip is None:
             return
-        waiting = {each.task for each in state.pending}
-        done = self._unkept
-        self._unkept = tuple(each for each in done if each.task in waiting)
-        for each in done:
-            found = state.found_by(each.task)
-            if each.task not in waiting and found is not None:
-                self._add(each, found, status)
-
-    def forget_but(self, state: SessionState) -> None:
-        """Discard the images of touches to be repeated."""
-        kinds = {*state.found, *([DRIFT.kind] if state.visits else [])}
-        self.images.forget_but(kinds)
-        self._unkept = tuple(each for each in self._unkept if each.task.kind in kinds)
+        records, lamps = self.images.records, status.lamp_drift
+        record = task_record(
+            setup.choices.task,
+            state.found,
+            tip,
+            setup.choices,
+            status.began or self._now(),
+            TaskImages(tip.origin, lamp_drift=lamps, records=records),
+        )
+        is_simulated = tip.origin is Origin.SIMULATED
+        self._queue(PendingRecord(lambda _: record, is_simulated))
 
     def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
         """Write the outcome of the verification with all its records."""
@@ -165,18 +117,13 @@ class SessionKeeping:
 
     def give_up(self, status: VerificationStatus) -> None:
         """Conclude an incomplete session, as another begins."""
-        self.images.forget_but(())
-        if status.state is not None:
-            state = replace(status.state, pending=())
-            self.settle(replace(status, state=state))
+        self.images.begin()
         if status.began is not None and not status.is_done:
             self.conclude(status, TrialOutcome.ABANDONED)
 
     def begin(self) -> None:
         """Begin another session."""
-        self._files = []
-        self._unkept, self._file = (), None
-        self._done = {}
+        self._files, self._file = [], None
 
     def write(self) -> None:
         """Write pending records; what cannot be written stays pending."""
@@ -194,12 +141,6 @@ class SessionKeeping:
         if self._file is None:
             path = under_way_path(self.root(tip), tip.names, status.began)
             self._file = CheckpointFile(path)
-        unkept = (done.task.kind for done in self._unkept)
-        queued = (
-            kept.task.kind
-            for kept, files in self._waiting
-            if files is self._files and kept.task is not None
-        )
         self._file.note(
             VerificationCheckpoint(
                 began=status.began,
@@ -211,14 +152,10 @@ class SessionKeeping:
                 seen_by=tip.viewers.hashes,
                 choices=setup.choices,
                 runs=runs,
-                files=tuple(file.name for file in self._files),
-                unwritten=(*unkept, *queued),
             )
         )
 
-    def take_over(
-        self, path: Path, before: ResumedVerification, lamp_drift: LampDrift | None
-    ) -> None:
+    def take_over(self, path: Path, before: ResumedVerification) -> None:
         """Continue an interrupted verification, unless another window has it."""
         under_way, file = before.under_way, CheckpointFile(path)
         file.hold()
@@ -227,29 +164,7 @@ class SessionKeeping:
         except BaseException:
             file.release()
             raise
-        self._file = file
-        self._files = list(before.files)
-        for kind in before.state.found:
-            done = self._live_task(task_of(kind), before.tip, lamp_drift)
-            self._done[kind] = done
-            if kind in before.unwritten:
-                self._keep(done)
-
-    def _add(
-        self, done: CompletedTask, found: Found, status: VerificationStatus
-    ) -> None:
-        """Have a task written, now or as soon as it can be."""
-        assert status.setup is not None
-        record = task_record(
-            done.task,
-            found,
-            done.tip,
-            status.setup.choices,
-            status.began or self._now(),
-            done.images,
-        )
-        is_simulated = Origin.SIMULATED in (done.tip.origin, done.images.origin)
-        self._queue(PendingRecord(lambda _: record, is_simulated, done.task))
+        self._file, self._files = file, list(before.files)
 
     def _queue(self, kept: PendingRecord) -> None:
         self._waiting.append((kept, self._files))

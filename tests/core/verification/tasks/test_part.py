@@ -92,7 +92,7 @@ class Station:
 
 
 def station(instrument: Instrument, plan: Plan) -> Station:
-    choices = VerificationChoices((PART.kind,), (PartOptions(plan),), n_frames=2)
+    choices = VerificationChoices(PART.kind, (PartOptions(plan),), n_frames=2)
     setup = SessionSetup(instrument, choices, BALL)
     return Station(setup, Holder(instrument.rig, instrument.pen))
 
@@ -137,7 +137,7 @@ def measured(instrument: Instrument) -> Station:
     at_it = station(instrument, plate_plan())
     runs = probed_plate(instrument, plate_plan())
     found = PART.measure(runs, at_it.setup.conditions, at_it.options)
-    at_it.state = replace(at_it.state, found={PART.kind: found})
+    at_it.state = replace(at_it.state, done=PART, found=found)
     return at_it
 
 
@@ -151,8 +151,7 @@ def test_ten_features_of_the_plate_are_measured_without_a_key(
         error = result.value.value - (result.planned.nominal or 0.0)
         assert abs(error) < max(2 * result.value.uncertainty, 0.02), result.planned
     assert measured.found.missing == ()
-    assert measured.state.assessment is not None
-    assert measured.state.assessment.grade is not Grade.REPEAT
+    assert measured.found.assessment.grade is not Grade.REPEAT
 
 
 def test_tables_have_a_decision_for_each_characteristic(measured: Station) -> None:
@@ -498,7 +497,7 @@ def test_a_scanned_feature_needs_one_point_held_still(instrument: Instrument) ->
         n_images = 1 if at_it.state.touches else 5
         for seen in at_it.holder.still(Hold(tuple(place.tolist()), 0.1), n_images):
             at_it.state = advance_session(at_it.setup, at_it.state, "image", seen).state
-        if at_it.state.assessment is not None:
+        if at_it.state.done is not None:
             break
 
     part = at_it.found.part
