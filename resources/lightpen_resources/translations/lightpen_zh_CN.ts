@@ -5107,16 +5107,8 @@ needed</source>
 <context>
     <name>TaskPanel</name>
     <message>
-        <source>Include: {0}</source>
-        <translation>包括：{0}</translation>
-    </message>
-    <message>
-        <source>Probe again</source>
-        <translation>重新触测</translation>
-    </message>
-    <message>
-        <source>Repeat this task; the result so far is kept in the archive.</source>
-        <translation>重做该项；此前的结果保留在档案中。</translation>
+        <source>Do now: {0}</source>
+        <translation>现在进行：{0}</translation>
     </message>
 </context>
 <context>
@@ -5287,10 +5279,6 @@ mm</translation>
     <message>
         <source>Damaged: {0}</source>
         <translation>已损坏：{0}</translation>
-    </message>
-    <message>
-        <source>verification, {0} of {1} tasks</source>
-        <translation>验证，已完成 {0} / {1} 项任务</translation>
     </message>
 </context>
 <context>
@@ -6019,10 +6007,6 @@ mm</translation>
     <message>
         <source>No such file or directory</source>
         <translation>没有那个文件或目录</translation>
-    </message>
-    <message>
-        <source>No task is selected. Select at least one.</source>
-        <translation>未选择任务。请至少选择一个。</translation>
     </message>
     <message>
         <source>Nominal</source>
