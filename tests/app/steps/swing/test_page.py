@@ -24,6 +24,7 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.simulator.hand import Operator
 from lightpen.swing.capture.state import Pause, Phase, SwingState
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow
@@ -199,6 +200,7 @@ def shared_desk(
             limits=SHORT,
             camera_file=samples.camera_file,
             pen_file=samples.pen_file,
+            source=SourceChoice(),
         )
     )
     with pytest.MonkeyPatch.context() as unhurried:  # that of each test comes later
