@@ -23,7 +23,6 @@ from lightpen.verification.storage.conclusion import Conclusion, conclusion_reco
 from lightpen.verification.storage.point_images import NewRecord, PointImages
 from lightpen.verification.storage.resuming import ResumedVerification
 from lightpen.verification.storage.verification_files import (
-    TaskImages,
     keep_verification,
     task_record,
     verifications_folder,
@@ -92,14 +91,14 @@ class SessionKeeping:
         setup, state, tip = status.setup, status.state, status.tip
         if setup is None or state is None or state.found is None or tip is None:
             return
-        records, lamps = self.images.records, status.lamp_drift
         record = task_record(
             setup.choices.task,
             state.found,
             tip,
             setup.choices,
             status.began or self._now(),
-            TaskImages(tip.origin, lamp_drift=lamps, records=records),
+            status.lamp_drift,
+            self.images.records,
         )
         is_simulated = tip.origin is Origin.SIMULATED
         self._queue(PendingRecord(lambda _: record, is_simulated))

@@ -4,16 +4,14 @@ Each has the format that the command of its kind writes, with operator, item and
 in addition. Files of simulated pens are kept apart.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry, record_bytes
-from lightpen.model.origin import Origin
 from lightpen.record.folder.verifications import VERIFICATIONS
 from lightpen.record.library.entered_files import add_numbered
 from lightpen.record.library.signing.keys import SigningKey
@@ -24,20 +22,8 @@ from lightpen.verification.probing.image_locations import PenCameras
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.storage.point_images import PointRecord
-from lightpen.verification.tasks.probed_point import RejectedFrame, rejected_entries
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import Found
-
-
-@dataclass(frozen=True)
-class TaskImages:
-    """Source of the images of a task."""
-
-    origin: Origin | None
-    files: tuple[InputFile, ...] = ()  # of recorded images
-    rejected: tuple[RejectedFrame, ...] = ()  # that belong to no touch
-    lamp_drift: LampDrift | None = None
-    records: tuple[PointRecord, ...] = ()  # of a live camera, one a run
 
 
 def keep_verification(
@@ -66,9 +52,13 @@ def task_record(
     tip: CurrentTip,
     choices: VerificationChoices,
     session: datetime,
-    images: TaskImages,
+    lamp_drift: LampDrift | None,
+    records: Sequence[PointRecord],
 ) -> dict[str, Any]:
-    """Return the record of a task in the verification that began at ``session``."""
+    """Return the record of the task of a verification that began at ``session``.
+
+    ``records`` has the images of its points, one a run.
+    """
     names, limits = tip.names, asdict(choices.limits)
     return verification_record(
         task.kind,
@@ -78,13 +68,13 @@ def task_record(
             "operator": names.operator,
             "pen": names.pen,
             "tip": names.tip,
-            "origin": images.origin,
+            "origin": tip.origin,
             "camera_serials": camera_serials(tip.instrument),
             "remarks": list(tip.instrument.remarks),
             **conditions_entries(tip.temperature_c, tip.humidity_percent),
             **task.entries(found, tip.instrument),
-            "rejected": rejected_entries(images.rejected),
-            "witness": lamp_drift_entries(images.lamp_drift),
+            "rejected": [],
+            "witness": lamp_drift_entries(lamp_drift),
         },
         found.assessment,
         {name: limits[name] for name in task.limits},
@@ -92,10 +82,10 @@ def task_record(
             "tip": file_entry(tip.tip_file),
             **viewer_entries(tip.viewers),
             "pen": file_entry(tip.pen_file),
-            "images": [file_entry(file) for file in images.files],
+            "images": [],
             "touches": [
                 {"folder": each.folder.name, "journal_sha256": each.journal.sha256}
-                for each in images.records
+                for each in records
             ],
         },
         task.rule_of(choices.options_of(task), choices.limits),
