@@ -131,7 +131,7 @@ def calibrate_camera(
             raise change_error(change, views.names) from error
         raise
     found = _calibrated(kept, first, report)
-    rotated = find_rotated(views, found.effects.adjustment, found.change)
+    rotated = find_rotated(views, first, found.change)
     if rotated.any():
         remarks.append(rotated_message(views.names, rotated))
         if rotated.sum() >= FEWEST:

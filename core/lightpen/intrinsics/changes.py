@@ -34,10 +34,8 @@ USELESS = 0.001  # of the image's longer side, by which a change moves the image
 MAX_ROUNDS = 10
 N_WAYS = 3  # zoom and shift of the principal point along x and y
 RIDGE = 1e-10  # of a normal matrix scaled to ones
-# Residuals of a rotated view as it was, of others rotated, over those as they are.
-ROTATED, UPRIGHT = 1.6, 1.2
-BETTER, NEARLY = 1.1, 0.9  # ratio of the errors, and its share of that by a change
-SUSPECT, N_DRAWN = 0.45, 2  # of the median, of a view that may be; first rounds
+WORSE = 1.3  # ratio of the residuals of first groups that are turned to those before
+BETTER, NEARLY = 1.25, 0.9  # ratio of the errors, and its share of that by a change
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,11 +169,6 @@ class _ViewEquations:
         by_step = np.einsum("i,vij,j->v", step, information, step)
         return np.asarray(self.squares - 2 * scores @ step + by_step)
 
-    def without_each(self) -> FloatArray:
-        """Return the step of all unknowns by all views but one, (V, p)."""
-        normal = self.information.sum(axis=0) + self.prior
-        return _solved(normal - self.information, -self.scores)
-
     def held_out(self, share: FloatArray) -> FloatArray:
         """Return the squares of the residuals of each view by the others, (V,)."""
         information, scores = self._parted(share)
@@ -216,66 +209,35 @@ def find_rotated(
 ) -> BoolArray:
     """Return which views are of images rotated by 180 degrees, (V,).
 
-    Views that fit better so are turned round until all fit one camera, each by the
-    others in the end. They count as rotated, the fewer of them, where they fit much
-    better than as they were, and views are predicted better, as by a change of the
-    camera.
+    Views that pull the camera to the other side than most are turned round, then those
+    that fit better so. They count as rotated where that predicts all views better, as
+    by a change of the camera.
     """
+    gain = BETTER if change is None else max(BETTER, NEARLY * change.ratio)
     none = np.zeros(views.n_views, dtype=np.bool_)
-    turned, now, offsets = none, fitted, fitted.state.offsets
+    turned, now = _ViewEquations.of(fitted).starts()[1] > 0.5, fitted
     try:
         for n_done in range(MAX_ROUNDS):
-            ratio = _ratios(views, turned, now, n_done > N_DRAWN)
-            # At first the camera is between those of both; what is wrong draws it.
-            suspect = SUSPECT * float(np.median(ratio)) if n_done < N_DRAWN else 1.0
-            before, turned = turned, turned ^ (ratio < max(suspect, 1.0))
-            if n_done == N_DRAWN and not _are_clear(ratio, before, 1.0):
+            now = fit_camera(_turned(views, turned), now.state.cameras[0])
+            if now.rms > fitted.rms * (1.0 if n_done else WORSE):
                 return none
-            if np.array_equal(before, turned) and n_done > N_DRAWN:
+            ways = none, ~none
+            rms = [_by_poses(_turned(views, way), now).view_rms[:, 0] for way in ways]
+            before, turned = turned, rms[1] < rms[0]
+            if np.array_equal(before, turned):
                 break
-            if not turned.any():
-                return none
-            camera = now.state.cameras[0]
-            now = fit_camera(_turned(views, turned), camera, offsets=offsets)
-        if not _are_clear(ratio, turned, ROTATED):
-            return none
-        errors = held_out_errors(views, fit_camera(views, camera, offsets=offsets))
+        turned = before
+        for v in range(views.n_views):  # each by its part in the fit of all
+            other = turned ^ (np.arange(views.n_views) == v)
+            by_other = fit_camera(_turned(views, other), now.state.cameras[0])
+            if by_other.rms < now.rms:
+                turned, now = other, by_other
+        errors = held_out_errors(views, fitted)
         less = held_out_errors(_turned(views, turned), now)
     except CalibrationError:  # the camera does not image them so
         return none
-    better = float(np.sqrt(np.mean(errors**2) / np.mean(less**2)))
-    least = BETTER if change is None else max(BETTER, NEARLY * change.ratio)
-    return min(turned, ~turned, key=np.count_nonzero) if better > least else none
-
-
-def _are_clear(ratio: FloatArray, turned: BoolArray, least: float) -> bool:
-    """Return whether some views, and not all, fit much better when turned round."""
-    if not turned.any() or turned.all():
-        return False
-    others = min(least, UPRIGHT)
-    return bool(np.median(ratio[turned]) > least and np.median(ratio[~turned]) > others)
-
-
-def _ratios(
-    views: Views, turned: BoolArray, fitted: BoardFit, by_others: bool
-) -> FloatArray:
-    """Return the residuals of views if turned otherwise, over those as they are, (V,).
-
-    Each by all views, or by the others alone.
-    """
-    own, other = _turned(views, turned), _turned(views, ~turned)
-    if not by_others:
-        rms = [_by_poses(each, fitted).view_rms[:, 0] for each in (other, own)]
-        return np.asarray(rms[0] / rms[1])
-    camera, ratios = fitted.state.cameras[0], []
-    steps = _ViewEquations.of(fitted).without_each()[:, : len(camera.intrinsics)]
-    for v, step in enumerate(steps):
-        cameras = (camera.with_intrinsics(camera.intrinsics + step),)
-        near = replace(fitted, state=replace(fitted.state, cameras=cameras))
-        alone = np.arange(views.n_views) == v
-        rms = [_by_poses(e.chosen(alone), near).view_rms[0, 0] for e in (other, own)]
-        ratios.append(rms[0] / rms[1])
-    return np.array(ratios)
+    is_better = np.sum(errors**2) > gain**2 * np.sum(less**2)
+    return min(turned, ~turned, key=np.count_nonzero) if is_better else none
 
 
 def _turned(views: Views, which: BoolArray) -> Views:

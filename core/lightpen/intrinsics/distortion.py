@@ -31,7 +31,6 @@ WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
 LARGE = 10.0  # of a coefficient, if the views do not determine it
 ALIKE = 1.5  # times the held-out error: another model that is near to the views
 SIGMAS = 2.0  # of the gain of all views
-NOWHERE = np.zeros(3)
 MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
 
@@ -226,13 +225,8 @@ def _fit_whole(views: Views, near: Camera, most: float = np.inf) -> "_Drawn | No
     return None if is_fisheye else _unfolded(views, near, pulls)
 
 
-def fit_camera(
-    views: Views, near: Camera, pull: float | None = None, offsets: FloatArray = NOWHERE
-) -> BoardFit:
-    """Fit camera, poses and board from an initial camera; see `Choice` for the pull.
-
-    ``offsets`` (N, 3), mm, are those of the points of the board from its shape.
-    """
+def fit_camera(views: Views, near: Camera, pull: float | None = None) -> BoardFit:
+    """Fit camera, poses and board from an initial camera; see `Choice` for the pull."""
     known, poses = None, rough_poses(near, views)
     if pull is not None:
         distortion = near.distortion.copy()
@@ -243,7 +237,7 @@ def fit_camera(
         at = 4 + np.array(folding)
         known[at, at] = pull**-2
     state = BoardState(
-        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE), offsets
+        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
     return adjust_board(views, state, (known,))
 

@@ -3,8 +3,8 @@
 The residuals of a fit are linear in its unknowns, in the places of all points of the
 board (as in a calibration that releases the object [1]_), and in a smooth residual
 field of the lens over the image. The variances of noise, points and field follow from
-restricted maximum likelihood, by the fixed point of [2]_; amplitude and length of the
-field are averaged over a grid, weighted by the likelihood.
+restricted maximum likelihood, by the fixed point of [2]_; fields of three lengths are
+averaged, weighted by the likelihood.
 
 What one view has to itself (blur, shadows, a board that gives way) makes its residuals
 depend on each other. The covariance therefore takes whole views as independent, and
@@ -39,16 +39,15 @@ from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
 
 LENGTHS = (0.3, 0.15, 0.6)  # of the field, in the image's longer side
-SPREADS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the amplitude, in the likeliest one
 LEAST = 1e-3  # of the noise: a component of no effect
-LEAST_SPREAD = 0.3  # of the noise: an amplitude that may yet be
+LEAST_FIELD = 0.3  # of the noise: an amplitude that may yet be
 FIRST = 0.2  # of the noise: start value of a component
 MAX_ROUNDS = 20
 CONVERGED = 0.1  # of twice the logarithm of the likelihood
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
+LARGE = 4.0  # times the noise: a field beside which the fit is far off
 FINER = (2**0.5, 2**0.25)  # ratio of further lengths to one that is singled out
 SINGLED = 0.9  # of the likelihood, by one length
-LARGE = 4.0  # times the noise: a field beside which the fit is far off
 SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
 
 
@@ -140,46 +139,48 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
 
 def _from(views: Views, fitted: BoardFit) -> MixedFit:
     plain = _design_of(views, fitted)
-    longer = max(views.image_sizes[0])
-    designs = [_with_field(plain, views, fitted, each * longer) for each in LENGTHS]
-    components = _most_likely(designs[0]).components
-    without = _solved(plain, components)
-    found = [each for design in designs for each in _solutions(design, without)]
-    weights, best = _weighed(found)
-    for ratio in FINER:  # a length that the likelihood singles out
-        is_it = np.array([each.design.field is best.design.field for each in found])
-        if weights[is_it].sum() < SINGLED or best.design.field is None:
-            break
-        for length in (
-            best.design.field.length * ratio,
-            best.design.field.length / ratio,
-        ):
-            design = _with_field(plain, views, fitted, length)
-            found += _solutions(design, without)
-        weights, best = _weighed(found)
-    n, n_kept = plain.n_fit, len(without.x)
-    x = np.sum([w * s.x[:n_kept] for w, s in zip(weights, found, strict=True)], axis=0)
-    off = np.stack([s.x[:n] - x[:n] for s in found])
+    found, weights, best = _by_lengths(plain, views, fitted)
+    without = _solved(plain, best.components)
+    n, all_x = plain.n_fit, np.stack([each.x[: plain.n_plain] for each in found])
+    x = weights @ all_x
+    off = all_x[:, :n] - x[:n]
     held_out, robust = _robust(best)
     prior = best.design.prior(best.components)
     total = best.covariance @ prior @ best.covariance + robust
-    between = np.einsum("s,si,sj->ij", weights, off, off)
     field = None
     if without.deviance - best.deviance > SIGNIFICANT:
         field = _field(best, total, fitted)
     adjustment = _moved(views, fitted, x, best.components.noise, field)
-    adjustment = replace(adjustment, covariance=total[:n, :n] + between)
+    adjustment = replace(adjustment, covariance=total[:n, :n] + weights * off.T @ off)
     squares = np.square(held_out).sum(axis=1) / views.seen.sum(axis=(1, 2))
     return MixedFit(
         adjustment, best.components, robust[:n, :n], field, np.sqrt(squares)
     )
 
 
-def _weighed(found: list[_Solution]) -> tuple[FloatArray, _Solution]:
-    """Return the weights of solutions by their likelihood, and the likeliest one."""
-    deviances = np.array([each.deviance for each in found])
-    weights = np.exp(-0.5 * (deviances - deviances.min()))
-    return weights / weights.sum(), found[int(np.argmin(deviances))]
+def _by_lengths(
+    plain: _Design, views: Views, fitted: BoardFit
+) -> tuple[list[_Solution], FloatArray, _Solution]:
+    """Return solutions by lengths of the field, their weights, and the likeliest one.
+
+    Further ones lie about a length that the likelihood singles out.
+    """
+    found: list[_Solution] = []
+    longer, near = max(views.image_sizes[0]), None
+    lengths = [each * longer for each in LENGTHS]
+    for ratio in (*FINER, 1.0):
+        for length in lengths:
+            design = _with_field(plain, views, fitted, length)
+            found.append(_most_likely(design, near))
+        deviances = np.array([each.deviance for each in found])
+        weights = np.exp(-0.5 * (deviances - deviances.min()))
+        weights /= weights.sum()
+        best = found[int(np.argmin(deviances))]
+        if weights.max() < SINGLED or best.design.field is None:
+            break
+        near, length = best.components, best.design.field.length
+        lengths = [length * ratio, length / ratio]
+    return found, weights, best
 
 
 def held_out_errors(views: Views, fitted: BoardFit) -> FloatArray:
@@ -257,11 +258,11 @@ def _without_poses(projector: FloatArray, columns: FloatArray) -> FloatArray:
     return np.asarray(columns - projector @ explained)
 
 
-def _most_likely(design: _Design) -> _Solution:
+def _most_likely(design: _Design, near: VarianceComponents | None = None) -> _Solution:
     """Return the solution by the most likely components."""
     noise = max(np.sqrt(design.squares / max(design.n, 1)), 1e-6)
     mm = FIRST * noise * design.mm
-    components = VarianceComponents(noise, mm, mm, FIRST * noise)
+    components = near or VarianceComponents(noise, mm, mm, FIRST * noise)
     before = np.inf
     for _ in range(MAX_ROUNDS):
         solution = _solved(design, components)
@@ -312,40 +313,10 @@ def _following(solution: _Solution) -> VarianceComponents:
         noise,
         deviation(squares[:2].sum(), in_plane, least * design.mm),
         deviation(squares[2], out_of_plane, least * design.mm),
-        deviation(float(nodes @ own @ nodes), of_field, least)
+        deviation(float(nodes @ own @ nodes), of_field, LEAST_FIELD * noise)
         if len(nodes)
         else components.field,
     )
-
-
-def _solutions(design: _Design, without: _Solution) -> list[_Solution]:
-    """Return the solutions with fields of several amplitudes.
-
-    Given that without a field, the other unknowns are eliminated.
-    """
-    n, components = design.n_plain, without.components
-    weight = components.noise**-2
-    cross = weight * design.normal[:n, n:]
-    drawn = without.covariance @ cross
-    own = weight * design.normal[n:, n:] - cross.T @ drawn
-    right = weight * design.right[n:] - cross.T @ without.x
-    logarithm = float(np.linalg.slogdet(design.node_prior)[1])
-    most = max(components.field, LEAST_SPREAD * components.noise)
-    found = []
-    for amplitude in (most * np.array(SPREADS)).tolist():
-        of_nodes, determinant = _inverse(own + design.node_prior / amplitude**2)
-        nodes, by_field = of_nodes @ right, drawn @ of_nodes
-        covariance = np.empty_like(design.normal)
-        covariance[:n, :n] = without.covariance + by_field @ drawn.T
-        covariance[n:, n:] = of_nodes
-        covariance[:n, n:] = -by_field
-        covariance[n:, :n] = -by_field.T
-        deviance = without.deviance + determinant - logarithm
-        deviance += 2 * len(nodes) * np.log(amplitude) - float(right @ nodes)
-        x = np.r_[without.x - drawn @ nodes, nodes]
-        its = replace(components, field=amplitude)
-        found.append(_Solution(design, its, deviance, x, covariance))
-    return found
 
 
 def _inverse(normal: FloatArray) -> tuple[FloatArray, float]:
