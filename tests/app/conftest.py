@@ -45,6 +45,7 @@ from pytestqt.exceptions import TimeoutError as WaitedInVain
 from pytestqt.qtbot import QtBot
 from pytestqt.wait_signal import SignalBlocker
 from tests.app.disk import disk_watch
+from tests.app.patience import PATIENCE_MS
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
@@ -65,8 +66,6 @@ from lightpen_app.work.garbage import collect_if_due
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
-
-PATIENCE_MS = 120_000  # on a machine that does other things besides
 
 
 class PatientBot(QtBot):

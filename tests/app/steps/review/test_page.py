@@ -30,6 +30,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.patience import PATIENCE_MS
 from tests.app.pictures import colors_in
 from tests.app.typed_numbers import type_number
 from tests.app.undressed import undressed
@@ -104,7 +105,6 @@ N_PLOTS = 9
 DAMAGED = 7
 SLIPPED = 9
 THEN = datetime.now().astimezone() - timedelta(days=99)
-PATIENCE_MS = 120_000  # on a machine that does other things besides
 
 
 @pytest.fixture(scope="session")

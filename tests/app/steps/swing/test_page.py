@@ -11,6 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication
 from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
+from tests.app.patience import PATIENCE_MS
 from tests.faulty_camera import FaultyCamera
 
 from lightpen.cameras.protocol import CameraSettings
@@ -46,7 +47,6 @@ SHORT = SwingLimits(
 LONG = SwingLimits(max_uncertainty=1e-5, min_images=5000, max_images=5000)
 VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
 UPRIGHT = Posture(0.0, 0.0, 0.0)
-PATIENCE_MS = 120_000
 
 
 class Recorder:
