@@ -238,7 +238,8 @@ def _towards_light(windows: _Windows, at: FloatArray, misfit: float) -> FloatArr
     beside = np.maximum(away[:, 1, :, None], away[:, 0, None, :])
     edges = np.ceil(BOX * windows.radii)[:, None, None]
     rim, inside = beside == edges, beside <= edges
-    background = (windows.light * rim).sum(axis=(1, 2)) / rim.sum(axis=(1, 2))
+    n_rim = np.maximum(rim.sum(axis=(1, 2)), 1)  # none where a fit leaves its window
+    background = (windows.light * rim).sum(axis=(1, 2)) / n_rim
     light = windows.light - background[:, None, None]
     least = FAINT * (windows.tops - background)
     light = np.where(inside & (light > least[:, None, None]), light, 0.0)
