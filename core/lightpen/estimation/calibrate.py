@@ -27,7 +27,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.adjustment import Adjustment, adjust
 from lightpen.estimation.bundle.bundle import Bundle
-from lightpen.estimation.bundle.change_point import Step, step_of_poses
+from lightpen.estimation.bundle.change_point import ChangePoint, step_of_poses
 from lightpen.estimation.bundle.consistency_findings import Contradiction
 from lightpen.estimation.bundle.disc_diameter import read_diameter
 from lightpen.estimation.bundle.field_findings import FoundField, found_fields
@@ -145,7 +145,9 @@ class Calibration:
     coverage: Coverage
     lags: tuple[TimeLag | None, ...] = ()  # of each camera of a rig but the first
     second: SecondCone | None = None
-    step: Step | None = None  # between two images; its ``first`` counts all images
+    step: ChangePoint | None = (
+        None  # between two images; its ``first`` counts all images
+    )
     method: Method = "joint"  # of the reported tip
 
     @property
@@ -501,8 +503,8 @@ def _calibration_of(
 
 
 def _step_of(
-    step: Step | None, start: _Start, part: PosedImages, poses: Poses
-) -> Step | None:
+    step: ChangePoint | None, start: _Start, part: PosedImages, poses: Poses
+) -> ChangePoint | None:
     """Return a step with its index among all images, a large one by the poses."""
     reasons = start.reasons[part.posed, 0]
     chosen = np.flatnonzero((reasons == Reason.NONE) | (reasons == Reason.SLIPPED))

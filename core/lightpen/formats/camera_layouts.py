@@ -28,7 +28,7 @@ _RADIAL = "k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty"  # in the order of OpenCV
 
 
 @dataclass(frozen=True)
-class Layout:
+class FileLayout:
     """Where a program writes the intrinsics of a camera.
 
     A path is names with ``/`` between them; ``|`` separates other spellings.
@@ -64,7 +64,7 @@ def _each(names: str, path: str = "{}") -> dict[str, str]:
 
 
 LAYOUTS = (
-    Layout(
+    FileLayout(
         "mrcal",
         marks="lensmodel imagersize",
         size="imagersize",
@@ -73,7 +73,7 @@ LAYOUTS = (
         brown="lensmodelpinhole lensmodelopencv4 lensmodelopencv5 lensmodelopencv8 "
         "lensmodelopencv12",
     ),
-    Layout(
+    FileLayout(
         "COLMAP",
         marks="colmap",
         size="width height",
@@ -83,7 +83,7 @@ LAYOUTS = (
         fisheye="simpleradialfisheye radialfisheye opencvfisheye",
         first=0.5,
     ),
-    Layout(
+    FileLayout(
         "Metashape",
         marks="projection",
         size="width height",
@@ -95,7 +95,7 @@ LAYOUTS = (
         fisheye="fisheye",
         first=0.5,
     ),
-    Layout(
+    FileLayout(
         "calib.io",
         marks="Calibration",
         part="Calibration/cameras/model",
@@ -107,7 +107,7 @@ LAYOUTS = (
         model="polymorphic_name",
         brown="libcalibcameramodelopencv",
     ),
-    Layout(
+    FileLayout(
         "PhotonVision",
         marks="cameraIntrinsics",
         size="resolution",
@@ -116,7 +116,7 @@ LAYOUTS = (
             "distCoeffs|cameraExtrinsics": _RADIAL,
         },
     ),
-    Layout(
+    FileLayout(
         "RealSense",
         marks="ppx ppy",
         size="width height",
@@ -127,7 +127,7 @@ LAYOUTS = (
         undistorted="inversebrownconrady modifiedbrownconrady",
         of_fisheye={"coeffs": "k1 k2 k3 k4 -"},
     ),
-    Layout(
+    FileLayout(
         "camodocal",
         marks="model_type projection_parameters",
         size="image_width image_height",
@@ -211,7 +211,7 @@ def foreign_intrinsics(entries: Entries) -> Given | None:
     return None
 
 
-def _given(layout: Layout, entries: Entries) -> Given:
+def _given(layout: FileLayout, entries: Entries) -> Given:
     part = _descend(entries, layout.part)
     lens, stated = _lens(layout, part)
     size = np.concatenate([_numbers(part, path) for path in layout.size.split()])
@@ -238,7 +238,7 @@ def _given(layout: Layout, entries: Entries) -> Given:
 
 
 def _pinhole(
-    named: dict[str, float], size: FloatArray, layout: Layout, entries: Entries
+    named: dict[str, float], size: FloatArray, layout: FileLayout, entries: Entries
 ) -> FloatArray:
     f = named.get(_FOCAL, named.get("fx"))
     if f is None:
@@ -267,7 +267,7 @@ def _coefficients(named: dict[str, float], lens: LensModel) -> FloatArray:
     return values[: next(n for n in (5, 8, 12, 14) if used < n)]
 
 
-def _lens(layout: Layout, part: Entries) -> tuple[LensModel | None, str]:
+def _lens(layout: FileLayout, part: Entries) -> tuple[LensModel | None, str]:
     """Return the lens model, None without distortion, and its name in the file."""
     if not layout.model:
         return BROWN, ""
@@ -284,7 +284,7 @@ def _lens(layout: Layout, part: Entries) -> tuple[LensModel | None, str]:
     raise _unread(layout, stated, part)
 
 
-def _unread(layout: Layout, model: str, entries: Entries) -> FileError:
+def _unread(layout: FileLayout, model: str, entries: Entries) -> FileError:
     return FileError(
         "camera-file.foreign-model",
         name=entries.name,

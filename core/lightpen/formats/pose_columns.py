@@ -185,7 +185,7 @@ def _matrix(header: Sequence[str]) -> ToolColumns | None:
     )
 
 
-def rotations_of(quaternions: FloatArray) -> FloatArray:
+def rotations_of_quaternions(quaternions: FloatArray) -> FloatArray:
     """Return rotations (N, 3, 3) of quaternions (N, 4), w x y z; NaN of none."""
     from scipy.spatial.transform import Rotation  # takes 0.2 s
 
@@ -238,7 +238,8 @@ def without_names(values: FloatArray, name: str) -> tuple[FloatArray, FloatArray
         elif own.shape[1] == 7:
             for q, t in ((own[:, 3:], own[:, :3]), (own[:, :4], own[:, 4:])):
                 candidates += [
-                    (rotations_of(np.roll(q, turn, 1)), t) for turn in (0, 1)
+                    (rotations_of_quaternions(np.roll(q, turn, 1)), t)
+                    for turn in (0, 1)
                 ]
     good = [each for each in candidates if are_rotations(each[0])]
     if not good:

@@ -21,7 +21,7 @@ from lightpen.formats.pose_columns import (
     ToolColumns,
     are_rotations,
     is_lost,
-    rotations_of,
+    rotations_of_quaternions,
     tools_of,
     without_names,
 )
@@ -111,7 +111,7 @@ def _of_tool(table: Table, columns: ToolColumns, rows: list[int]) -> GivenPoses:
     if columns.matrix:
         rotations = own.numbers_or_none(columns.matrix).reshape(-1, 3, 3)
     else:
-        rotations = rotations_of(own.numbers_or_none(columns.quaternion))
+        rotations = rotations_of_quaternions(own.numbers_or_none(columns.quaternion))
     return _given(rotations, translations, columns.unit, table.name)
 
 

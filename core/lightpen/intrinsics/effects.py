@@ -398,13 +398,13 @@ def _moved(
     state = moved_state(fitted.state, x[:n], poses)
     state = replace(state, offsets=fitted.state.offsets + x[n:].reshape(-1, 3))
     return replace(
-        fit_board_poses(without_field(views, field), state),
+        fit_board_poses(views_without_field(views, field), state),
         sigma=noise,
         prior=fitted.prior,
     )
 
 
-def without_field(views: Views, field: LensField | None) -> Views:
+def views_without_field(views: Views, field: LensField | None) -> Views:
     """Return the views of one camera with the residual field of its lens removed."""
     if field is None:
         return views

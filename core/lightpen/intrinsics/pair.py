@@ -22,7 +22,7 @@ from lightpen.intrinsics.calibration import (
 )
 from lightpen.intrinsics.changes import USELESS
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
-from lightpen.intrinsics.effects import without_field
+from lightpen.intrinsics.effects import views_without_field
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
@@ -98,7 +98,7 @@ def calibrate_pair(
         raise
     views = views.chosen(np.all(views.found, axis=1))
     for c, camera in enumerate(cameras):
-        even = without_field(views.of_camera(c), camera.lens_field)
+        even = views_without_field(views.of_camera(c), camera.lens_field)
         pixels = views.pixels.copy()
         pixels[:, c] = even.pixels[:, 0]
         views = replace(views, pixels=pixels)

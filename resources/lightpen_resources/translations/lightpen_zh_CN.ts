@@ -4325,6 +4325,10 @@ needed</source>
 <context>
     <name>SetupView</name>
     <message>
+        <source>Enter what you are calibrating. Entries are saved for this station.</source>
+        <translation>填写标定对象。所填内容按工位保存。</translation>
+    </message>
+    <message>
         <source>More</source>
         <translation>更多</translation>
     </message>
@@ -4510,24 +4514,12 @@ needed</source>
         <translation>选择测头，将其放入锥孔，然后开始摆动。</translation>
     </message>
     <message>
-        <source>The tip rests in a cone while the pen is tilted to all sides; a camera observes the LEDs of the pen. The only point of the pen that does not move is the tip centre.</source>
-        <translation>测头停在锥孔中，光笔向各个方向倾斜；相机观察光笔的 LED。光笔上唯一不动的点就是测头中心。</translation>
-    </message>
-    <message>
-        <source>Enter what you are calibrating. Entries are saved for this station.</source>
-        <translation>填写标定对象。所填内容按工位保存。</translation>
-    </message>
-    <message>
         <source>Choose how to begin.</source>
         <translation>请选择如何开始。</translation>
     </message>
     <message>
         <source>Tip {0} is retired. Choose another tip, or reactivate it in the tip library.</source>
         <translation>测头 {0} 已停用。请另选一个，或在测头库中恢复使用。</translation>
-    </message>
-    <message>
-        <source>A swing is in progress.</source>
-        <translation>摆动正在进行。</translation>
     </message>
     <message>
         <source>Continue to the camera</source>
@@ -5488,10 +5480,21 @@ mm</translation>
     </message>
 </context>
 <context>
+    <name>WelcomeControl</name>
+    <message>
+        <source>A swing is in progress.</source>
+        <translation>摆动正在进行。</translation>
+    </message>
+</context>
+<context>
     <name>WelcomeView</name>
     <message>
         <source>Folder of the recorded images</source>
         <translation>录制图像的文件夹</translation>
+    </message>
+    <message>
+        <source>The tip rests in a cone while the pen is tilted to all sides; a camera observes the LEDs of the pen. The only point of the pen that does not move is the tip centre.</source>
+        <translation>测头停在锥孔中，光笔向各个方向倾斜；相机观察光笔的 LED。光笔上唯一不动的点就是测头中心。</translation>
     </message>
     <message>
         <source>Try it with a simulated pen</source>

@@ -236,7 +236,10 @@ def test_an_image_shows_the_same_live_and_on_files(
 
 def test_every_reason_that_one_image_can_have_is_among_the_scenes() -> None:
     reasons = {reason for _, reason in SCENES.values()}
-    of_many_images = {*(Reason.MISFIT, Reason.SLIPPED, Reason.TAKEN_OUT, Reason.COPY)}
+    of_many_images = {
+        *(Reason.MISFIT, Reason.SLIPPED, Reason.TAKEN_OUT, Reason.COPY),
+        Reason.OUTSIDE,
+    }
     elsewhere = {
         Reason.UNREADABLE,  # a file; a live image comes whole or not at all
         Reason.UNHANDLED,  # a mistake of the program, made in the tests of both ways

@@ -12,7 +12,7 @@ from lightpen.messages import Message, message
 from lightpen.swing_messages import Code, file_uncertain, too_little_tilt
 
 DAMAGED = message("results.damaged", file="a, b {c}.json")
-ADVICE = message("share.temperature")
+ADVICE = message("share.leds")
 
 
 def stored(original: Message) -> StoredMessage:

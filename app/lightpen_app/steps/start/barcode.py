@@ -1,10 +1,11 @@
 """Barcode scanner input, distinguished from typing by its speed."""
 
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QWindow
+from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent, QWindow
 from typing_extensions import override
 
 from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.translated import WidgetMixin
 
 PACE_MS = 50  # from one key of a scanner to the next at most; a hand takes longer
 PATIENCE_MS = 60  # without a key that end a scan
@@ -93,6 +94,29 @@ class BarcodeListener(QObject):
             if self._window is not None:
                 QCoreApplication.sendEvent(self._window, each)
         self._hands_on = False
+
+
+class HearsBarcodes(WidgetMixin):
+    """Mixin before the base of a widget: listens to barcodes while it is shown."""
+
+    barcodes: BarcodeListener
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.barcodes.listen(self.window().windowHandle())
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self.barcodes.listen(None)
+
+    @override
+    def event(self, event: QEvent) -> bool:
+        """Keep the keys of a barcode from triggering shortcuts."""
+        if event.type() == QEvent.Type.ShortcutOverride:
+            return self.barcodes.takes(event) or super().event(event)
+        return super().event(event)
 
 
 def _is_of_barcode(event: QKeyEvent) -> bool:

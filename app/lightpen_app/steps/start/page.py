@@ -1,15 +1,15 @@
 """The step Start: day page and set-up of the station."""
 
-from PySide6.QtCore import QEvent, QSize
-from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 from typing_extensions import override
 
-from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.start.barcode import HearsBarcodes
 from lightpen_app.steps.start.day_control import DayControl
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.entries import EntryPresenter
@@ -21,17 +21,18 @@ from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsControl
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.setup_view import SetupView
+from lightpen_app.steps.start.welcome_control import WelcomeControl
 from lightpen_app.steps.start.welcome_view import WelcomeView
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.work.selection import TRIAL, is_trial_ready
+from lightpen_app.work.selection import is_trial_ready
 from lightpen_app.work.workbench import Workbench
 
 DAY, SETUP, WELCOME = range(3)  # the views
 
 
-class StartPage(ResponsiveLayout, Page):
+class StartPage(HearsBarcodes, ResponsiveLayout, Page):
     """Shows the day page; on request the set-up; before all, how to begin."""
 
     key = "start"
@@ -41,9 +42,7 @@ class StartPage(ResponsiveLayout, Page):
 
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
-        self._selection, self._run = workbench.selection, workbench.run
-        self._tips = workbench.library
-        self._camera, self._chosen_files = workbench.camera, workbench.files
+        self._selection, self._tips = workbench.selection, workbench.library
 
         # Widgets: the order of making them is the order of the Tab key
         self._unknown_code = QuestionBar()
@@ -52,6 +51,7 @@ class StartPage(ResponsiveLayout, Page):
         is_known = bool(workbench.selection.stations())
         self._setup = setup = SetupView(workbench, is_known=is_known)
         self._welcome = WelcomeView()
+        self._begin = WelcomeControl(workbench, self._welcome, self)
         self._result = LastResultPanel(workbench.around.now)
         self._large = LargeScreenPanel(workbench.run.logbook)
         self._views = QStackedWidget()
@@ -61,12 +61,13 @@ class StartPage(ResponsiveLayout, Page):
             workbench, self._interrupted, lambda: self._entries.settle(), self
         )
         self._last = LastResultPresenter(
-            self._selection, self._run, self._tips, self._result, self._large
+            self._selection, workbench.run, self._tips, self._result, self._large
         )
         self._entries = EntryPresenter(
             self._selection, self._library, setup.names, setup.limits, setup.assumed
         )
         self._control = DayControl(workbench, self._library, self._day)
+        self.barcodes = self._library.barcodes
 
         # Layout
         bars = self._unknown_code, self._interrupted
@@ -84,11 +85,9 @@ class StartPage(ResponsiveLayout, Page):
         setup.names.station_entered.connect(self.show_missing_input)
         setup.limits.all_requested.connect(self._all_limits.open)
         setup.welcome_requested.connect(self.show_welcome)
-        self._welcome.trial_requested.connect(
-            lambda: self._chosen_files.use_trial(self._begin_trial)
-        )
-        self._welcome.images_chosen.connect(self._begin_station)
-        self._welcome.station_requested.connect(self._begin_station)
+        self._begin.trial_ready.connect(lambda: self.step_requested.emit("swing"))
+        self._begin.trial_awaited.connect(self.show_welcome)
+        self._begin.station_begun.connect(self.show_setup)
         setup.folder.change_requested.connect(self.data_folder_requested)
         setup.done.connect(self.show_day)
         self._day.setup_requested.connect(self.show_setup)
@@ -101,7 +100,6 @@ class StartPage(ResponsiveLayout, Page):
         workbench.folder_watch.fault_changed.connect(setup.folder.set_fault)
         workbench.library.changed.connect(self._refresh)
         workbench.selection.changed.connect(self._on_selected)
-        workbench.run.changed.connect(self._show_trial)
 
         self._use_room()
         self._retranslate()
@@ -109,15 +107,14 @@ class StartPage(ResponsiveLayout, Page):
     @property
     def is_day(self) -> bool:
         """Whether the day page is shown, and not the set-up of the station."""
-        return self._views.currentIndex() == DAY
+        return self._shows(DAY)
 
-    @property
-    def _is_welcome(self) -> bool:
-        return self._views.currentIndex() == WELCOME
+    def _shows(self, view: int) -> bool:
+        return self._views.currentIndex() == view
 
     @override
     def heading(self) -> str:
-        if self._is_welcome:
+        if self._shows(WELCOME):
             return self.tr("Where is the tip of the pen?")
         return self.title() if self.is_day else self.tr("Set up station")
 
@@ -125,15 +122,7 @@ class StartPage(ResponsiveLayout, Page):
     def lead(self) -> str:
         if self.is_day:
             return self.tr("Choose a tip, seat it in the cone and start the swing.")
-        if self._is_welcome:
-            return self.tr(
-                "The tip rests in a cone while the pen is tilted to all sides; a "
-                "camera observes the LEDs of the pen. The only point of the pen that "
-                "does not move is the tip centre."
-            )
-        return self.tr(
-            "Enter what you are calibrating. Entries are saved for this station."
-        )
+        return self._welcome.lead() if self._shows(WELCOME) else self._setup.lead()
 
     @override
     def is_complete(self) -> bool:
@@ -142,7 +131,7 @@ class StartPage(ResponsiveLayout, Page):
     @override
     def main_action(self) -> MainAction:
         why_not = self._entries.why_not_on()
-        if self._is_welcome:
+        if self._shows(WELCOME):
             why_not = self.tr("Choose how to begin.")
         if not self.is_day:
             return MainAction(self.tr("Continue to the camera"), why_not)
@@ -159,16 +148,15 @@ class StartPage(ResponsiveLayout, Page):
 
     @override
     def show_missing_input(self) -> None:
-        if self._is_welcome:
+        if self._shows(WELCOME):
             self._welcome.trial.setFocus()
             return
-        missing_inputs = self._entries.typed().start_missing_inputs()
-        if missing_inputs:
+        if self._entries.typed().start_missing_inputs():
             self.show_setup()
 
     @override
     def first_control(self) -> QWidget | None:
-        if self._is_welcome:
+        if self._shows(WELCOME):
             return self._welcome.trial
         return self._day.first_control() if self.is_day else None
 
@@ -194,10 +182,7 @@ class StartPage(ResponsiveLayout, Page):
 
     def show_day(self) -> None:
         """Show the tips of the station."""
-        self._views.setCurrentIndex(DAY)
-        if self.isVisible():
-            self._day.first_control().setFocus()
-        self._refresh()
+        self._show_view(DAY)
 
     def show_setup(self) -> None:
         """Show the settings page."""
@@ -212,9 +197,13 @@ class StartPage(ResponsiveLayout, Page):
 
     def show_welcome(self) -> None:
         """Show how to begin."""
-        self._views.setCurrentIndex(WELCOME)
-        if self.isVisible():
-            self._welcome.trial.setFocus()
+        self._show_view(WELCOME)
+
+    def _show_view(self, view: int) -> None:
+        self._views.setCurrentIndex(view)
+        control = self.first_control()
+        if control is not None and self.isVisible():
+            control.setFocus()
         self._refresh()
 
     @override
@@ -230,25 +219,12 @@ class StartPage(ResponsiveLayout, Page):
     @override
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._library.barcodes.listen(self.window().windowHandle())
         if not event.spontaneous():
             self._unfinished.search()
 
     @override
-    def hideEvent(self, event: QHideEvent) -> None:
-        super().hideEvent(event)
-        self._library.barcodes.listen(None)
-
-    @override
-    def event(self, event: QEvent) -> bool:
-        """Keep the keys of a barcode from triggering shortcuts."""
-        if event.type() == QEvent.Type.ShortcutOverride:
-            return self._library.barcodes.takes(event) or super().event(event)
-        return super().event(event)
-
-    @override
     def _retranslate(self) -> None:
-        self._show_trial()
+        self._begin.refresh()
         self._last.show_status()
         self._library.refresh()
         self._control.refresh()
@@ -268,29 +244,6 @@ class StartPage(ResponsiveLayout, Page):
         if not before.names.station and not now.start_missing_inputs():
             self.show_day()  # the station is known from before
         self._refresh()
-
-    def _begin_trial(self) -> None:
-        if not self._camera.live.is_open:
-            self.show_welcome()  # until there is an image; the day page shows none
-            self._camera.open()
-        elif is_trial_ready(self._selection.preparation) and self.isVisible():
-            self.step_requested.emit("swing")
-
-    def _begin_station(self, images: str = "") -> None:
-        """Set up a station, with recorded images or without a source."""
-        names = self._selection.preparation.names
-        if names.station in ("", TRIAL.station):
-            self._selection.begin_station()
-        if images:
-            source = SourceChoice(SourceKind.RECORDED, images)
-            chosen = self._selection.preparation.with_source(source)
-            self._selection.set_preparation(chosen)
-        self.show_setup()
-
-    def _show_trial(self) -> None:
-        is_on = self._run.status.state is not None
-        why_not = self.tr("A swing is in progress.") if is_on else ""
-        self._welcome.trial.set_why_not(why_not)
 
     def _on_verification_requested(self) -> None:
         self._entries.settle()

@@ -55,6 +55,12 @@ class SetupView(Translated, QWidget):
         self.set_more(is_known)
         self._retranslate()
 
+    def lead(self) -> str:
+        """Return what to enter."""
+        return self.tr(
+            "Enter what you are calibrating. Entries are saved for this station."
+        )
+
     def set_narrow(self, narrow: bool) -> None:
         """Use one column where there is little width."""
         set_stacked(self._columns, narrow)

@@ -74,6 +74,14 @@ class WelcomeView(Translated, QWidget):
         dialog.fileSelected.connect(self.images_chosen)
         dialog.open()
 
+    def lead(self) -> str:
+        """Return what the program does."""
+        return self.tr(
+            "The tip rests in a cone while the pen is tilted to all sides; a camera "
+            "observes the LEDs of the pen. The only point of the pen that does not "
+            "move is the tip centre."
+        )
+
     def _retranslate(self) -> None:
         self.trial.set_words(
             self.tr("Try it with a simulated pen"),

@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
-from lightpen.estimation.bundle.change_point import Step, find_step
+from lightpen.estimation.bundle.change_point import ChangePoint, find_step
 from lightpen.estimation.bundle.consistency_findings import (
     ContradictedInputs,
     Contradiction,
@@ -50,7 +50,7 @@ class Adjustment:
     contradictions: tuple[Contradiction, ...]
     correlation: Correlation
     fields: tuple[SearchedField, ...]  # those that are not fitted
-    step: Step | None  # between two images; the fit does not contain it
+    step: ChangePoint | None  # between two images; the fit does not contain it
 
 
 @dataclass(frozen=True, eq=False)

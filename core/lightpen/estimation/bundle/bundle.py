@@ -305,7 +305,7 @@ def with_fields(
     return unknowns, _solve(unknowns, now, bundle.weight_sigma, with_components=True)
 
 
-def at_rest(bundle: Bundle, pixels: FloatArray) -> tuple[Solved, FloatArray]:
+def solved_at_rest(bundle: Bundle, pixels: FloatArray) -> tuple[Solved, FloatArray]:
     """Return the linear solution about a fit without drift and seat, but with jitter.
 
     And its step from the fit, (p,); ``pixels`` (N, C, L, 2) as fitted, px.

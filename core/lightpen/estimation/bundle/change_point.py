@@ -13,7 +13,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import Poses
-from lightpen.estimation.bundle.bundle import Bundle, at_rest
+from lightpen.estimation.bundle.bundle import Bundle, solved_at_rest
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.pivot.pivot import contact_matrix, tip_covariances
 from lightpen.messages import Message, message
@@ -27,7 +27,7 @@ EXPLAINED = 0.8  # of the images, by a large step: those before it or after it s
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class ChangePoint:
     """A step between two images."""
 
     first: int  # index of the first image after it
@@ -101,7 +101,7 @@ class _Images(NamedTuple):
         return float(self.gains(score[None], information[None], coupling[None])[0][0])
 
 
-def find_step(bundle: Bundle, pixels: FloatArray) -> Step | None:
+def find_step(bundle: Bundle, pixels: FloatArray) -> ChangePoint | None:
     """Return the step in a swing; None if there is none beyond doubt.
 
     ``pixels`` (N, C, L, 2) as fitted, px. A second cone has no step.
@@ -109,7 +109,7 @@ def find_step(bundle: Bundle, pixels: FloatArray) -> Step | None:
     state = bundle.state
     if len(pixels) < 2 * MIN_PART + 1 or state.at_second is not None:
         return None
-    solved, change = at_rest(bundle, pixels)
+    solved, change = solved_at_rest(bundle, pixels)
     rows = solved.eliminated.cone_rows
     coupling = bundle.unknowns.sensitivity(rows)
     score = solved.eliminated.cone_right - coupling @ change
@@ -117,7 +117,7 @@ def find_step(bundle: Bundle, pixels: FloatArray) -> Step | None:
     return _certain(cone, state.rotations)
 
 
-def step_of_poses(poses: Poses, is_slipped: BoolArray) -> Step | None:
+def step_of_poses(poses: Poses, is_slipped: BoolArray) -> ChangePoint | None:
     """Return the step by poses cam_from_pen alone, where many images slipped, or None.
 
     A fit of all images leaves out those after a large step. ``is_slipped`` (N,) are
@@ -144,13 +144,15 @@ def step_of_poses(poses: Poses, is_slipped: BoolArray) -> Step | None:
     return step if explained > EXPLAINED else None
 
 
-def _certain(cone: _Images, rotations: FloatArray) -> Step | None:
+def _certain(cone: _Images, rotations: FloatArray) -> ChangePoint | None:
     """Return the likelier step of tip and cone, if beyond chance and drift."""
     found = []
     for is_tip, images in ((True, cone.turned(-rotations)), (False, cone)):
         gains, shifts = images.steps()
         best = int(np.argmax(gains))
-        found.append(Step(best + MIN_PART, shifts[best], is_tip, float(gains[best])))
+        found.append(
+            ChangePoint(best + MIN_PART, shifts[best], is_tip, float(gains[best]))
+        )
     step = max(found, key=lambda each: each.gain)
     needed = max(CERTAIN, MORE_THAN_DRIFT + cone.drift())
     return step if step.gain > needed else None
