@@ -251,11 +251,11 @@ def test_the_verdict_is_printed_last_and_recorded_with_what_it_goes_by(
 
     assert (verdict["grade"], verdict["next_step"]) == ("pass", "accept")
     assert verdict["code"] == "verdict.good-unchecked"
-    assert list(verdict["values"].values()) == [
-        fields["weakest_direction"]["expanded_uncertainty_mm"]
-    ]
+    weakest = fields["weakest_direction"]["expanded_uncertainty_mm"]
+    assert verdict["values"]["uncertainty"] == weakest
+    assert verdict["values"]["what"]["code"] == "unchecked.scale"
     assert verdict["limits"] == {
-        "max_uncertainty_mm": 0.02,
+        "max_uncertainty_mm": 0.012,
         "min_images": 60,
         "min_per_field": 2,
     }

@@ -16,7 +16,7 @@ from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import Tone
+from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.camera.device_field import DeviceField
@@ -57,6 +57,7 @@ class SourcePanel(Translated, QGroupBox):
         self._kind.setSizeAdjustPolicy(
             ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
+        self._kind.setMinimumWidth(22 * GRID)  # the placeholder would widen it
         for _ in SOURCES:
             self._kind.addItem("")
         self._place = PathField()
