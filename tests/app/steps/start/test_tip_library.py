@@ -273,7 +273,7 @@ def test_a_damaged_library_is_reported_until_it_is_mended(desk: Desk) -> None:
     file.write_bytes(sound.replace(b"T-7", b"T-6"))
     desk.workbench.library.refresh()
     desk.settle()
-    assert "was modified or damaged after it was saved." in reported[-1]
+    assert "was changed before it was entered in the archive." in reported[-1]
 
     file.write_bytes(sound)
     desk.workbench.library.refresh()
