@@ -145,9 +145,7 @@ class Calibration:
     coverage: Coverage
     lags: tuple[TimeLag | None, ...] = ()  # of each camera of a rig but the first
     second: SecondCone | None = None
-    step: ChangePoint | None = (
-        None  # between two images; its ``first`` counts all images
-    )
+    step: ChangePoint | None = None  # its ``first`` counts all images
     method: Method = "joint"  # of the reported tip
 
     @property

@@ -10,6 +10,7 @@ import logging
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
+from typing import TypeVar
 
 from msgspec import Struct
 
@@ -17,11 +18,15 @@ from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, read_bytes, write_whole
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import DamagedError, Digest, parse_own_json
-from lightpen.formats.system_reasons import strerror
-from lightpen.messages import message
-from lightpen.record.library.signing.keys import SigningKey, is_signed, key_folder
+from lightpen.record.library.signing.keys import (
+    WHAT,
+    SigningKey,
+    is_signed,
+    key_folder,
+    make_private_folder,
+)
 
-WHAT = message("file.station-key")
+S = TypeVar("S", bound=Struct)
 
 _logger = logging.getLogger(__name__)
 
@@ -56,10 +61,7 @@ def remembered_head(chain: str) -> RememberedHead | None:
     file = head_file(chain)
     if not file.exists():
         return None
-    try:
-        return parse_own_json(read_bytes(file, WHAT, MEGABYTE), RememberedHead)
-    except DamagedError as error:
-        raise FileError("signing.key-damaged", file=file) from error
+    return _read(file, RememberedHead)
 
 
 def remember_head(chain: str, number: int, digest: str) -> None:
@@ -98,7 +100,7 @@ def owed_files(chain: str) -> tuple[OwedFile, ...]:
     for note in _owed(chain).glob("*.json") if chain else ():
         with suppress(FileNotFoundError):  # it was entered just now
             found.append((note.stat().st_mtime_ns, note))
-    return tuple(_read(note) for _, note in sorted(found) if note.exists())
+    return tuple(_read(note, OwedFile) for _, note in sorted(found) if note.exists())
 
 
 def forget_owed(chain: str, file: OwedFile) -> None:
@@ -114,18 +116,13 @@ def _approved(chain: str, place: str, digest: str) -> bytes:
     return f"lightpen approval\n{chain}\n{place}\n{digest}".encode()
 
 
-def _read(file: Path) -> OwedFile:
+def _read(file: Path, kind: type[S]) -> S:
     try:
-        return parse_own_json(read_bytes(file, WHAT, MEGABYTE), OwedFile)
+        return parse_own_json(read_bytes(file, WHAT, MEGABYTE), kind)
     except DamagedError as error:
         raise FileError("signing.key-damaged", file=file) from error
 
 
 def _write(file: Path, content: Struct) -> None:
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    except OSError as error:
-        raise FileError(
-            "results.no-folder", folder=file.parent, reason=strerror(error)
-        ) from error
+    make_private_folder(file.parent)
     write_whole(file, json_bytes(content))

@@ -84,6 +84,16 @@ def key_folder() -> Path:
     return platformdirs.user_data_path("lightpen-keys", appauthor=False)
 
 
+def make_private_folder(folder: Path) -> None:
+    """Create a folder that no other user may read."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError as error:
+        raise FileError(
+            "results.no-folder", folder=folder, reason=strerror(error)
+        ) from error
+
+
 def chain_of(public: str) -> str:
     """Return the name of the chain that begins with a key."""
     return sha256(bytes.fromhex(public)).hexdigest()[:_CHAIN_LENGTH]
@@ -95,12 +105,7 @@ def make_station_key() -> SigningKey:
 
     key = SigningKey(Ed25519PrivateKey.generate())
     file = _file_of(chain_of(key.public))
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    except OSError as error:
-        raise FileError(
-            "results.no-folder", folder=file.parent, reason=strerror(error)
-        ) from error
+    make_private_folder(file.parent)
     create_whole(file, key.private_bytes().hex().encode(), PRIVATE)
     return key
 
