@@ -141,7 +141,18 @@ def test_u_predicted_from_linear_equations_is_that_of_the_calibration(
     assert 0.8 < ratio < 1.8
 
 
-@pytest.mark.parametrize("name", ["restless", "usual"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("restless", "usual"),
+        pytest.param(
+            "loose",
+            marks=pytest.mark.xfail(
+                strict=True, reason="U is too small for a stylus that jumps by 0.06 mm"
+            ),
+        ),
+    ],
+)
 def test_errors_of_trials_are_what_u_says(name: str, calibrated: Calibrated) -> None:
     found = calibrated(name)
     trials = trials_of(found)

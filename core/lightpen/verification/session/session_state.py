@@ -68,6 +68,7 @@ class SessionState:
 
     def found_by(self, task: VerificationTask[OptionsT, FoundT]) -> FoundT | None:
         """Return the result of a task; None until it is complete."""
+        # What the task itself found has its type.
         return self.found if self.done is task else None  # type: ignore[return-value]
 
     def task(self, setup: SessionSetup) -> AnyTask | None:
