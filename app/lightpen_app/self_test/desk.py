@@ -75,9 +75,8 @@ class Walk(QObject):
             self.ended.emit()
 
     def _open(self) -> bool:
-        if self._workbench.selection.preparation.image_size is not None:
-            self._workbench.run.open_requested.emit(self._swing)
-            self._next = self._finish
+        self._workbench.run.open_requested.emit(self._swing)
+        self._next = self._finish
         return False
 
     def _finish(self) -> bool:
