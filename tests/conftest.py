@@ -53,7 +53,7 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 WATCHED = """
 import sys
 from pathlib import Path
-from lightpen.cli import main
+from lightpen_program import main
 
 status = main(sys.argv[2:])
 reported = Path("/proc/self/status")
@@ -249,7 +249,7 @@ def basler(monkeypatch: pytest.MonkeyPatch) -> "SourcePlace":
 def lightpen() -> Callable[..., CompletedProcess[str]]:
     """Return a function that runs the command line in this process."""
     # Imported here: a broken command line must not keep the other tests from running.
-    from lightpen.cli import main
+    from lightpen_program import main
 
     def run(*arguments: str | Path) -> CompletedProcess[str]:
         words = [str(argument) for argument in arguments]

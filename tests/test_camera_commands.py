@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.cli import main
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.rig_files import read_rig
 from lightpen.intrinsics.boards import parse_board
@@ -17,6 +16,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
+from lightpen_program import main
 
 BOARD = "chessboard:7x5:20"
 CAMERA = Camera(200, 160, 300.0, 299.6, 101.0, 78.0)

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from lightpen import __version__
 from lightpen.arrays import FloatArray
-from lightpen.cli import main
 from lightpen.formats.observation_files import read_poses
 from lightpen.logs import log_file
+from lightpen_program import main
 from lightpen_resources import languages
 
 Run = Callable[..., CompletedProcess[str]]

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.cli import COMMANDS
+from lightpen_program import EXTENSIONS
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
@@ -33,7 +34,12 @@ def test_every_link_leads_to_a_file_and_to_a_heading(page: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [*(name for name, *_ in COMMANDS), "archive", "tips", "open", "report"]
+    "name",
+    [
+        *(name for name, *_ in COMMANDS),
+        *(each.name for extension in EXTENSIONS for each in extension.commands),
+        *("archive", "tips", "open", "report"),
+    ],
 )
 def test_every_command_is_on_the_page_of_commands(name: str) -> None:
     page = (ROOT / "docs" / "command-line.md").read_text("utf-8")

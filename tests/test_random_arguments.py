@@ -10,9 +10,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from lightpen.archive.logbook.lazy_logbook import SERVER
-from lightpen.cli import COMMANDS, _parser
+from lightpen.cli import _parser
+from lightpen_program import EXTENSIONS
 
-NAMES = sorted({"archive", "tips", *(name for name, _, _ in COMMANDS)})
+_, COMMANDS = _parser([], None, EXTENSIONS)
+NAMES = sorted(COMMANDS)
 # After all others, so that nothing long is done.
 LAST = {"simulate": ["--images", "1", "--binning", "4"]}
 WORDS = st.sampled_from(
@@ -50,7 +52,7 @@ def options_of(
 def every_command() -> dict[tuple[str, ...], list[str]]:
     found = dict[tuple[str, ...], list[str]]()
     for name in NAMES:
-        parser, commands = _parser([name], None)
+        parser, commands = _parser([name], None, EXTENSIONS)
         assert isinstance(commands, dict), parser
         found.update(options_of(commands[name], (name,)))
     return found

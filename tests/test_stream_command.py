@@ -29,7 +29,7 @@ def test_a_recorded_swing_is_streamed_with_its_tip(
 ) -> None:
     words = ["stream", swung(), "--tip", record, "--port", "0", "--once"]
     with subprocess.Popen(
-        [sys.executable, "-m", "lightpen", *map(str, words)],
+        [sys.executable, "-m", "lightpen_program", *map(str, words)],
         stdout=subprocess.PIPE,
         text=True,
     ) as process:

@@ -78,7 +78,7 @@ def _run() -> int:
     if len(sys.argv) == 3 and sys.argv[1] == SELF_TEST:
         # Names a damaged file, also one that all commands need.
         return Launchers().test_itself(Path(sys.argv[2]))
-    from lightpen.cli import main as run
+    from lightpen_program import main as run
 
     return run(desktop=Launchers())
 

@@ -31,31 +31,19 @@ from lightpen.commands.desktop import (
 )
 from lightpen.commands.tips import add_tips
 from lightpen.errors import CalibrationError, LightpenError, UsageError
+from lightpen.extension import Extension, Subcommand
 from lightpen.logs import LEVEL_VARIABLE, LEVELS, log_level, running_log, write_log_to
 from lightpen.messages import Message
 
 # Name, module that adds the options, imported only for what was given, and purpose.
 COMMANDS = (
     ("calibrate", "calibrate", "calibrate the tip from the images of a swing"),
-    ("simulate", "simulate", "write a simulated swing"),
     ("pivot", "pivot", "calibrate the tip from given poses"),
     ("pen", "pen", "transform measured LED coordinates into the pen frame"),
-    ("verify", "verify", "verify a tip on reference artefacts"),
-    ("measure", "measure", "measure a part by a plan"),
-    ("discover", "discover", "find tip, pen and camera from one swing and one length"),
     ("repeatability", "repeatability", "compare calibrations of one tip"),
     ("recalculate", "recalculate", "recompute calibrations and check U by Monte Carlo"),
     ("improve-pen", "pen_health", "improve the LED file from several swings"),
-    ("intrinsics", "intrinsics", "calibrate a camera with a board"),
-    (
-        "extrinsics",
-        "intrinsics",
-        "calibrate the extrinsics of two cameras with a board",
-    ),
-    ("board", "board", "write a calibration board for printing"),
     ("check-camera", "check_camera", "check the intrinsics file with a swing"),
-    ("export", "export", "export a tip for other programs"),
-    ("stream", "stream", "stream pose and tip to other programs"),
 )
 OPENED = (".lightpen", ".json")  # suffixes of the files that the window opens
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
@@ -74,14 +62,18 @@ ADVICE = {
 _logger = logging.getLogger(__name__)
 
 
-def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None) -> int:
+def main(
+    arguments: Sequence[str] | None = None,
+    desktop: Desktop | None = None,
+    extensions: Sequence[Extension] = (),
+) -> int:
     """Run the command line and return the exit status.
 
     By default the arguments of the process are parsed. Without a desktop a command must
-    be given.
+    be given. The extensions add their commands.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    parser, commands = _parser(given, desktop)
+    parser, commands = _parser(given, desktop, extensions)
     if desktop is not None and _names_file(given, commands):
         given = ["open", *given]
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
@@ -164,7 +156,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser(
-    given: Sequence[str], desktop: Desktop | None
+    given: Sequence[str], desktop: Desktop | None, extensions: Sequence[Extension]
 ) -> tuple[argparse.ArgumentParser, Collection[str]]:
     """Return the parser, and the names of the commands."""
     has_window = desktop is not None
@@ -188,12 +180,11 @@ def _parser(
         add_desktop(parser, desktop)
         add_open(added("open", "open a recorded swing"), desktop)
         add_report(added("report", "write the calibration report as PDF"), desktop)
-    for name, module, help_text in COMMANDS:
-        command = added(name, help_text)
+    for each in (*map(_own, COMMANDS), *(c for e in extensions for c in e.commands)):
+        command = added(each.name, each.purpose)
         command.set_defaults(log_folder=usual_data_folder)
-        if name in given:
-            add = f"add_{name.replace('-', '_')}"
-            resolve_name(f"lightpen.commands.{module}:{add}")(command)
+        if each.name in given:
+            each.add_options(command)
     data_folder = usual_data_folder if desktop is None else desktop.data_folder
     for name, help_text, add_options in (
         ("archive", "check, list, export and import entries", add_archive),
@@ -204,6 +195,17 @@ def _parser(
         if name in given:
             add_options(command, data_folder)
     return parser, commands.choices
+
+
+def _own(entry: tuple[str, str, str]) -> Subcommand:
+    """Return a command of the calibration."""
+    name, module, purpose = entry
+
+    def add_options(parser: argparse.ArgumentParser) -> None:
+        add = f"add_{name.replace('-', '_')}"
+        resolve_name(f"lightpen.commands.{module}:{add}")(parser)
+
+    return Subcommand(name, purpose, add_options)
 
 
 def _names_file(given: Sequence[str], commands: Collection[str]) -> bool:

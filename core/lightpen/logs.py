@@ -29,7 +29,11 @@ LEVELS = {
     "error": logging.ERROR,
 }
 LEVEL_VARIABLE = "LIGHTPEN_LOG_LEVEL"
-OUR_LOGGERS = ("lightpen", "lightpen_app")  # others log warnings and errors
+OUR_LOGGERS = (
+    "lightpen",
+    "lightpen_extensions",
+    "lightpen_app",
+)  # others log warnings and errors
 LINE = "%(asctime)s %(levelname)s %(process)d %(threadName)s %(name)s: %(message)s"
 MAX_BYTES = 1_000_000  # of a file, after which a new one is begun
 N_OLD_FILES = 5

@@ -9,7 +9,7 @@ def main() -> int:
     """Run the command line and return the exit status."""
 
     def command_line() -> int:
-        from lightpen.cli import main as run
+        from lightpen_program import main as run
 
         return run()
 

@@ -1,0 +1,1 @@
+"""Extensions of the program, one package each; they lean on `lightpen` alone."""

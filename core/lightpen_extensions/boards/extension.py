@@ -1,0 +1,37 @@
+"""What this extension adds to the program."""
+
+from argparse import ArgumentParser
+
+from lightpen.extension import Extension, Subcommand
+
+
+def _add_intrinsics(parser: ArgumentParser) -> None:
+    from lightpen.commands.intrinsics import add_intrinsics
+
+    add_intrinsics(parser)
+
+
+def _add_extrinsics(parser: ArgumentParser) -> None:
+    from lightpen.commands.intrinsics import add_extrinsics
+
+    add_extrinsics(parser)
+
+
+def _add_board(parser: ArgumentParser) -> None:
+    from lightpen.commands.board import add_board
+
+    add_board(parser)
+
+
+BOARDS = Extension(
+    "boards",
+    commands=(
+        Subcommand("intrinsics", "calibrate a camera with a board", _add_intrinsics),
+        Subcommand(
+            "extrinsics",
+            "calibrate the extrinsics of two cameras with a board",
+            _add_extrinsics,
+        ),
+        Subcommand("board", "write a calibration board for printing", _add_board),
+    ),
+)

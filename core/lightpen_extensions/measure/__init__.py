@@ -1,0 +1,1 @@
+"""Verification of tips, and parts measured with them."""

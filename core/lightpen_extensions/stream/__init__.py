@@ -1,0 +1,1 @@
+"""Pose and tip for other programs, live."""
