@@ -25,7 +25,6 @@ MESSAGES = {
     "pen-health.too-few": "One swing does not show changes of a pen; give at least two.",
     "pen-health.led-moved": "LED {led} moved by {distance:.3f} mm relative to the others according to {swing}: it was knocked or is loose.",
     "pen-health.another-pen": "{other} was calibrated with another LED file than {first}. Give calibrations of one pen with one LED file.",
-    "chart.suffix": "{name} does not end in .csv or .svg. Choose a name that does; control charts are written in these formats.",
     "repeatability.tighten": "Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.",
     "repeatability.widen": "Next: average more calibrations, reduce the noise of the images, or use the tip for wider tolerances only.",
     "repeatability.not-capable": "Not capable: the least of Cg and Cgk is {least:.2f}, {needed:.2f} are needed for a tolerance of {tolerance:g} mm.",

@@ -37,7 +37,6 @@ from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.history.pen_health import require_one_pen
 from lightpen.verification.history.recorded_tasks import read_fixed_point
-from lightpen.verification.reports.charts import write_chart
 from lightpen.verification.reports.records import (
     repeatability_entries,
     verification_record,
@@ -95,7 +94,6 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help=f"limit of the standard deviation of a coordinate ({usual:g})",
     )
-    add_file(parser, "--chart", "FILE", "control chart, .csv or .svg")
     add_verdict(parser)
     add_json(parser)
     add_entering(parser)
@@ -105,7 +103,6 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
 def _repeatability(options: argparse.Namespace) -> int:
     inputs = [*options.results, options.fixed_point, options.camera, options.pen]
     require_other_file(options.json, *inputs)
-    require_other_file(options.chart, *inputs)
     if options.reference is not None and options.tolerance is None:
         raise UsageError("cli.reference-alone")
     tips, first = _tips(options)
@@ -126,8 +123,6 @@ def _repeatability(options: argparse.Namespace) -> int:
         ),
     )
     print(shown(repeatability_text(found, rule)))
-    if options.chart is not None:
-        write_chart(found, options.chart)
     files = [each for each in inputs if each is not None]
     record = verification_record(
         "repeatability",

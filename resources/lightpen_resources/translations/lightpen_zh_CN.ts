@@ -3245,36 +3245,8 @@
 <context>
     <name>PenPanel</name>
     <message>
-        <source>Improve the LED file</source>
-        <translation>改进 LED 文件</translation>
-    </message>
-    <message>
-        <source>Pools the newest swings; the last one is held out for confirmation. The old file is retained.</source>
-        <translation>合并最近的几次摆动，留出最后一次用于证实。旧文件保留不变。</translation>
-    </message>
-    <message>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
-        <source>Use the new file</source>
-        <translation>使用新文件</translation>
-    </message>
-    <message>
-        <source>Progress</source>
-        <translation>进度</translation>
-    </message>
-    <message>
         <source>LEDs since the first swing / µm, size of the pen / ppm</source>
         <translation>自首次摆动以来各 LED 的位移 / µm，光笔尺寸变化 / ppm</translation>
-    </message>
-    <message>
-        <source>LEDs since the first swing / mm</source>
-        <translation>自首次摆动以来各 LED 的位移 / mm</translation>
-    </message>
-    <message>
-        <source>swing no.</source>
-        <translation>摆动序号</translation>
     </message>
     <message>
         <source>Reading the swings of the pen.</source>
@@ -3287,22 +3259,6 @@
     <message>
         <source>Swings with another LED file, or unreadable: {0}.</source>
         <translation>使用其他 LED 文件或无法读取的摆动：{0}。</translation>
-    </message>
-    <message>
-        <source>The swings are not read yet.</source>
-        <translation>尚未读取摆动。</translation>
-    </message>
-    <message>
-        <source>Four accepted swings with this LED file and intrinsics file are needed; missing: {0}.</source>
-        <translation>需要用此 LED 文件和内参文件的四次已接受摆动；还缺：{0}。</translation>
-    </message>
-    <message>
-        <source>An LED has moved: no LED file fits all swings.</source>
-        <translation>有 LED 移动过：没有 LED 文件能符合所有摆动。</translation>
-    </message>
-    <message>
-        <source>Saved as {0}: residuals of the swing held out {1} px, with the old file {2} px. Calibrate the tip again with the new file.</source>
-        <translation>已保存为 {0}：留出摆动的残差为 {1} px，旧文件为 {2} px。请用新文件重新标定测头。</translation>
     </message>
     <message>
         <source>size</source>
@@ -6810,10 +6766,6 @@ mm</translation>
     <message>
         <source>{name} does not end in .csv or .json. Choose a name that does; LED files are written in these formats.</source>
         <translation>{name} 不以 .csv 或 .json 结尾；LED 文件以这两种格式保存。请另选名称。</translation>
-    </message>
-    <message>
-        <source>{name} does not end in .csv or .svg. Choose a name that does; control charts are written in these formats.</source>
-        <translation>{name} 不以 .csv 或 .svg 结尾；控制图以这两种格式写出。请另选名称。</translation>
     </message>
     <message>
         <source>{name} does not end in .yaml; intrinsics files are written as YAML. Choose a name that ends in .yaml.</source>

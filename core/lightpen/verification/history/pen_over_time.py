@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from itertools import count
 from pathlib import Path
@@ -11,7 +11,6 @@ from lightpen.errors import FileError, UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.hashes import hashed
 from lightpen.formats.pen_files import write_pen
-from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
@@ -19,9 +18,8 @@ from lightpen.record.library.numbered_files import make_folder
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.record.swings.names import Names, folder_name
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.history.led_file import MIN_POOLED, ImprovedPen, improve_pen
+from lightpen.verification.history.led_file import ImprovedPen, improve_pen
 from lightpen.verification.history.pen_health import MIN_SWINGS, PenHealth, examine_pen
-from lightpen.verification.tasks.pen_scale import Scale
 
 LED_FILES = "led files"  # a folder of the data folder
 MOST = 20  # swings, the newest
@@ -37,28 +35,10 @@ class PenOverTime:
     names: Names
     is_simulated: bool
     pen: Pen
-    pen_file: Path
     pen_sha256: str
-    camera: Camera | None
-    camera_sha256: str
     swings: tuple[CalibrationFile, ...]  # the oldest first
     n_left_out: int  # with another LED file, or unreadable
     health: PenHealth | None  # None of fewer than two swings
-
-    @property
-    def poolable(self) -> tuple[CalibrationFile, ...]:
-        """The newest swings usable for an improved LED file, the oldest first."""
-        alike = [
-            swing
-            for swing in self.swings
-            if swing.camera_sha256 == self.camera_sha256 and not swing.is_of_rig
-        ]
-        return tuple(alike[-MOST_POOLED:])
-
-    @property
-    def n_missing(self) -> int:
-        """Number of swings missing for an improved LED file."""
-        return max(MIN_POOLED + 1 - len(self.poolable), 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +58,6 @@ def read_pen_over_time(
     if pen_file is None:
         raise ValueError("`pen_file` must be chosen.")
     pen_sha256 = hashed(pen_file.path).sha256
-    camera_sha256 = "" if camera_file is None else hashed(camera_file.path).sha256
     is_simulated = preparation.origin is Origin.SIMULATED
     names = preparation.names
     files = archive.files_of_pen(names.pen, is_simulated=is_simulated)[:MOST]
@@ -95,10 +74,7 @@ def read_pen_over_time(
         names=names,
         is_simulated=is_simulated,
         pen=pen_file.pen,
-        pen_file=pen_file.path,
         pen_sha256=pen_sha256,
-        camera=camera,
-        camera_sha256=camera_sha256,
         swings=swings,
         n_left_out=len(files) - len(swings),
         health=(
@@ -107,35 +83,6 @@ def read_pen_over_time(
             else None
         ),
     )
-
-
-def improve_led_file(
-    data: Path,
-    pen: PenOverTime,
-    scale: Scale | None,
-    now: datetime,
-    report: Tell = lambda _: None,
-    *,
-    must_gain: bool = True,
-) -> NewLedFile:
-    """Write an improved LED file; see `led_file.improve_pen`.
-
-    The old file stays, and no file is replaced.
-    """
-    if pen.camera is None:
-        raise ValueError("The camera of the swings must be chosen.")
-    improved = improve_pen(
-        *(pen.poolable, pen.camera, pen.pen, scale, report), must_gain=must_gain
-    )
-    folder = (data / SIMULATED if pen.is_simulated else data) / LED_FILES
-    make_folder(folder)
-    stem = folder_name(Names(pen=pen.names.pen), now)
-    names = (f"{stem}{'' if n == 1 else f'-{n}'}.json" for n in count(1))
-    path = next(folder / name for name in names if not (folder / name).exists())
-    write_pen(improved.pen, path, pen.pen_sha256)
-    camera_path = path.with_suffix(".yaml")
-    write_camera(improved.camera, camera_path)
-    return NewLedFile(path, camera_path, improved)
 
 
 def adjust_together(
@@ -147,9 +94,31 @@ def adjust_together(
 ) -> NewLedFile:
     """Write LED file and camera file by the accepted swings with the chosen results.
 
-    Results with other files take no part; see `improve_led_file`.
+    Results with other files take no part; see `led_file.improve_pen`. The old file
+    stays, and no file is replaced.
     """
     pen = read_pen_over_time(archive, preparation)
-    swings = tuple(each for each in pen.swings if each.path in chosen)
-    pen = replace(pen, swings=swings)
-    return improve_led_file(archive.folder, pen, None, now, report, must_gain=False)
+    if preparation.camera_file is None:
+        raise ValueError("The camera of the swings must be chosen.")
+    camera_sha256 = hashed(preparation.camera_file.path).sha256
+    swings = [
+        swing
+        for swing in pen.swings
+        if swing.path in chosen
+        and swing.camera_sha256 == camera_sha256
+        and not swing.is_of_rig
+    ]
+    camera = preparation.camera_file.camera
+    improved = improve_pen(
+        swings[-MOST_POOLED:], camera, pen.pen, report=report, must_gain=False
+    )
+    data = archive.folder
+    folder = (data / SIMULATED if pen.is_simulated else data) / LED_FILES
+    make_folder(folder)
+    stem = folder_name(Names(pen=pen.names.pen), now)
+    names = (f"{stem}{'' if n == 1 else f'-{n}'}.json" for n in count(1))
+    path = next(folder / name for name in names if not (folder / name).exists())
+    write_pen(improved.pen, path, pen.pen_sha256)
+    camera_path = path.with_suffix(".yaml")
+    write_camera(improved.camera, camera_path)
+    return NewLedFile(path, camera_path, improved)

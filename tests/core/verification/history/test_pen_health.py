@@ -12,7 +12,6 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.record.swings.names import Names
 from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.verification.history.led_file import (
     _is_better,
@@ -27,7 +26,6 @@ from lightpen.verification.history.pen_health import (
     _without_move,
     examine_pen,
 )
-from lightpen.verification.history.pen_over_time import PenOverTime
 
 CAMERA, PEN = paper_camera(), paper_pen()
 LEDS = PEN.leds
@@ -308,22 +306,3 @@ def test_the_information_of_a_swing_on_what_is_shared_is_that_of_the_marginal() 
     by_both = np.linalg.inv(np.linalg.inv(A.T @ A + prior)[at])
     np.testing.assert_allclose(information, by_both - prior[at], atol=1e-9)
     np.testing.assert_allclose(by_both @ values[COMMON], right, atol=1e-9)
-
-
-def pen_over(*swings: Any) -> PenOverTime:
-    return PenOverTime(
-        *(Names(), True, PEN, Path("pen"), "pen", CAMERA, "camera", swings, 0, None)
-    )
-
-
-@pytest.mark.parametrize(
-    ("n_swings", "n_missing"), [(0, 4), (3, 1), (4, 0), (8, 0), (9, 0)]
-)
-def test_the_newest_eight_swings_of_the_camera_are_pooled(
-    n_swings: int, n_missing: int
-) -> None:
-    alike = [swing(i) for i in range(n_swings)]
-    found = pen_over(swing(90, camera="other"), *alike, swing(91, is_of_rig=True))
-
-    assert found.poolable == tuple(alike[-8:])
-    assert found.n_missing == n_missing

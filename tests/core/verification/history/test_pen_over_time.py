@@ -16,7 +16,7 @@ from lightpen.formats.simulated_files import is_simulated, mark_simulated
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.history.pen_over_time import (
-    improve_led_file,
+    adjust_together,
     read_pen_over_time,
 )
 
@@ -46,27 +46,24 @@ def test_accepted_swings_with_the_led_file_tell_of_the_pen(
     found = read_pen_over_time(FolderArchive(tmp_path), off_file, reported.append)
 
     assert reported == [1 / 3, 2 / 3, 1.0]
-    assert (len(found.swings), found.n_left_out, found.n_missing) == (2, 1, 2)
+    assert (len(found.swings), found.n_left_out) == (2, 1)
     assert found.health is not None
     assert found.health.assessment.grade is Grade.STEADY
-    assert found.poolable == found.swings
-    assert replace(found, camera_sha256="of another").poolable == ()
 
 
 @pytest.mark.slow
 def test_a_better_led_file_is_a_new_one_and_names_its_parent(
     tmp_path: Path, off_file: Preparation
 ) -> None:
-    for seed in (1, 2, 3, 4):
-        accept_tip(tmp_path, off_file, seed, LED_ERROR)
+    files = [accept_tip(tmp_path, off_file, seed, LED_ERROR) for seed in (1, 2, 3, 4)]
     assert off_file.pen_file is not None
     old = off_file.pen_file.path
     before = old.read_bytes()
     mark_simulated(tmp_path / SIMULATED)
-    found = read_pen_over_time(FolderArchive(tmp_path), off_file)
+    archive = FolderArchive(tmp_path)
     reported: list[float] = []
-    first = improve_led_file(tmp_path, found, None, NOON, reported.append)
-    second = improve_led_file(tmp_path, found, None, NOON)
+    first = adjust_together(archive, off_file, files, NOON, reported.append)
+    second = adjust_together(archive, off_file, files, NOON)
 
     assert first.path != second.path
     assert old.read_bytes() == before
@@ -78,13 +75,13 @@ def test_a_better_led_file_is_a_new_one_and_names_its_parent(
     assert reported[-1] == 1.0
 
 
-def test_leds_that_are_right_already_are_not_written_anew(
+def test_only_the_chosen_swings_are_adjusted_together(
     tmp_path: Path, prepared: Preparation
 ) -> None:
-    for seed in (1, 2, 3, 4):
-        accept_tip(tmp_path, prepared, seed)
-    found = read_pen_over_time(FolderArchive(tmp_path), prepared)
-    with pytest.raises(CalibrationError, match="does not confirm"):
-        improve_led_file(tmp_path, found, None, NOON)
+    files = [accept_tip(tmp_path, prepared, seed) for seed in (1, 2)]
+    archive = FolderArchive(tmp_path)
+
+    with pytest.raises(CalibrationError, match="Swings given: 1"):
+        adjust_together(archive, prepared, files[:1], NOON)
 
     assert not list(tmp_path.rglob("led files/*"))

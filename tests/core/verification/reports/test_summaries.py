@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera, paper
 from lightpen.verification.history.led_file import ImprovedPen
 from lightpen.verification.history.pen_health import Growth, PenHealth, SwingOfPen
 from lightpen.verification.history.press_test import PressTest
-from lightpen.verification.reports.charts import write_chart
 from lightpen.verification.reports.records import (
     pen_health_entries,
     repeatability_entries,
@@ -208,41 +206,3 @@ def test_calibrations_of_a_tip_are_the_first_table_of_the_paper() -> None:
     assert alone["capability"] is alone["fixed_point_std_mm"] is None
     record = verification_record("length", {}, None, {}, {})
     assert (record["verdict"], record["coverage_factor"]) == (None, 2.0)
-
-
-def test_a_control_chart_shows_each_axis_between_its_limits(tmp_path: Path) -> None:
-    found = repeated(4, has_control=True)
-    for name in ("chart.svg", "chart.CSV"):
-        write_chart(found, tmp_path / name)
-    lines = (tmp_path / "chart.svg").read_text(encoding="utf-8").splitlines()
-
-    assert lines[0].endswith(
-        'width="720" height="600" font-family="sans-serif" font-size="12">'
-    )
-    assert lines[1] == '<rect width="720" height="600" fill="white"/>'
-    axes = [each for each in lines if each.endswith(", mm</text>")]
-    assert axes == [
-        f'<text x="8" y="{y}">{axis}, mm</text>'
-        for axis, y in zip("xyz", (18, 218, 418), strict=True)
-    ]
-    # The last axis reaches from the lower limit to a tip that is 0.010 mm off.
-    *_, lower, center, upper, path, _, _, _, last, _ = lines
-    for line, y in ((lower, 580.0), (center, 530.0), (upper, 480.0)):
-        assert line.startswith(f'<line x1="60" y1="{y}" x2="660" y2="{y}"')
-        assert f'<text x="664" y="{y + 4}">' in line
-    assert path.startswith(
-        '<polyline points="135.0,540.0 285.0,520.0 435.0,540.0 585.0,430.0"'
-    )
-    assert last.startswith('<circle cx="585.0" cy="430.0" r="3.5" fill="#b3261e"')
-    # Below the lower limit, and without limits.
-    low = replace(found.tips[0], tip_pen=PAPER_TIP - 0.01)
-    for control, colours in ((found.control, "#b3261e"), (None, "#1f5fa8")):
-        tips = (low, *found.tips[1:3])
-        write_chart(replace(found, tips=tips, control=control), tmp_path / "low.svg")
-        text = (tmp_path / "low.svg").read_text(encoding="utf-8")
-        assert f'<circle cx="160.0" cy="180.0" r="3.5" fill="{colours}"' in text
-        assert text.count('fill="#b3261e"') == (3 if control else 0)
-    table = (tmp_path / "chart.CSV").read_text(encoding="utf-8").splitlines()
-    numbers = [f"{PAPER_TIP[2] + off:.6f}" for off in (0.01, -0.005, 0.0, 0.005)]
-    assert len(table) == 1 + 3 * 4
-    assert table[-1] == f"4,test 3,z,{','.join(numbers)}"

@@ -2,18 +2,15 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from lightpen.errors import CalibrationError, UsageError
+from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
-from lightpen.verification.reports.charts import write_chart
 from lightpen.verification.reports.records import repeatability_entries
 from lightpen.verification.reports.summaries import repeatability_text
 from lightpen.verification.tasks.repeatability import (
@@ -296,9 +293,9 @@ def test_one_calibration_is_refused() -> None:
         measure_repeatability(estimates(TABLE_1[:1]), LIMITS)
 
 
-def test_fewer_than_five_calibrations_give_no_verdict_and_nine_no_control_limits(
-    tmp_path: Path,
-) -> None:
+def test_fewer_than_five_calibrations_give_no_verdict_and_nine_no_control_limits() -> (
+    None
+):
     steady = PAPER_TIP + 0.02 * (TABLE_1 - TABLE_1.mean(axis=0))
     four, five, nine, ten = (
         measure_repeatability(estimates(steady[:n]), LIMITS) for n in (4, 5, 9, 10)
@@ -311,8 +308,6 @@ def test_fewer_than_five_calibrations_give_no_verdict_and_nine_no_control_limits
     assert ten.control is not None
     assert "Control limit" not in repeatability_text(nine)
     assert repeatability_entries(nine)["control"] is None
-    write_chart(nine, tmp_path / "chart.svg")
-    assert "dasharray" not in (tmp_path / "chart.svg").read_text()
 
 
 @pytest.mark.parametrize("n_tips", [STUDY - 1, STUDY])
@@ -334,19 +329,3 @@ def test_a_tip_beyond_its_control_limits_is_named() -> None:
     found = measure_repeatability(estimates(values), LIMITS)
 
     assert [tip.name for tip in found.out_of_control] == ["test 13"]
-
-
-def test_the_control_chart_is_a_table_or_a_picture(tmp_path: Path) -> None:
-    found = measure_repeatability(estimates(TABLE_1), LIMITS)
-
-    write_chart(found, tmp_path / "chart.csv")
-    write_chart(found, tmp_path / "chart.svg")
-
-    lines = (tmp_path / "chart.csv").read_text().splitlines()
-    assert len(lines) == 1 + 3 * len(TABLE_1)
-    assert lines[1].startswith("1,test 1,x,-1.278000,")
-    root = ElementTree.parse(tmp_path / "chart.svg").getroot()
-    circles = [each for each in root if each.tag.endswith("circle")]
-    assert len(circles) == 3 * len(TABLE_1)
-    with pytest.raises(UsageError, match="does not end in"):
-        write_chart(found, tmp_path / "chart.png")
