@@ -290,6 +290,28 @@ def test_a_part_of_the_images_can_be_used(
     assert fields["images"]["used"] <= 38
 
 
+def test_the_part_before_a_moved_cone_gives_the_tip(
+    clean: Path, clean_centers: Path, record: Record, truth: Truth, tmp_path: Path
+) -> None:
+    header, *rows = clean_centers.read_text(encoding="utf-8").splitlines()
+    moved = []
+    for row in rows:
+        frame, led, x, y = row.split(",")
+        shift = 0.4 if int(frame) > 36 else 0.0  # px
+        moved.append(f"{frame},{led},{float(x) + shift!r},{y}")
+    file = tmp_path / "centers.csv"
+    file.write_text("\n".join([header, *moved]), encoding="utf-8")
+
+    verdict = record(clean, "--centers", str(file))["verdict"]
+    told = verdict["values"]
+    assert (verdict["grade"], verdict["next_step"]) == ("repeat", "use longer part")
+    assert (told["image"], told["begin"], told["end"]) == (37, 1, 36)
+    part = record(clean, "--centers", str(file), "--until", str(told["end"]))
+    assert part["verdict"]["next_step"] != "use longer part"
+    assert part["images"]["used"] == 36
+    assert tip_error_um(part, truth(clean)) <= 10.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "tip", ["-1.3182 -90.4095 -23.8548", "-1 -90. -23", "-1.3182e0 -9.04095e1 -2e1"]

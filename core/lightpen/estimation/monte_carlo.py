@@ -139,7 +139,7 @@ def trials_of(calibration: Calibration) -> Trials:
         cone_cam=joint.cone_cam,
         rotations=joint.rotations,
         seen=joint.used,
-        sigma=joint.sigma * float(np.sqrt(calibration.budget.correlation_factor)),
+        sigma=bundle.sigma * float(np.sqrt(calibration.budget.correlation_factor)),
         led_covariance=led_covariance,
         forms=bundle.unknowns.forms[:n_images, : len(move_covariance) // N_CONE],
         move_covariance=move_covariance,

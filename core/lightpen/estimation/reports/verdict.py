@@ -262,7 +262,9 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     if step is not None and step.size > STEP_MATTERS * uncertainty:
         return Verdict(Grade.REPEAT, step.told(len(calibration.used)))
     if uncertainty > FAR_OFF * limits.max_uncertainty:
-        return Verdict(Grade.REPEAT, _why_uncertain(calibration, limits))
+        late = late_cameras(calibration)
+        why = late[0] if late else _why_uncertain(calibration, limits)
+        return Verdict(Grade.REPEAT, why)
     for finding in _findings(calibration, limits):
         return Verdict(Grade.CHECK, finding)
     return Verdict(Grade.PASS, _good(calibration, uncertainty))

@@ -60,7 +60,7 @@ from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import swing_from_postures
+from lightpen.simulator.swings import PAPER_TIP, swing_from_postures
 from lightpen.swing.capture.state import SwingState
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
@@ -104,13 +104,20 @@ N_IMAGES = 20
 N_PLOTS = 9
 DAMAGED = 7
 SLIPPED = 9
+TURNED = 13
 THEN = datetime.now().astimezone() - timedelta(days=99)
 
 
 @pytest.fixture(scope="session")
 def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record a swing that leans to all sides; copy it before it is changed."""
-    folder = tmp_path_factory.mktemp("recorded")
+    return record_swing(small_scene, tmp_path_factory.mktemp("recorded"))
+
+
+def record_swing(
+    small_scene: Scene, folder: Path, turned: FloatArray | None = None
+) -> Path:
+    """Record a swing in whose last images the tip is ``turned`` by so much, mm."""
     files = write_sample_files(small_scene, folder / "files")
     preparation = Preparation(
         names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
@@ -123,6 +130,8 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
     directions = np.radians(np.tile(np.arange(0, 360, 45), 3))[4:]
     turns = np.radians(np.resize([-25.0, 0.0, 25.0], N_IMAGES))
     swing = swing_from_postures(Postures(tilts, directions, turns))
+    if turned is not None:
+        swing.translations[TURNED:] -= swing.rotations[TURNED:] @ turned
     with RecordWriter.create(folder / "swing", record_header(preparation)) as writer:
         for i in range(N_IMAGES):
             R, t = swing.rotations[i], swing.translations[i]
@@ -197,11 +206,6 @@ class Bed:
             lambda: workbench.run.status.assessment not in (None, before)
         )
         return workbench
-
-    def assume_rigid(self) -> None:
-        """Let the settings of the swing state that nothing gives way."""
-        folder = self.workbench.run.records_folder / "swing"
-        self.rewrite_header(folder, {PREFIX + "compliance": 1e-6})
 
     def solve_uncertain(self) -> Workbench:
         """Solve the swing with a limit that its U is beyond."""
@@ -488,7 +492,6 @@ def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
 def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     bed: Bed,
 ) -> None:
-    bed.assume_rigid()
     workbench = bed.solve_uncertain()
     page = bed.show()
 
@@ -504,7 +507,7 @@ def test_the_settings_are_to_be_checked_where_no_file_makes_the_tip_uncertain(
     bed: Bed,
 ) -> None:
     folder = bed.workbench.run.records_folder / "swing"
-    bed.rewrite_header(folder, {PREFIX + "warmth": 60.0})
+    bed.rewrite_header(folder, {PREFIX + "form_error": 0.002})
     bed.solve_uncertain()
     page = bed.show()
 
@@ -517,7 +520,6 @@ def test_the_settings_are_to_be_checked_where_no_file_makes_the_tip_uncertain(
 
 
 def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
-    bed.assume_rigid()
     workbench = bed.solve(1e-6)
     page = bed.show()
 
@@ -531,6 +533,26 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     assert reported.args[0].startswith("The tip cannot be accepted.")
     assert not page.is_complete()
     assert in_force(workbench) is None
+
+
+def test_the_part_before_a_tip_turned_is_used_by_one_click(
+    bed: Bed, small_scene: Scene, tmp_path: Path
+) -> None:
+    turned = record_swing(small_scene, tmp_path, np.array([0.06, 0.0, -0.08]))
+    shutil.rmtree(bed.swing)
+    shutil.copytree(turned, bed.swing)
+    workbench = bed.solve()
+    page = bed.show()
+
+    assert banner(page).word == "REPEAT: Moved during the swing"
+    assert f"before image {TURNED + 1}. Images 1 to {TURNED}" in banner(page).detail
+    assert page.main_action() == MainAction("Use longer part")
+    page.run_main_action()
+
+    left_out = f"{N_IMAGES - TURNED} outside the part that is used"
+    await_count(bed.qtbot, page, included(TURNED, left_out))
+    assert np.linalg.norm(tip(workbench) - PAPER_TIP) < 0.01
+    assert banner(page).word == "CHECK: More images"
 
 
 def test_without_an_earlier_result_that_is_reported(page: ReviewPage) -> None:
