@@ -6,9 +6,6 @@ EXTRAS = {
     *("genicam", "harvesters"),  # "genicam"
     *("crcmod", "pyigtl"),  # "stream"
     *("psycopg", "psycopg-binary", "tzdata"),  # "postgres"
-    *("keyring", "jaraco-classes", "jaraco-context", "jaraco-functools"),  # "keyring"
-    *("more-itertools", "pywin32-ctypes", "jeepney", "secretstorage"),
-    *("backports-tarfile", "importlib-metadata", "lazy-importer", "zipp"),
 }
 
 

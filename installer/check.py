@@ -23,7 +23,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from installer import bad_conditions, extras, life, users
+from installer import bad_conditions, life, users
 from installer.build import Packing, pack
 from installer.launchers import ToolMissingError
 from installer.machine import fresh_machine
@@ -113,7 +113,6 @@ def try_all(trial: Trial, payload: Path, authority: Path | None) -> None:
     life.try_remains(trial)
     try_start(trial)
     life.try_entry_points(trial, __version__)
-    extras.try_keyring(trial)
     life.try_demo(trial)
     life.try_double_click(trial)
     life.try_refusals(trial)

@@ -26,10 +26,7 @@ RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere
 NOTES = "my notes 笔记.txt"
 # For cameras, for archives, and for the keys of stations.
-NEEDED = (
-    *("harvesters.core", "psycopg", "keyring.backends.Windows"),
-    "cryptography.hazmat.bindings._rust",
-)
+NEEDED = (*("harvesters.core", "psycopg", "cryptography.hazmat.bindings._rust"),)
 SIZE_LIMIT = 350e6  # bytes installed
 
 

@@ -50,7 +50,7 @@ MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
            "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
            "lightpen_app.wizard_pages")  # fmt: skip
 # Drive cameras, and reach an archive on a server.
-OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "keyring.backends.Windows")
+OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg")
 
 
 def test_program(file: Path) -> int:

@@ -1,14 +1,11 @@
-"""A check notes what may be honest: files without entries, times, keys."""
+"""A check notes what may be honest: files without entries, and keys."""
 
 import shutil
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from msgspec import structs
 from tests.core.archive.test_logbook import result
 
 from lightpen.archive.checks.check import check_file
@@ -57,13 +54,3 @@ def test_an_archive_of_another_account_is_noted(
 ) -> None:
     monkeypatch.setenv(KEYS, str(tmp_path / "other keys"))
     assert notes(data) == {"archive.unknown-here"}
-
-
-def test_impossible_times_are_noted(data: Path) -> None:
-    usual = result(data, 2)
-    early = usual.accepted - timedelta(days=1)
-    calibration = structs.replace(usual.calibration, created=usual.accepted)
-    FolderArchive(data).store(replace(usual, accepted=early, calibration=calibration))
-    with closing(Logbook(data)) as logbook:
-        assert logbook.enter_owed() == ()
-    assert notes(data) == {"archive.clock-back", "archive.accepted-too-early"}

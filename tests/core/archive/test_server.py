@@ -1,16 +1,12 @@
 """A server is called by its address, encrypted, and each role has its rights alone."""
 
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-import keyring
 import psycopg
 import pytest
 from benchmarks.postgres_server import PASSWORD, Postgres
-from keyring.backend import KeyringBackend
-from keyring.backends import fail
 from tests.core.archive.conftest import Station
 
 from lightpen.archive.chains.chains import entries_of, heads, note_delivered, records_of
@@ -97,47 +93,6 @@ def test_the_password_may_be_in_a_file(postgres: Postgres, tmp_path: Path) -> No
     address = postgres.new_database().replace(f":{PASSWORD}@", "@")
 
     open_server(f"{address}&passfile={file}").close()
-
-
-class Keyring(KeyringBackend):
-    """A keyring with one password."""
-
-    priority = 1
-
-    def get_password(self, service: str, username: str) -> str | None:
-        return PASSWORD if (service, username) == ("lightpen", "plant") else None
-
-    def set_password(self, service: str, username: str, password: str) -> None:
-        raise NotImplementedError
-
-
-@pytest.fixture
-def use_keyring() -> Iterator[Callable[[KeyringBackend], None]]:
-    before = keyring.get_keyring()
-    yield keyring.set_keyring
-    keyring.set_keyring(before)
-
-
-def test_the_password_may_be_in_the_system_keyring(
-    postgres: Postgres, use_keyring: Callable[[KeyringBackend], None]
-) -> None:
-    use_keyring(Keyring())  # type: ignore[no-untyped-call]
-    address = postgres.new_database().replace(f":{PASSWORD}@", "@")
-
-    open_server(f"{address}&keyring=lightpen").close()
-    with pytest.raises(ArchiveError, match="no password of user plant for the service"):
-        open_server(f"{address}&keyring=other")
-    use_keyring(fail.Keyring())  # type: ignore[no-untyped-call]
-    with pytest.raises(ArchiveError, match="system keyring cannot be read"):
-        open_server(f"{address}&keyring=lightpen")
-
-
-def test_without_its_package_the_keyring_is_said_to_need_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setitem(sys.modules, "keyring", None)
-    with pytest.raises(ArchiveError, match=r"pip install \"lightpen\[keyring\]\""):
-        open_server("postgresql://plant@127.0.0.1:1/plant?keyring=lightpen")
 
 
 @pytest.fixture(scope="module")

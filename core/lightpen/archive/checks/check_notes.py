@@ -1,29 +1,22 @@
 """Observations of an archive check that prove no change.
 
-A power cut leaves files that are not entered yet, a clock may be set back, a data
-folder may move to another computer. None of it proves a change.
+A power cut leaves files that are not entered yet, and a data folder may move to another
+computer. Neither proves a change.
 """
 
 from collections.abc import Iterator
-from datetime import datetime
 from pathlib import Path
 
-from msgspec import Struct
-
 from lightpen.archive.chains.chains import (
-    batch_of,
     chain_at_home,
     entries_of_limits,
     entry_of_result,
     heads,
-    records_of,
 )
-from lightpen.archive.chains.entries import IN_FORCE_BY, SHORT
+from lightpen.archive.chains.entries import SHORT
 from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.events.station_events import station_files
 from lightpen.archive.store.database import Database
-from lightpen.errors import FileError
-from lightpen.formats.own_json import DamagedError, ZonedTime, parse_own_json
 from lightpen.messages import Message, message, printable
 from lightpen.record.library.signing.account import owed_files, remembered_head
 from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
@@ -32,19 +25,10 @@ from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive
 
 
-class _Calibrated(Struct):
-    created: ZonedTime
-
-
-class _Accepted(Struct):
-    calibration: _Calibrated
-
-
 def check_notes(database: Database, data: Path) -> Iterator[Message]:
     """Yield notes on the archive of a data folder.
 
-    Files without entries, keys that are not known or that nobody approved, clocks that
-    were set back, and tips that were accepted before they were computed.
+    Files without entries, and keys that are not known or that nobody approved.
     """
     home = chain_at_home(database)
     for head in heads(database):
@@ -52,7 +36,6 @@ def check_notes(database: Database, data: Path) -> Iterator[Message]:
     if home is not None:
         yield from _unknown_here(home)
         yield from _not_entered(database, data, home)
-        yield from _impossible_times(database, home)
 
 
 def _unknown_here(home: str) -> Iterator[Message]:
@@ -80,25 +63,3 @@ def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]
             yield message("archive.file-owed", file=printable(place))
         else:
             yield message("archive.file-not-entered", file=printable(place))
-
-
-def _impossible_times(database: Database, home: str) -> Iterator[Message]:
-    """Compare the times of acceptances with each other, and with their computation."""
-    before: datetime | None = None
-    number = 0
-    while batch := batch_of(database, home, number):
-        records = records_of(database, batch)
-        for each in batch:
-            number, event = each.entry.number, each.entry.event
-            if event.kind not in IN_FORCE_BY:
-                continue
-            if before is not None and event.at < before:
-                yield message("archive.clock-back", number=number)
-            before = event.at
-            record = records.get(event.record_sha256 or "", "")
-            try:
-                whole = parse_own_json(record.encode(), _Accepted)
-            except (DamagedError, FileError, UnicodeEncodeError):
-                continue
-            if event.at < whole.calibration.created.replace(microsecond=0):
-                yield message("archive.accepted-too-early", number=number)

@@ -39,10 +39,9 @@ def open_server(address: str) -> Database:
     """Open the archive on a server.
 
     The address is ``postgresql://user@host/database`` with options of libpq such as
-    ``?sslrootcert=FILE&passfile=FILE``. ``keyring=SERVICE`` names the service under
-    which the system keyring has the password of the user.
+    ``?sslrootcert=FILE&passfile=FILE``.
     """
-    url = server_url(address)
+    url = _server_url(address)
     try:
         engine = create_engine(url, connect_args=dict(_CALLING))
         event.listen(engine, "connect", _ask_to_notice)
@@ -55,11 +54,8 @@ def open_server(address: str) -> Database:
     return database
 
 
-def server_url(address: str) -> URL:
-    """Return the URL of the driver for an address of `open_server`, with the password.
-
-    Raises `ArchiveError` for an address that is not of PostgreSQL.
-    """
+def _server_url(address: str) -> URL:
+    """Return the URL of the driver; refuse an address that is not of PostgreSQL."""
     try:
         url = make_url(address)
         if url.get_backend_name() != "postgresql":
@@ -69,29 +65,7 @@ def server_url(address: str) -> URL:
     except (ArgumentError, ValueError) as error:
         raise ArchiveError("archive.no-address") from error
     query = {"sslmode": TLS, **url.query}
-    service = query.pop("keyring", None)
-    if isinstance(service, str):
-        url = url.set(password=_kept_password(service, url.username or ""))
     return url.set(drivername="postgresql+psycopg", query=query)
-
-
-def _kept_password(service: str, user: str) -> str:
-    """Return the password that the system keyring has for a user of a service."""
-    try:
-        import keyring
-        from keyring.errors import KeyringError
-    except ModuleNotFoundError as error:
-        raise ArchiveError("archive.no-keyring") from error
-    try:
-        password = keyring.get_password(service, user)
-    except KeyringError as error:
-        reason = printable(str(error))
-        raise ArchiveError("archive.keyring-closed", reason=reason) from error
-    if password is None:
-        raise ArchiveError(
-            "archive.no-password", service=printable(service), user=printable(user)
-        )
-    return password
 
 
 def _without_password(url: URL) -> str:
