@@ -3,7 +3,6 @@
 MESSAGES = {
     "application.no-display": "No display is available for the window. Start the program in a desktop session, or use a command; lightpen --help lists them.",
     "archive.no-server": "No archive server is set. Set the variable {variable} to its address, postgresql://user:password@host/database.",
-    "archive.no-such-kind": "{name} is not an entry type. Entry types: {kinds}.",
     "log.no-such-level": "{variable} is {found}, which is not a log level. Set it to one of: {levels}.",
     "cli.no-such-file": "The file {path} does not exist. Check the name and the folder.",
     "cli.board-suffix": "A board is written as PDF, but {name} does not end in .pdf. Choose a name that does.",

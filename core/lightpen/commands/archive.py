@@ -1,13 +1,11 @@
 """``lightpen archive``: check, list, deliver, fetch and export entries."""
 
 import argparse
-from datetime import date
 from pathlib import Path
 
 import platformdirs
 
 from lightpen.commands.arguments import DataFolder, add_data, whole_number
-from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
 USUAL_LENGTH = 50  # entries that are listed
 
@@ -40,11 +38,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         action="store_true",
         help="check the copy on the server set by LIGHTPEN_ARCHIVE, too",
     )
-    delivered.add_argument(
-        "--again",
-        action="store_true",
-        help="deliver again what the server had and has lost",
-    )
     fetched.add_argument(
         "--chain",
         default="",
@@ -68,15 +61,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
             f"--{name}", default="", help="list entries of this item only"
         )
     listed.add_argument(
-        "--kind", default="", help="entry type, for example refused or verification"
-    )
-    listed.add_argument(
-        "--since", type=parse_date, metavar="YYYY-MM-DD", help="first day"
-    )
-    listed.add_argument(
-        "--until", type=parse_date, metavar="YYYY-MM-DD", help="last day"
-    )
-    listed.add_argument(
         "--most",
         type=whole_number,
         default=USUAL_LENGTH,
@@ -86,21 +70,6 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     listed.add_argument(
         "--csv", action="store_true", help="write a table for other programs"
     )
-
-
-def parse_date(text: str) -> date:
-    """Return a day that lies in every time zone."""
-    try:
-        day = date.fromisoformat(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text} is no date such as 2026-08-14."
-        ) from error
-    if not FIRST_YEAR <= day.year <= LAST_YEAR:
-        raise argparse.ArgumentTypeError(
-            f"{text} is not between the years {FIRST_YEAR} and {LAST_YEAR}."
-        )
-    return day
 
 
 def _run(options: argparse.Namespace) -> int:

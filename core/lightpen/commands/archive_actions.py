@@ -3,18 +3,16 @@
 import argparse
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
-from lightpen.archive.chains.chains import chain_head, note_delivered
-from lightpen.archive.chains.entries import SHORT, Kind
+from lightpen.archive.chains.entries import SHORT
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.history.history import Line, lines
 from lightpen.archive.history.listing import entries_csv
 from lightpen.archive.history.queries import EntryFilter, newest
 from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.replication.comparison import check_server, require_same
+from lightpen.archive.replication.comparison import check_server
 from lightpen.archive.replication.exchange import deliver, export_entries
 from lightpen.archive.replication.fetching import fetch
 from lightpen.archive.replication.server import open_server
@@ -25,7 +23,6 @@ from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import UsageError
 from lightpen.local_time import local_now, local_time
-from lightpen.messages import printable
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision_changes import renew_station_key
 
@@ -62,14 +59,7 @@ def _check(options: argparse.Namespace) -> int:
 
 @printing
 def _list(options: argparse.Namespace) -> None:
-    wanted = EntryFilter(
-        pen=options.pen,
-        tip=options.tip,
-        station=options.station,
-        kinds=_kinds(options.kind),
-        begin=_midnight(options.since),
-        end=_midnight(options.until and options.until + timedelta(days=1)),
-    )
+    wanted = EntryFilter(options.pen, options.tip, options.station)
     with _looked_into(data_of(options)) as database:
         if options.csv:
             text = entries_csv(newest(database, wanted, options.most))
@@ -89,13 +79,9 @@ def _export(options: argparse.Namespace) -> None:
 @printing
 def _deliver(options: argparse.Namespace) -> None:
     with closing(Logbook(data_of(options))) as logbook, _server() as server:
-        database, chain = logbook.database, logbook.chain
-        if options.again:
-            note_delivered(database, chain, chain_head(server, chain).number)
-        require_same(database, chain, server)
         for fault in logbook.enter_owed():
             print(shown(str(fault)))
-        copied = deliver(database, chain, server)
+        copied = deliver(logbook.database, logbook.chain, server)
     print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
 
 
@@ -158,21 +144,6 @@ def _opened(data: Path) -> Iterator[Database]:
         yield database
     finally:
         database.close()
-
-
-def _kinds(name: str) -> tuple[Kind, ...]:
-    if not name:
-        return ()
-    try:
-        return (Kind(name),)
-    except ValueError as error:
-        raise UsageError(
-            "archive.no-such-kind", name=printable(name), kinds=", ".join(Kind)
-        ) from error
-
-
-def _midnight(day: date | None) -> datetime | None:
-    return None if day is None else local_time(datetime.combine(day, time()))
 
 
 def _line(line: Line) -> str:

@@ -3,10 +3,10 @@
 import argparse
 import getpass
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from typing import TypeVar
 
-from lightpen.commands.archive import parse_date
 from lightpen.commands.arguments import (
     FORGOTTEN,
     DataFolder,
@@ -15,6 +15,7 @@ from lightpen.commands.arguments import (
     not_negative,
     whole_number,
 )
+from lightpen.formats.own_json import FIRST_YEAR, LAST_YEAR
 
 T = TypeVar("T")
 
@@ -57,7 +58,7 @@ def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
 def _add_entries(action: argparse.ArgumentParser) -> None:
     of_all = action.add_argument_group("all items")
     of_all.add_argument(
-        "--due", type=_or_nothing(parse_date), metavar="YYYY-MM-DD", help="expiry date"
+        "--due", type=_or_nothing(_date), metavar="YYYY-MM-DD", help="expiry date"
     )
     of_all.add_argument(
         "--certificate",
@@ -68,7 +69,7 @@ def _add_entries(action: argparse.ArgumentParser) -> None:
     )
     of_all.add_argument(
         "--certified",
-        type=_or_nothing(parse_date),
+        type=_or_nothing(_date),
         metavar="YYYY-MM-DD",
         help="date of the certificate",
     )
@@ -146,6 +147,21 @@ def _add_author(action: argparse.ArgumentParser) -> None:
         help="supervisor who signs, if the data folder has a supervisor password; "
         "the password is requested, or read from LIGHTPEN_PASSWORD",
     )
+
+
+def _date(text: str) -> date:
+    """Return a day that lies in every time zone."""
+    try:
+        day = date.fromisoformat(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text} is no date such as 2026-08-14."
+        ) from error
+    if not FIRST_YEAR <= day.year <= LAST_YEAR:
+        raise argparse.ArgumentTypeError(
+            f"{text} is not between the years {FIRST_YEAR} and {LAST_YEAR}."
+        )
+    return day
 
 
 def _or_nothing(kind: Callable[[str], T]) -> Callable[[str], T | object]:

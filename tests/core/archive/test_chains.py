@@ -10,7 +10,7 @@ from pathlib import Path
 from msgspec import structs
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import entries_of, heads
+from lightpen.archive.chains.chains import chain_head, chain_names, entries_of
 from lightpen.archive.chains.entries import FileHash, Kind
 from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.history.queries import (
@@ -59,7 +59,7 @@ def test_the_same_result_is_entered_once(station: Station) -> None:
 
     assert append(station.database, station.chain, event, record) is not None
     assert append(station.database, station.chain, event, record) is None
-    assert heads(station.database)[0].number == 1
+    assert chain_head(station.database, station.chain).number == 1
 
 
 def test_what_was_taken_back_is_not_the_last_accepted(station: Station) -> None:
@@ -87,10 +87,10 @@ def test_two_programs_of_one_folder_share_a_chain(tmp_path: Path) -> None:
         list(executor.map(enter_some, ("one", "other")))
 
     database = open_file(file)
-    (head,) = heads(database)
-    entries = list(entries_of(database, head.chain))
+    (chain,) = chain_names(database)
+    entries = list(entries_of(database, chain))
     database.close()
-    assert len(entries) == head.number == 2 * N_EACH
+    assert len(entries) == 2 * N_EACH
     assert all(
         later.entry.previous == earlier.sha256 for earlier, later in pairwise(entries)
     )

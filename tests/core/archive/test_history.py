@@ -80,6 +80,8 @@ def test_every_block_of_lines_follows_the_one_before(station: Station) -> None:
     [
         (EntryFilter(pen="LP-04"), 4),
         (EntryFilter(pen="LP-04", tip="T-11"), 1),
+        (EntryFilter(pen="lp\u201104", tip="t\u201311", station=" hall  2"), 1),
+        (EntryFilter(tip="\u0422-11"), 1),  # Cyrillic
         (EntryFilter(tip="T-12"), 0),
         (EntryFilter(begin=NOON + timedelta(minutes=2)), 2),
         (EntryFilter(end=NOON + timedelta(minutes=2)), 2),

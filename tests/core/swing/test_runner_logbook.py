@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.core.conftest import TIMEOUT, Station
 
-from lightpen.archive.chains.chains import entries_of, heads
+from lightpen.archive.chains.chains import chain_names, entries_of
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
@@ -44,8 +44,8 @@ def entered(station: Station) -> list[Event]:
     with closing(look_into(station.folder / ARCHIVE)) as database:
         return [
             each.entry.event
-            for head in heads(database)
-            for each in entries_of(database, head.chain)
+            for chain in chain_names(database)
+            for each in entries_of(database, chain)
         ]
 
 

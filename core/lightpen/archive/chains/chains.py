@@ -4,15 +4,16 @@ from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import Connection, Select, func, select, tuple_, update
+from sqlalchemy import Connection, Select, func, select
 
 from lightpen.archive.chains.entries import EPOCH, ChainHead, Kind, StoredEntry
 from lightpen.archive.chains.rows import READ, read_entries, read_row, searchable
 from lightpen.archive.store.database import Database
-from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.archive.store.tables import ENTRIES, RECORDS
+from lightpen.errors import ArchiveError, FileError
 from lightpen.record.library.signing.chain_keys import key_in
+from lightpen.record.library.signing.station import known_station_name
 
-AT_HOME = select(CHAINS.c.chain)
 BATCH = 200  # entries that are copied in one transaction
 
 
@@ -21,24 +22,23 @@ def chain_at_home(database: Database) -> str | None:
     if database.file is None:
         return None
     with database.reading() as connection:
-        return connection.execute(AT_HOME).scalar_one_or_none()
+        chain = chain_in(connection)
+    try:
+        return chain or known_station_name(database.file.parent) or None
+    except FileError as error:
+        raise ArchiveError(error.message) from error
 
 
-def heads(database: Database) -> tuple[ChainHead, ...]:
-    """Return the head of each chain."""
-    if database.file is None:
-        place = tuple_(ENTRIES.c.chain, ENTRIES.c.number)
-        ends = select(ENTRIES.c.chain, func.max(ENTRIES.c.number))
-        found = (
-            select(ENTRIES.c.chain, ENTRIES.c.number, ENTRIES.c.sha256)
-            .where(place.in_(ends.group_by(ENTRIES.c.chain)))
-            .order_by(ENTRIES.c.chain)
-        )
-    else:
-        found = select(CHAINS)
-    return tuple(
-        ChainHead(row.chain, row.number, row.sha256) for row in database.rows(found)
-    )
+def chain_in(connection: Connection) -> str | None:
+    """Return the chain of the entries in a file; None if it has none."""
+    found = connection.execute(select(func.min(ENTRIES.c.chain))).scalar_one()
+    return found if isinstance(found, str) else None
+
+
+def chain_names(database: Database) -> tuple[str, ...]:
+    """Return the names of all chains that have an entry."""
+    wanted = select(ENTRIES.c.chain).distinct().order_by(ENTRIES.c.chain)
+    return tuple(str(chain) for (chain,) in database.rows(wanted))
 
 
 def chain_head(database: Database, chain: str) -> ChainHead:
@@ -47,18 +47,12 @@ def chain_head(database: Database, chain: str) -> ChainHead:
         return head_in(connection, chain)
 
 
-def delivered_number(database: Database, chain: str) -> int:
-    """Return the number of the last entry of a chain delivered to a server."""
-    wanted = select(CHAINS.c.delivered).where(CHAINS.c.chain == chain)
-    with database.reading() as connection:
-        return connection.execute(wanted).scalar_one_or_none() or 0
-
-
-def note_delivered(database: Database, chain: str, number: int) -> None:
-    """Note the number of the last entry of a chain that a server has."""
-    noted = update(CHAINS).where(CHAINS.c.chain == chain, CHAINS.c.delivered != number)
-    with database.writing() as connection:
-        connection.execute(noted.values(delivered=number))
+def hash_in(connection: Connection, chain: str, number: int) -> str | None:
+    """Return the SHA-256 of the entry of a number; None if there is none."""
+    wanted = select(ENTRIES.c.sha256).where(
+        ENTRIES.c.chain == chain, ENTRIES.c.number == number
+    )
+    return connection.execute(wanted).scalar_one_or_none()
 
 
 def entries_of(database: Database, chain: str) -> Iterator[StoredEntry]:

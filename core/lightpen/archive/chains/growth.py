@@ -6,11 +6,18 @@ differ from what is there are refused.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, func, insert, select
 from sqlalchemy.dialects import postgresql
 
-from lightpen.archive.chains.chains import AT_HOME, head_in, of_limits
+from lightpen.archive.chains.chains import (
+    chain_at_home,
+    chain_in,
+    hash_in,
+    head_in,
+    of_limits,
+)
 from lightpen.archive.chains.entries import (
     SHORT,
     ChainHead,
@@ -25,11 +32,11 @@ from lightpen.archive.chains.entries import (
 from lightpen.archive.chains.rows import columns_of, searchable
 from lightpen.archive.chains.signatures import entry_signature, signature_finding
 from lightpen.archive.store.database import Database
-from lightpen.archive.store.tables import CHAIN_WRITERS, CHAINS, ENTRIES, RECORDS
+from lightpen.archive.store.tables import CHAIN_WRITERS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
-from lightpen.record.library.entered_files import NOTHING_BEFORE, require_remembered
+from lightpen.record.library.entered_files import require_remembered
 from lightpen.record.library.signing.account import remember_head
 from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
 from lightpen.record.library.signing.station import station_name
@@ -38,20 +45,15 @@ SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 
 
 def own_chain(database: Database) -> str:
-    """Return the chain of a file; the first call begins it.
-
-    With it begins its station key.
-    """
-    with database.writing() as connection:
-        chain = connection.execute(AT_HOME).scalar_one_or_none()
-        if chain is None:
-            assert database.file is not None
-            try:
-                chain = station_name(database.file.parent)
-            except FileError as error:
-                raise ArchiveError(error.message) from error
-            _begin(connection, chain)
-    return chain
+    """Return the chain of a file; the first call begins it with its station key."""
+    chain = chain_at_home(database)
+    if chain is not None:
+        return chain
+    assert database.file is not None
+    try:
+        return station_name(database.file.parent)
+    except FileError as error:
+        raise ArchiveError(error.message) from error
 
 
 def append(
@@ -74,7 +76,7 @@ def append(
         entry = replace(entry, signature=signature)
         if record is not None:
             _keep_records(connection, {text_sha256(record): record})
-        _put(connection, chain, [entry])
+        _put(connection, [entry])
     remember_head(chain, entry.entry.number, entry.sha256)
     return entry
 
@@ -101,7 +103,7 @@ def copy_entries(
         if new:
             _require_signed(connection, chain, new)
         _keep_records(connection, _named(new, records))
-        _put(connection, chain, new)
+        _put(connection, new)
     return len(new)
 
 
@@ -116,30 +118,19 @@ def adopt_entries(
     Raises `ArchiveError` if they do not continue the chain, are not signed by its
     station, or the own chain is another one.
     """
-    empty = delete(CHAINS).where(CHAINS.c.number == 0, CHAINS.c.chain != chain)
     with database.writing() as connection:
-        connection.execute(empty)
-        home = connection.execute(AT_HOME).scalar_one_or_none()
-        if home is None:
-            _begin(connection, chain)
-        elif home != chain:
+        if chain_in(connection) not in (None, chain):
             raise ArchiveError(_forked(entries[0]))
         _require_next(head_in(connection, chain), list(entries))
         _require_signed(connection, chain, entries)
         _keep_records(connection, _named(entries, records))
-        _put(connection, chain, entries)
+        _put(connection, entries)
     remember_head(chain, entries[-1].entry.number, entries[-1].sha256)
 
 
 def _require_remembered(connection: Connection, chain: str, name: str) -> None:
-    def hash_of(number: int) -> str | None:
-        wanted = select(ENTRIES.c.sha256).where(
-            ENTRIES.c.chain == chain, ENTRIES.c.number == number
-        )
-        return connection.execute(wanted).scalar_one_or_none()
-
     try:
-        require_remembered(name, chain, hash_of)
+        require_remembered(name, chain, partial(hash_in, connection, chain))
     except FileError as error:
         raise ArchiveError(error.message) from error
 
@@ -156,28 +147,9 @@ def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
     return connection.execute(wanted).one_or_none() is not None
 
 
-def _begin(connection: Connection, chain: str) -> None:
-    connection.execute(
-        insert(CHAINS).values(chain=chain, number=0, sha256=NOTHING_BEFORE, delivered=0)
-    )
-
-
-def _is_server(connection: Connection) -> bool:
-    return connection.dialect.name == "postgresql"
-
-
-def _put(connection: Connection, chain: str, entries: Sequence[StoredEntry]) -> None:
-    if not entries:
-        return
-    connection.execute(insert(ENTRIES), list(map(columns_of, entries)))
-    if _is_server(connection):
-        return
-    last = entries[-1]
-    connection.execute(
-        update(CHAINS)
-        .where(CHAINS.c.chain == chain)
-        .values(number=last.entry.number, sha256=last.sha256)
-    )
+def _put(connection: Connection, entries: Sequence[StoredEntry]) -> None:
+    if entries:
+        connection.execute(insert(ENTRIES), list(map(columns_of, entries)))
 
 
 def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
@@ -187,7 +159,8 @@ def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
     new = [{"sha256": n, "text": t} for n, t in records.items() if n not in known]
     if new:  # on a server, another role may have stored one invisible to this one
         put = postgresql.insert(RECORDS).on_conflict_do_nothing()
-        connection.execute(put if _is_server(connection) else insert(RECORDS), new)
+        is_server = connection.dialect.name == "postgresql"
+        connection.execute(put if is_server else insert(RECORDS), new)
 
 
 def _require_next(head: ChainHead, new: list[StoredEntry]) -> None:

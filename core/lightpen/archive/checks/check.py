@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Row, exists, select, text
+from sqlalchemy import Row, exists, func, select, text
 
-from lightpen.archive.chains.chains import chain_at_home, heads
-from lightpen.archive.chains.entries import SHORT, ChainHead, named_entry, text_sha256
+from lightpen.archive.chains.chains import chain_at_home, chain_names
+from lightpen.archive.chains.entries import SHORT, named_entry, text_sha256
 from lightpen.archive.chains.rows import searchable, sound_entry
 from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.checks.check_notes import check_notes
 from lightpen.archive.checks.files_check import FilesCheck
 from lightpen.archive.store.database import Database, is_open, look_into
-from lightpen.archive.store.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.archive.store.tables import ENTRIES, RECORDS
 from lightpen.errors import FileError, LightpenError
 from lightpen.messages import Message, message
 from lightpen.record.library.entered_files import (
@@ -49,26 +49,21 @@ def check_archive(
     A given data folder is examined as well. ``report`` is called with the fraction
     done, 0 to 1; what it raises ends the check.
     """
-    ends, home = heads(database), chain_at_home(database)
-    n_all = max(1, sum(head.number for head in ends))
+    chains, home = chain_names(database), chain_at_home(database)
+    ((n_entries,),) = database.rows(select(func.count()).select_from(ENTRIES))
     files = FilesCheck(data)
     stages = [_damage(database)]
     if data is not None:
         stages.append(_rolled_back(data))
-    n_before = 0
-    for head in ends:
-        start, share = n_before / n_all, head.number / n_all
-
-        def part(fraction: float, start: float = start, share: float = share) -> None:
-            report(start + share * fraction)
-
-        own = files if head.chain == home else None
-        stages.append(_walked(database, head, own, part))
-        n_before += head.number
-    stages += [_strays(database), _changed_records(database), _lost_records(database)]
+    for chain in chains:
+        if home in (None, chain):
+            stages.append(_walked(database, chain, files, report, n_entries))
+        else:
+            stages.append(iter([message("archive.other-chain", chain=chain[:SHORT])]))
+    stages += [_changed_records(database), _lost_records(database)]
     findings = tuple(each for stage in stages for each in _findings(stage))
     notes = () if data is None else tuple(_findings(check_notes(database, data)))
-    return ArchiveCheckResult(n_before, files.n_files, findings, notes)
+    return ArchiveCheckResult(n_entries, files.n_files, findings, notes)
 
 
 def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
@@ -120,36 +115,28 @@ def _rolled_back(data: Path) -> Iterator[Message]:
 
 
 def _walked(
-    database: Database, head: ChainHead, files: FilesCheck | None, report: Report
+    database: Database, chain: str, files: FilesCheck, report: Report, n_all: int
 ) -> Iterator[Message]:
     """Check a chain from its first entry to its last, and yield the findings.
 
     Entries added meanwhile are checked as well.
     """
-    number, previous, keys = 0, NOTHING_BEFORE, ChainKeys(head.chain)
-    while True:
-        rows = _rows_after(database, head.chain, number)
-        if not rows:
-            # The present state, or the last one of a lost chain.
-            head = next((h for h in heads(database) if h.chain == head.chain), head)
-            if number >= head.number or not _rows_after(database, head.chain, number):
-                break
+    number, previous, keys = 0, NOTHING_BEFORE, ChainKeys(chain)
+    while rows := _rows_after(database, chain, number):
         sound = []
         for row in rows:
             if not isinstance(row.number, int):  # SQLite also stores a text there
-                yield _changed(head.chain, number + 1)
+                yield _changed(chain, number + 1)
                 return
             if row.number > number + 1:
-                yield _missing(head.chain, number + 1, row.number - 1)
+                yield _missing(chain, number + 1, row.number - 1)
                 previous = ""
             entry = sound_entry(row)
             if entry is None:
-                yield _changed(head.chain, row.number)
+                yield _changed(chain, row.number)
             elif previous not in ("", entry.entry.previous):
                 yield message(
-                    "archive.entry-unchained",
-                    number=row.number,
-                    chain=head.chain[:SHORT],
+                    "archive.entry-unchained", number=row.number, chain=chain[:SHORT]
                 )
             else:
                 sound.append(entry)
@@ -157,13 +144,8 @@ def _walked(
                 if unsigned is not None and unsigned.code != UNAPPROVED:
                     yield unsigned
             number, previous = row.number, row.sha256
-        if files is not None:
-            yield from files.findings(sound)
-        report(min(1.0, number / max(1, head.number)))
-    if number < head.number:
-        yield _missing(head.chain, number + 1, head.number)
-    elif (number, previous) != (head.number, head.sha256) and previous:
-        yield message("archive.head-changed", chain=head.chain[:SHORT])
+        yield from files.findings(sound)
+        report(min(1.0, number / n_all))
 
 
 def _rows_after(database: Database, chain: str, number: int) -> Sequence[Row[Any]]:
@@ -174,16 +156,6 @@ def _rows_after(database: Database, chain: str, number: int) -> Sequence[Row[Any
         .limit(BATCH)
     )
     return database.rows(rows)
-
-
-def _strays(database: Database) -> Iterator[Message]:
-    """Yield the entries of a file that belong to no chain."""
-    if database.file is None:  # where a foreign key prevents it
-        return
-    known = select(CHAINS.c.chain)
-    strays = select(ENTRIES.c.chain).where(ENTRIES.c.chain.not_in(known)).distinct()
-    for (chain,) in database.rows(strays):
-        yield message("archive.no-such-chain", chain=str(chain)[:SHORT])
 
 
 def _changed_records(database: Database) -> Iterator[Message]:

@@ -11,7 +11,6 @@ from lightpen.archive.chains.chains import (
     chain_at_home,
     entries_of_limits,
     entry_of_result,
-    heads,
 )
 from lightpen.archive.chains.entries import SHORT
 from lightpen.archive.chains.signatures import signature_finding
@@ -31,9 +30,8 @@ def check_notes(database: Database, data: Path) -> Iterator[Message]:
     Files without entries, and keys that are not known or that nobody approved.
     """
     home = chain_at_home(database)
-    for head in heads(database):
-        yield from _unapproved_keys(database, head.chain)
     if home is not None:
+        yield from _unapproved_keys(database, home)
         yield from _unknown_here(home)
         yield from _not_entered(database, data, home)
 

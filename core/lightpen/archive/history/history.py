@@ -63,7 +63,7 @@ def lines(
     newest_first = [column.desc() for column in IN_ORDER]
     places = (
         select(ENTRIES.c.chain, ENTRIES.c.number)
-        .where(condition_of(wanted))
+        .where(condition_of(database, wanted))
         .order_by(*newest_first)
         .offset(first)
         .limit(n_lines)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import (
+    Column,
     ColumnElement,
     Exists,
     FromClause,
@@ -24,6 +25,7 @@ from lightpen.archive.chains.entries import (
 from lightpen.archive.chains.rows import READ, read_entries, searchable
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES
+from lightpen.model.names import folded_name
 
 IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
 _KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
@@ -44,7 +46,8 @@ class EntryFilter:
 
 def n_wanted(database: Database, wanted: EntryFilter) -> int:
     """Return the number of matching entries."""
-    count = select(func.count()).select_from(ENTRIES).where(condition_of(wanted))
+    condition = condition_of(database, wanted)
+    count = select(func.count()).select_from(ENTRIES).where(condition)
     with database.reading() as connection:
         return connection.execute(count).scalar_one()
 
@@ -56,7 +59,7 @@ def newest(
 
     ``before`` is the last of those that were returned before.
     """
-    condition = condition_of(wanted)
+    condition = condition_of(database, wanted)
     if before is not None:
         place = (since_us(before.since), before.chain, before.number)
         condition &= tuple_(*IN_ORDER) < place
@@ -69,6 +72,15 @@ def newest(
     return read_entries(database, found)
 
 
+def _is_named(
+    database: Database, column: Column[str], name: str
+) -> ColumnElement[bool]:
+    """Return the condition that a name is in a column, however it was typed."""
+    folded = folded_name(searchable(name))
+    found = (typed for (typed,) in database.rows(select(column).distinct()))
+    return column.in_([each for each in found if folded_name(str(each)) == folded])
+
+
 def last_accepted(
     database: Database,
     pen: str,
@@ -79,8 +91,8 @@ def last_accepted(
 ) -> StoredEntry | None:
     """Return the last acceptance of a pen and tip that was not revoked.
 
-    By default in the chain of any data folder. The current result of a station is in
-    its result files.
+    The names are as the entry has them: every acceptance spells them as the one before.
+    The current result of a station is in its result files.
     """
     condition = (
         (ENTRIES.c.pen == searchable(pen))
@@ -141,13 +153,13 @@ def replaced(entries: FromClause) -> Exists:
     )
 
 
-def condition_of(wanted: EntryFilter) -> ColumnElement[bool]:
+def condition_of(database: Database, wanted: EntryFilter) -> ColumnElement[bool]:
     """Return the SQL condition of an entry filter."""
     condition: ColumnElement[bool] = true()
     names = {"pen": wanted.pen, "tip": wanted.tip, "station": wanted.station}
     for column, name in names.items():
         if name:
-            condition &= ENTRIES.c[column] == searchable(name)
+            condition &= _is_named(database, ENTRIES.c[column], name)
     if wanted.kinds:
         condition &= ENTRIES.c.kind.in_([kind.value for kind in wanted.kinds])
     if wanted.is_simulated is not None:

@@ -20,8 +20,8 @@ from threading import Lock
 from msgspec import structs
 
 from lightpen.archive.chains.chains import (
+    chain_head,
     entry_of_result,
-    heads,
     is_swing_entered,
     records_of,
 )
@@ -194,8 +194,8 @@ class Logbook:
         n_delivered, fault = self._replicator.n_delivered, self._replicator.fault
         if n_delivered is None:
             return ReplicationState(None, fault)
-        ends = {head.chain: head.number for head in heads(self.database)}
-        return ReplicationState(max(0, ends.get(self.chain, 0) - n_delivered), fault)
+        n_entries = chain_head(self.database, self.chain).number
+        return ReplicationState(max(0, n_entries - n_delivered), fault)
 
     def close(self) -> None:
         """Close the archive."""

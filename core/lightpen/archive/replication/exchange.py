@@ -18,13 +18,12 @@ from pathlib import Path
 from lightpen.archive.chains.chains import (
     batch_of,
     chain_head,
+    chain_names,
     entries_of,
-    heads,
-    note_delivered,
     records_of,
 )
 from lightpen.archive.chains.growth import copy_entries
-from lightpen.archive.replication.comparison import require_continued
+from lightpen.archive.replication.comparison import require_same
 from lightpen.archive.store.database import Database
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.system_reasons import strerror
@@ -47,14 +46,12 @@ def deliver(database: Database, chain: str, server: Database) -> Delivery:
     Raises `ArchiveError` if it does not answer, is ahead of this chain, or holds other
     entries of it.
     """
-    require_continued(database, chain, server)
+    require_same(database, chain, server)
     known = last = chain_head(server, chain).number
     n_new = 0
-    note_delivered(database, chain, last)
     while batch := batch_of(database, chain, last)[:DELIVERED]:
         n_new += copy_entries(server, chain, batch, records_of(database, batch))
         last = batch[-1].entry.number
-        note_delivered(database, chain, last)
     return Delivery(n_new, known)
 
 
@@ -83,8 +80,8 @@ def export_entries(database: Database, path: Path) -> int:
 
 def _contents(database: Database) -> Iterator[dict[str, object]]:
     yield {"lightpen_archive": FORMAT}
-    for head in heads(database):
-        for entry in entries_of(database, head.chain):
+    for chain in chain_names(database):
+        for entry in entries_of(database, chain):
             name = entry.entry.event.record_sha256
             records = records_of(database, [entry])
             yield {

@@ -13,9 +13,8 @@ from lightpen.archive.chains.chains import (
     batch_of,
     chain_at_home,
     chain_head,
+    chain_names,
     entries_of,
-    heads,
-    note_delivered,
     records_of,
 )
 from lightpen.archive.chains.entries import SHORT, StoredEntry
@@ -61,14 +60,13 @@ def fetch(
     while batch := batch_of(server, home, last):
         adopt_entries(database, home, batch, records_of(server, batch))
         last = batch[-1].entry.number
-    note_delivered(database, home, max(n_there, last))
     n_files, lost = _restore_files(database, data, home)
     return FetchResult(last - n_here, n_files, lost)
 
 
 def _chosen(server: Database, start: str) -> str:
     """Return the chain of a server that is meant."""
-    found = [head.chain for head in heads(server) if head.chain.startswith(start)]
+    found = [chain for chain in chain_names(server) if chain.startswith(start)]
     if not found:
         raise ArchiveError("archive.nothing-to-fetch", name=server.name)
     if len(found) > 1:

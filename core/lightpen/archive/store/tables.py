@@ -1,9 +1,8 @@
 """The tables of the archive: entries and records, on SQLite and PostgreSQL alike.
 
 The columns of an entry repeat its text: they serve the search, and
-`lightpen.archive.checks.check` compares them with it. How far a chain has come, a file
-says beside its entries; on a server the entries alone do, see
-`lightpen.archive.replication.server_setup`.
+`lightpen.archive.checks.check` compares them with it. Nothing but the entries says how
+far a chain has come.
 """
 
 from sqlalchemy import (
@@ -20,15 +19,6 @@ from sqlalchemy import (
 )
 
 METADATA = MetaData()
-
-CHAINS = Table(  # of a file: its own
-    "archive_chains",
-    METADATA,
-    Column("chain", String(32), primary_key=True),
-    Column("number", Integer, nullable=False),
-    Column("sha256", String(64), nullable=False),
-    Column("delivered", Integer, nullable=False),  # entries that a server was given
-)
 
 CHAIN_WRITERS = Table(  # of a server
     "archive_writers",

@@ -244,12 +244,9 @@ def _read(data: Path) -> _Reading:
         if not file.is_file():
             return _Reading(data, known_station_name(data))
         with closing(_connected(file)) as connection:
-            rows = _chains(connection)
-            if not rows:
+            chain = _chain_in(connection)
+            if not chain:
                 return _Reading(data, known_station_name(data))
-            if len(rows) > 1:
-                raise sqlite3.DatabaseError("it has several chains")
-            ((chain,),) = rows
             _require_own(data, chain)
             reading = _readings.get(data)
             if reading is None or not _is_continued(connection, reading, chain):
@@ -263,11 +260,18 @@ def _read(data: Path) -> _Reading:
         raise FileError("archive.unusable", name=name, reason=str(error)) from error
 
 
-def _chains(connection: sqlite3.Connection) -> list[Any]:
-    tables = "SELECT 1 FROM sqlite_master WHERE name = 'archive_chains'"
+def _chain_in(connection: sqlite3.Connection) -> str:
+    """Return the chain of the entries; empty if there is none."""
+    tables = "SELECT 1 FROM sqlite_master WHERE name = 'archive_entries'"
     if connection.execute(tables).fetchone() is None:
-        return []
-    return connection.execute("SELECT chain FROM archive_chains").fetchall()
+        return ""
+    first, last = connection.execute(
+        "SELECT (SELECT min(chain) FROM archive_entries),"
+        " (SELECT max(chain) FROM archive_entries)"
+    ).fetchone()
+    if first != last:
+        raise sqlite3.DatabaseError("it has several chains")
+    return str(first or "")
 
 
 def _connected(file: Path) -> sqlite3.Connection:
