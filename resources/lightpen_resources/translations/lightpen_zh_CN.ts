@@ -6204,6 +6204,10 @@ mm</translation>
         <translation>LED 编号顺序错误：{places}。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请照此编号。</translation>
     </message>
     <message>
+        <source>The archive contains entries of another chain, {chain}.</source>
+        <translation>档案中含有另一条链 {chain} 的条目。</translation>
+    </message>
+    <message>
         <source>The archive is closed: the program ends.</source>
         <translation>档案库已关闭：程序正在结束。</translation>
     </message>
@@ -6366,10 +6370,6 @@ mm</translation>
     <message>
         <source>The swing {folder} of entry {number} is missing.</source>
         <translation>第 {number} 个条目的摆动 {folder} 缺失。</translation>
-    </message>
-    <message>
-        <source>The system keyring has no password of user {user} for the service {service}. Store it with: keyring set {service} {user} (Windows: cmdkey /generic:{service} /user:{user} /pass).</source>
-        <translation>系统密钥环中没有用户 {user} 用于服务 {service} 的密码。请用以下命令保存：keyring set {service} {user}（Windows：cmdkey /generic:{service} /user:{user} /pass）。</translation>
     </message>
     <message>
         <source>The tip cannot be accepted. {why}</source>
@@ -6976,10 +6976,6 @@ mm</translation>
         <translation>3D Slicer</translation>
     </message>
     <message>
-        <source>A password in the system keyring needs the package keyring, which is not installed. Install it with: pip install &quot;lightpen[keyring]&quot;.</source>
-        <translation>系统密钥环中的密码需要软件包 keyring，但尚未安装。安装命令：pip install &quot;lightpen[keyring]&quot;。</translation>
-    </message>
-    <message>
         <source>A press test compares two swings with the same cameras and LEDs. Give two calibrations of one station and pen.</source>
         <translation>压力试验比较使用相同相机和 LED 的两次摆动。请给出同一工位、同一光笔的两次标定。</translation>
     </message>
@@ -7010,10 +7006,6 @@ mm</translation>
     <message>
         <source>The tip is {x:+.4f} {y:+.4f} {z:+.4f} mm from its calibrated position, {distance:.4f} mm in all (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The difference is significant.</source>
         <translation>测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm，合计 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。差异显著。</translation>
-    </message>
-    <message>
-        <source>The tip of entry {number} was accepted before it was computed: the clock of the station was set back, or the entry was falsified.</source>
-        <translation>条目 {number} 的测头在计算之前已被接受：工位时钟曾被调回，或条目被篡改。</translation>
     </message>
     <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
@@ -8516,10 +8508,6 @@ mm</translation>
         <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
     <message>
-        <source>The last entry of chain {chain} is not the one that its head names: entries were added or removed.</source>
-        <translation>链 {chain} 的最后一条记录与链头所指的不同：有记录被添加或删除。</translation>
-    </message>
-    <message>
         <source>The lengths of the board {text} are not valid: they must be above 0 mm, and markers or circles smaller than their squares. Measure them again.</source>
         <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
     </message>
@@ -8672,10 +8660,6 @@ mm</translation>
         <translation>所选文件或名称与该摆动的不同。请先选择，再重做压力试验。</translation>
     </message>
     <message>
-        <source>The server had the entries {first} to {last} of this station and no longer shows them. Ask its administrator whether they were removed or the user was changed. They are delivered again only on request.</source>
-        <translation>服务器曾有本工位的第 {first} 至 {last} 条记录，现在不再显示。请询问其管理员是否已删除这些记录或更改了用户。仅在要求时才会重新传送。</translation>
-    </message>
-    <message>
         <source>The server has the chains of several stations: {chains}. Choose one.</source>
         <translation>服务器有多个工位的链：{chains}。请选择其一。</translation>
     </message>
@@ -8732,10 +8716,6 @@ mm</translation>
         <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
     </message>
     <message>
-        <source>The system keyring cannot be read: {reason}. Unlock it, or keep the password in a file.</source>
-        <translation>无法读取系统密钥环：{reason}。请将其解锁，或将密码保存在文件中。</translation>
-    </message>
-    <message>
         <source>The temperature of the pen was not measured; this station requires it. Measure it and enter it at Start, then repeat the swing.</source>
         <translation>光笔温度未测量，而本工位要求测量。请测量并在“开始”页输入，然后重新摆动。</translation>
     </message>
@@ -8790,10 +8770,6 @@ mm</translation>
     <message>
         <source>The tip moved in its seat with the tilt by about {distance:.4f} mm; U includes this. Check tip and cone for form error, wear and dirt.</source>
         <translation>测头随倾斜在锥孔中移动约 {distance:.4f} mm，已计入 U。请检查测头和锥孔的形状误差、磨损和污物。</translation>
-    </message>
-    <message>
-        <source>The tip of entry {number} was accepted earlier than the one before: the clock of the station was set back.</source>
-        <translation>第 {number} 条记录的测头的接受时间早于前一条：工位的时钟被调回。</translation>
     </message>
     <message>
         <source>The tip rested on two points, {distance:.2f} mm apart: cone or tracker moved. First point: poses {first}. Second point: poses {second}. {consequence}</source>
@@ -9530,10 +9506,6 @@ mm</translation>
     <message>
         <source>The adjustment did not converge in {n_steps} iterations: the views are too similar, or the board is another one, or far from flat. Add views with the board tilted by 20° to 40° to each side and in each corner of the image; otherwise count and measure the squares again.</source>
         <translation>平差在 {n_steps} 次迭代内未收敛：视图过于相似，或标定板不是所述的，或远非平面。请增加标定板向各侧倾斜 20° 至 40° 及位于图像各角的视图；否则请重新数并测量方格。</translation>
-    </message>
-    <message>
-        <source>The archive contains entries of chain {chain}, but not the chain itself.</source>
-        <translation>存档含有链 {chain} 的条目，但没有该链本身。</translation>
     </message>
     <message>
         <source>The database {name} is empty. Its administrator must set it up as described in docs/archive.md.</source>
