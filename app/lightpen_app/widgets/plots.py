@@ -42,7 +42,7 @@ from lightpen_app.widgets.plot_canvas import Canvas, LabelAxis, ReadableAxis
 
 PNG_SCALE = 2
 MARK_HEIGHT = 3 * GRID  # px, below a saved plot
-LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
+LEFT_WIDTH = 9 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = 6 * GRID  # px that a title leaves free, as for a button
 LEAST_TITLE = 9  # px
 SIDE = 0.045  # of many numbered items, beside the first and the last
@@ -50,6 +50,20 @@ N_LEAST = 10  # a trace has room for whole multiples, so that its numbers are wh
 MARGIN = 0.06  # of the range, left free around the data
 LEAST_FILL = 0.6  # of a steady range that the data must take
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
+LINE = 2  # px
+# Curves differ by these besides their colour, which not everybody tells apart.
+DASHES = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine)
+SYMBOLS = {
+    "o": "\N{BLACK CIRCLE}",
+    "s": "\N{BLACK SQUARE}",
+    "t1": "\N{BLACK UP-POINTING TRIANGLE}",
+}
+SYMBOL = 7  # px
+N_MARKED = 12  # points of a curve
+FENCE = 1.5  # quartile distances, beyond which a value is an outlier (Tukey)
+NEWEST = 0.25  # of the values, which are in sight whatever they are
+
+pg.setConfigOptions(antialias=True)
 
 Column: TypeAlias = FloatArray | tuple[str, ...]
 
@@ -70,6 +84,7 @@ class Plot(QWidget):
     """
 
     titled = Signal()  # title or labels changed
+    has_symbols = False  # whether its curves have the `SYMBOLS`
 
     def __init__(self, axes: Axes) -> None:
         super().__init__()
@@ -173,10 +188,17 @@ class Plot(QWidget):
     def _named_curves(self) -> tuple[str, ...]:
         return ()
 
+    def _signed_names(self) -> tuple[str, ...]:
+        """Return the names of the curves with their symbols, if they have any."""
+        names = self._named_curves()
+        if not self.has_symbols:
+            return names
+        return tuple(map(" ".join, zip(SYMBOLS.values(), names, strict=False)))
+
     def _fitted_title_px(self) -> int:
         """Return the font size that shows the whole title, px."""
         largest = scaled(TextSize.SMALL)
-        words = "   ".join((self._axes.title, *self._named_curves()))
+        words = "   ".join((self._axes.title, *self._signed_names()))
         needed = QFontMetricsF(font(largest, bold=True)).horizontalAdvance(words)
         room = max(self.width() - TITLE_MARGIN, 1)
         return max(min(int(largest * room / max(needed, 1.0)), largest), LEAST_TITLE)
@@ -189,7 +211,7 @@ class Plot(QWidget):
         size = f"{self._title_px}px"
         title = {"color": colors.text, "size": size, "justify": "left"}
         self._item.setTitle(escape(self._axes.title), **title)
-        if names := self._named_curves():  # beside the title they hide nothing
+        if names := self._signed_names():  # beside the title they hide nothing
             words = title_with_names(self._axes.title, names, colors)
             self._item.titleLabel.setText(words)
         for side, words in (("left", self._axes.y), ("bottom", self._axes.x)):
@@ -278,8 +300,8 @@ class TracePlot(Plot):
         Always show the zero.
     y_log : bool
         Show values over decades; those that are not above zero leave a gap.
-    tail : float
-        Share of the images, the newest, whose values must all be in sight.
+    is_robust : bool
+        Cut off outliers among the earlier values.
     """
 
     def __init__(
@@ -289,16 +311,18 @@ class TracePlot(Plot):
         *,
         y_zero: bool = False,
         y_log: bool = False,
-        tail: float = 1.0,
+        is_robust: bool = False,
     ) -> None:
+        self.has_symbols = len(curves) == len(SYMBOLS)
         self._curves: list[pg.PlotCurveItem] = []
+        self._marks: list[pg.ScatterPlotItem] = []
         self._legend: tuple[str, ...] = ()
         self._limit: pg.InfiniteLine | None = None
         super().__init__(axes)
         self._names = tuple(curve.column for curve in curves)
         self._y_zero = y_zero
         self._y_log = y_log
-        self._tail = tail
+        self._is_robust = is_robust
         self._limit_at: float | None = None
         self._legend = tuple(curve.name for curve in curves)
         left = self._item.getAxis("left")
@@ -307,11 +331,15 @@ class TracePlot(Plot):
         self._item.layout.setContentsMargins(0, 0, 2 * GRID, 0)
         self._show_nothing()
         for _ in curves:
-            curve = pg.PlotCurveItem()
-            curve.setSegmentedLineMode("on")
-            self._item.addItem(curve)
-            self._curves.append(curve)
-        self._limit = pg.InfiniteLine(angle=0, movable=False)
+            self._curves.append(pg.PlotCurveItem())
+        if self.has_symbols:
+            self._marks = [
+                pg.ScatterPlotItem(symbol=each, size=SYMBOL) for each in SYMBOLS
+            ]
+        for item in (*self._curves, *self._marks):
+            self._item.addItem(item)
+        place = {"position": 0.02, "anchors": [(0.0, 1.0), (0.0, 1.0)]}
+        self._limit = pg.InfiniteLine(angle=0, movable=False, label="", labelOpts=place)
         self._limit.hide()
         self._item.addItem(self._limit)
         self._restyle()
@@ -327,11 +355,15 @@ class TracePlot(Plot):
         heights = [self._height(value) for value in values]
         for curve, height in zip(self._curves, heights, strict=True):
             curve.setData(x, height, connect="finite")
+        every = slice(None, None, max(len(x) // N_MARKED, 1))
+        for marks, height in zip(self._marks, heights, strict=False):
+            marks.setData(x[every], height[every])
         self._show_range()
 
-    def set_limit(self, value: float | None) -> None:
-        """Draw a limit line, or none."""
+    def set_limit(self, value: float | None, name: str = "") -> None:
+        """Draw a limit line with a name, or none."""
         assert self._limit is not None
+        self._limit.label.setFormat(name)
         self._limit_at = value
         self._limit.setVisible(value is not None)
         if value is not None:
@@ -346,8 +378,9 @@ class TracePlot(Plot):
             self._show_nothing()
             return
         self._show_numbers(True)
-        n_hidden = int((1 - self._tail) * len(x))
-        in_sight = [self._height(value)[n_hidden:] for value in values]
+        in_sight = [self._height(value) for value in values]
+        if self._is_robust:
+            in_sight = list(map(_without_outliers, in_sight))
         if self._limit_at is not None:
             in_sight.append(self._height(np.array([self._limit_at])))
         n_steps = max(math.ceil((x.max() - x.min() + 1) / N_LEAST), 1)
@@ -380,12 +413,27 @@ class TracePlot(Plot):
     def _restyle(self) -> None:
         super()._restyle()
         colors = colors_of(self.palette())
-        for curve, tone in zip(self._curves, TONES, strict=False):
-            curve.setPen(pg.mkPen(colors.tone(tone), width=1))
+        for curve, tone, dash in zip(self._curves, TONES, DASHES, strict=False):
+            curve.setPen(pg.mkPen(colors.tone(tone), width=LINE, style=dash))
+        for marks, tone in zip(self._marks, TONES, strict=False):
+            marks.setPen(pg.mkPen(None))
+            marks.setBrush(pg.mkBrush(colors.tone(tone)))
         if self._limit is not None:
-            pen = pg.mkPen(colors.muted, width=1, style=Qt.PenStyle.DashLine)
-            self._limit.setPen(pen)
+            self._limit.setPen(pg.mkPen(colors.muted, width=1))
+            self._limit.label.setColor(colors.muted)
+            self._limit.label.textItem.setFont(font(TextSize.SMALL))
 
     @override
     def _named_curves(self) -> tuple[str, ...]:
         return self._legend if len(self._curves) > 1 else ()
+
+
+def _without_outliers(values: FloatArray) -> FloatArray:
+    """Return those of values (N,) that a plot must show: all but old outliers."""
+    if not np.isfinite(values).any():
+        return values
+    low, high = np.nanquantile(values, (0.25, 0.75))
+    reach = FENCE * (high - low)
+    is_usual = (low - reach <= values) & (values <= high + reach)
+    is_usual[int((1 - NEWEST) * len(values)) :] = True
+    return np.asarray(values[is_usual])

@@ -4759,16 +4759,48 @@ needed</source>
         <translation>限值 {0}</translation>
     </message>
     <message>
-        <source>RMS residual per image / px</source>
-        <translation>各图像的残差均方根 / px</translation>
+        <source>image</source>
+        <translation>图像</translation>
     </message>
     <message>
-        <source>Tip per image / µm</source>
-        <translation>各图像的测头位置 / µm</translation>
+        <source>Residuals and U</source>
+        <translation>残差与 U</translation>
     </message>
     <message>
-        <source>Tip estimate / µm</source>
-        <translation>测头估计值 / µm</translation>
+        <source>Tip</source>
+        <translation>测头</translation>
+    </message>
+    <message>
+        <source>Residual of each image</source>
+        <translation>每幅图像的残差</translation>
+    </message>
+    <message>
+        <source>How far the LEDs of an image are from where the fit expects them. This fit takes the LEDs as in their file; that of the review may correct them, and leave smaller residuals.</source>
+        <translation>图像中的 LED 与拟合预期位置的距离。此拟合采用文件中的 LED 位置；复核中的拟合可修正这些位置，残差因而更小。</translation>
+    </message>
+    <message>
+        <source>Uncertainty of the tip</source>
+        <translation>测头的不确定度</translation>
+    </message>
+    <message>
+        <source>U of the tip in its weakest direction. The swing ends below the limit (horizontal line). Dashed: what more images cannot improve.</source>
+        <translation>测头在最弱方向上的 U。降到限值（水平线）以下时摆动结束。虚线：更多图像也无法改善的部分。</translation>
+    </message>
+    <message>
+        <source>Tip of each image</source>
+        <translation>每幅图像的测头</translation>
+    </message>
+    <message>
+        <source>The tip by each image alone, from the cone: u to the right, v down, w away from the camera. A step means that the tip has slipped.</source>
+        <translation>仅由每幅图像得到的测头，相对于锥孔：u 向右，v 向下，w 远离相机。出现台阶表示测头滑动过。</translation>
+    </message>
+    <message>
+        <source>Estimate of the tip</source>
+        <translation>测头的估计</translation>
+    </message>
+    <message>
+        <source>The tip by all images so far, from its newest value. First estimates that are far off are cut off.</source>
+        <translation>由至今全部图像得到的测头，相对于其最新值。最初偏离很远的估计不全部显示。</translation>
     </message>
     <message>
         <source>achievable</source>
@@ -4784,6 +4816,14 @@ needed</source>
     <message>
         <source>Simulated pen</source>
         <translation>模拟光笔</translation>
+    </message>
+    <message>
+        <source>Other movements</source>
+        <translation>其他动作</translation>
+    </message>
+    <message>
+        <source>What else the simulated operator can do with the pen</source>
+        <translation>模拟操作员还能用光笔做的动作</translation>
     </message>
     <message>
         <source>Simulated swing</source>
@@ -4904,6 +4944,10 @@ needed</source>
         <translation>已接受</translation>
     </message>
     <message>
+        <source>Let the simulated operator swing; or choose Seat under Other movements and tilt the pen by dragging the dial.</source>
+        <translation>让模拟操作员摆动；或在“其他动作”中选“就位”，然后在姿态盘上拖动使光笔倾斜。</translation>
+    </message>
+    <message>
         <source>Done</source>
         <translation>完成</translation>
     </message>
@@ -4954,10 +4998,6 @@ needed</source>
     <message>
         <source>Computing the tip</source>
         <translation>正在计算测头</translation>
-    </message>
-    <message>
-        <source>Let the simulated operator swing; or press Seat and tilt the pen by dragging the dial.</source>
-        <translation>让模拟操作员摆动；或按“就位”，再拖动姿态盘使光笔倾斜。</translation>
     </message>
     <message>
         <source>Press test: press the tip firmly into the cone.</source>

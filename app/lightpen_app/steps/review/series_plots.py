@@ -14,11 +14,20 @@ from lightpen.arrays import FloatArray
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.steps.review.residual_plots import SquarePlot
-from lightpen_app.widgets.plots import TONES, Axes, Column, Curve, Plot
+from lightpen_app.widgets.plots import (
+    DASHES,
+    LINE,
+    SYMBOL,
+    SYMBOLS,
+    TONES,
+    Axes,
+    Column,
+    Curve,
+    Plot,
+)
 
 MOST_LINES = 2  # of labels below the bars; where more are needed, they stand upright
 GROUP = 0.8  # of the room for a label, that its bars fill
-SYMBOLS = ("o", "s", "t")  # so that curves differ by more than their colour
 FARTHEST = 36.0  # degrees of tilt that are always shown
 
 
@@ -123,11 +132,13 @@ class BarPlot(NamedPlot):
 class LinePlot(NamedPlot):
     """Values with marks, joined by lines, over iterations; at most three."""
 
+    has_symbols = True
+
     def __init__(self, axes: Axes, curves: Sequence[Curve]) -> None:
         self._curves: list[pg.PlotDataItem] = []
         super().__init__(axes, curves)
         for _, symbol in zip(curves, SYMBOLS, strict=False):
-            curve = pg.PlotDataItem(symbol=symbol, symbolSize=6)
+            curve = pg.PlotDataItem(symbol=symbol, symbolSize=SYMBOL)
             self._item.addItem(curve)
             self._curves.append(curve)
         self._restyle()
@@ -148,8 +159,8 @@ class LinePlot(NamedPlot):
     def _restyle(self) -> None:
         super()._restyle()
         colors = colors_of(self.palette())
-        for curve, tone in zip(self._curves, TONES, strict=False):
-            curve.setPen(pg.mkPen(colors.tone(tone), width=1))
+        for curve, tone, dash in zip(self._curves, TONES, DASHES, strict=False):
+            curve.setPen(pg.mkPen(colors.tone(tone), width=LINE, style=dash))
             curve.setSymbolPen(pg.mkPen(None))
             curve.setSymbolBrush(pg.mkBrush(colors.tone(tone)))
 

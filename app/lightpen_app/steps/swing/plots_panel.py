@@ -1,127 +1,168 @@
 """Live plots of a swing."""
 
-from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QTabBar, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.swing.capture.kept_images import AcceptedImages
 from lightpen.swing.capture.seat import tip_offsets
 from lightpen.swing.capture.state import SwingState
-from lightpen_app.look.layouts import grid_layout
-from lightpen_app.look.quantities import MICROMETRES
+from lightpen_app.look.layouts import horizontal_layout, vertical_layout
+from lightpen_app.look.quantities import AXES, MICROMETRES
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.plots import Axes, Curve, TracePlot
 from lightpen_app.widgets.translated import Translated
 
-TAIL = 0.75  # of the estimates; the first ones are far off
-LEAST_HEIGHT = 10 * GRID
+LEAST_HEIGHT = 15 * GRID
+CAMERA_AXES = ("u", "v", "w")
+N_SHOWN = 2  # plots at a time
+
+
+@dataclass
+class _Trace:
+    """A plot, how it shows a swing, and the swing that it shows."""
+
+    plot: TracePlot
+    show: Callable[[SwingState], None]
+    shown: SwingState | None = None
 
 
 class SwingPlots(Translated, QWidget):
-    """Misfit and tip of each image, the estimate of the tip, and its uncertainty."""
+    """Residuals and U, or in their place the tip of each image and its estimate."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._shown: dict[TracePlot, SwingState] = {}
         self._limit: float | None = None  # of U, µm
+        self._turn = 0
 
         # Widgets
-        self._misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
-        self._scatter = TracePlot(
-            Axes(""), [Curve("u_um", "u"), Curve("v_um", "v"), Curve("w_um", "w")]
-        )
-        self._estimate = TracePlot(
-            Axes(""),
-            [Curve("x_um", "x"), Curve("y_um", "y"), Curve("z_um", "z")],
-            tail=TAIL,
-        )
-        self._uncertainty = TracePlot(
+        self._choice = QTabBar(documentMode=True, drawBase=False)
+        self._choice.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # Space is the swing's
+        self._choice.addTab("")
+        self._choice.addTab("")
+        misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
+        uncertainty = TracePlot(
             Axes(""), [Curve("expanded_uncertainty_um"), Curve("floor_um")], y_log=True
+        )
+        scatter, estimate = (
+            TracePlot(Axes(""), [Curve(f"{a}_um", a) for a in axes], is_robust=True)
+            for axes in (CAMERA_AXES, AXES)
+        )
+        self._traces = (
+            _Trace(misfit, self._show_misfit),
+            _Trace(uncertainty, self._show_uncertainty),
+            _Trace(scatter, self._show_scatter),
+            _Trace(estimate, self._show_estimate),
         )
 
         # Layout
-        layout = grid_layout(self)
-        layout.addWidget(self._misfit, 0, 0)
-        layout.addWidget(self._scatter, 0, 1)
-        layout.addWidget(self._estimate, 1, 0)
-        layout.addWidget(self._uncertainty, 1, 1)
+        layout = vertical_layout(self, self._choice, spacing=0)
+        row = horizontal_layout(layout, *((plot, 1) for plot in self.plots()))
+        layout.setStretchFactor(row, 1)
         for plot in self.plots():
             plot.setMinimumHeight(LEAST_HEIGHT)
 
-        self._turns = deque(
-            zip(
-                self.plots(),
-                (
-                    self._show_misfit,
-                    self._show_scatter,
-                    self._show_estimate,
-                    self._show_uncertainty,
-                ),
-                strict=True,
-            )
-        )
+        # Connections
+        self._choice.currentChanged.connect(self._on_choice_changed)
+
+        self._on_choice_changed()
         self._retranslate()
 
     def plots(self) -> tuple[TracePlot, ...]:
-        """Return the plots: misfit, scatter, estimate and uncertainty."""
-        return self._misfit, self._scatter, self._estimate, self._uncertainty
+        """Return the plots: misfit, uncertainty, scatter and estimate."""
+        return tuple(trace.plot for trace in self._traces)
 
     def show_next(self, state: SwingState, max_uncertainty: float) -> None:
-        """Update one plot, in turn; the limit of U is in mm.
+        """Update one of the plots in sight, in turn; the limit of U is in mm.
 
         One at a time, so that the window is never held up by all of them.
         """
-        plot, show = self._turns[0]
-        self._turns.rotate(-1)
-        if self._shown.get(plot) is not state:
-            self._shown[plot] = state
-            show(state, max_uncertainty)
+        if self._limit != MICROMETRES * max_uncertainty:
+            self._limit = MICROMETRES * max_uncertainty
+            self._show_limit()
+        self._turn = (self._turn + 1) % N_SHOWN
+        trace = self._traces[N_SHOWN * self._choice.currentIndex() + self._turn]
+        if trace.shown is not state:
+            trace.shown = state
+            trace.show(state)
 
-    def _show_misfit(self, state: SwingState, _max_uncertainty: float) -> None:
-        self._misfit.set_data(_numbers(state.kept), state.kept.misfits)
+    def _on_choice_changed(self) -> None:
+        for i, plot in enumerate(self.plots()):
+            plot.setVisible(i // N_SHOWN == self._choice.currentIndex())
 
-    def _show_scatter(self, state: SwingState, _max_uncertainty: float) -> None:
+    def _show_misfit(self, state: SwingState) -> None:
+        self._traces[0].plot.set_data(_numbers(state.kept), state.kept.misfits)
+
+    def _show_uncertainty(self, state: SwingState) -> None:
+        trace = state.trace
+        finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
+        floors = np.where(np.isfinite(finite), trace.floors, np.nan)
+        n_images = trace.n_images.astype(np.float64)
+        values = MICROMETRES * finite, MICROMETRES * floors
+        self._traces[1].plot.set_data(n_images, *values)
+
+    def _show_scatter(self, state: SwingState) -> None:
         kept = state.kept
         offsets: FloatArray = np.zeros((len(kept), 3))
         if kept.seat is not None:
             offsets = tip_offsets(kept.seat, kept.rotations, kept.translations)
-        self._scatter.set_data(_numbers(kept), *(MICROMETRES * offsets.T))
+        self._traces[2].plot.set_data(_numbers(kept), *(MICROMETRES * offsets.T))
 
-    def _show_estimate(self, state: SwingState, _max_uncertainty: float) -> None:
+    def _show_estimate(self, state: SwingState) -> None:
         trace = state.trace
-        changes = trace.tips - trace.tips[-1:]
-        self._estimate.set_data(
-            trace.n_images.astype(np.float64), *(MICROMETRES * changes.T)
-        )
-
-    def _show_uncertainty(self, state: SwingState, max_uncertainty: float) -> None:
-        trace = state.trace
-        if self._limit != MICROMETRES * max_uncertainty:
-            self._limit = MICROMETRES * max_uncertainty
-            self._show_limit()
-        finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
-        floors = np.where(np.isfinite(finite), trace.floors, np.nan)
-        self._uncertainty.set_data(
-            trace.n_images.astype(np.float64),
-            MICROMETRES * finite,
-            MICROMETRES * floors,
-        )
+        changes = MICROMETRES * (trace.tips - trace.tips[-1:])
+        self._traces[3].plot.set_data(trace.n_images.astype(np.float64), *changes.T)
 
     def _show_limit(self) -> None:
-        title = self.tr("U (k = 2) / µm")
-        if self._limit is not None:
-            limit = self.tr("limit {0}").format(f"{self._limit:g}")
-            title = f"{title}, {limit}"
-        self._uncertainty.set_limit(self._limit)
-        self._uncertainty.set_axes(Axes(title))
+        words = "" if self._limit is None else f"{self._limit:g}"
+        limit = self.tr("limit {0}").format(words)
+        self._traces[1].plot.set_limit(self._limit, limit)
 
     def _retranslate(self) -> None:
-        self._misfit.set_axes(Axes(self.tr("RMS residual per image / px")))
-        self._scatter.set_axes(Axes(self.tr("Tip per image / µm")))
-        self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
-        self._uncertainty.set_names("U", self.tr("achievable"))
+        image = self.tr("image")
+        misfit, uncertainty, scatter, estimate = self.plots()
+        self._choice.setTabText(0, self.tr("Residuals and U"))
+        self._choice.setTabText(1, self.tr("Tip"))
+        misfit.set_axes(Axes(self.tr("Residual of each image"), image, "RMS / px"))
+        set_tooltip(
+            misfit,
+            self.tr(
+                "How far the LEDs of an image are from where the fit expects them. "
+                "This fit takes the LEDs as in their file; that of the review may "
+                "correct them, and leave smaller residuals."
+            ),
+        )
+        words = self.tr("Uncertainty of the tip"), image, self.tr("U (k = 2) / µm")
+        uncertainty.set_axes(Axes(*words))
+        uncertainty.set_names("U", self.tr("achievable"))
+        set_tooltip(
+            uncertainty,
+            self.tr(
+                "U of the tip in its weakest direction. The swing ends below the limit "
+                "(horizontal line). Dashed: what more images cannot improve."
+            ),
+        )
+        scatter.set_axes(Axes(self.tr("Tip of each image"), image, "µm"))
+        set_tooltip(
+            scatter,
+            self.tr(
+                "The tip by each image alone, from the cone: u to the right, v down, w "
+                "away from the camera. A step means that the tip has slipped."
+            ),
+        )
+        estimate.set_axes(Axes(self.tr("Estimate of the tip"), image, "µm"))
+        set_tooltip(
+            estimate,
+            self.tr(
+                "The tip by all images so far, from its newest value. First estimates "
+                "that are far off are cut off."
+            ),
+        )
         self._show_limit()
 
 

@@ -1,13 +1,14 @@
 """Buttons for the simulated operator, where the pen is simulated."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QToolButton, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 from typing_extensions import override
 
 from lightpen.model.posture import Posture
 from lightpen.simulator.hand import Operator
-from lightpen_app.look.layouts import fill, horizontal_layout
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
@@ -32,27 +33,31 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         # Widgets
         self._follow = PushButton(checkable=True)
         self._follow.setProperty("inviting", True)
-        slots = (
-            self._on_seat_clicked,
-            self._on_swing_clicked,
-            self._on_hold_clicked,
-            self._on_lift_clicked,
-            self._on_leave_clicked,
-            self._on_slip_clicked,
-            self._on_cover_clicked,
+        self._more = PushButton()
+        self._more.setProperty("menu", True)
+        menu = QMenu(self._more)
+        menu.setToolTipsVisible(True)
+        self._actions = tuple(
+            menu.addAction("", slot)
+            for slot in (
+                lambda: self._command(Operator.seat),
+                self._on_swing_clicked,
+                self._on_hold_clicked,
+                lambda: self._command(Operator.lift),
+                lambda: self._command(Operator.leave),
+                lambda: self._command(lambda hand: hand.slip(SLIP_MM, SLIP_S)),
+                lambda: self._command(lambda hand: hand.cover(COVER_S)),
+            )
         )
-        self._buttons = tuple(QToolButton() for _ in slots)
+        self._more.setMenu(menu)
 
         # Layout
         margins = (GRID, GRID // 2, GRID, GRID // 2)
-        self._layout = horizontal_layout(self, self._follow, 1, margins=margins)
-        fill(self._layout, *self._buttons)
+        horizontal_layout(self, self._follow, 1, self._more, margins=margins)
 
         # Connections
         self._follow.toggled.connect(self._on_follow_toggled)
-        for button, slot in zip(self._buttons, slots, strict=True):
-            button.clicked.connect(slot)
-        for each in (self._follow, *self._buttons):
+        for each in (self._follow, self._more):
             # A click leaves Space and Enter to the swing.
             each.setFocusPolicy(Qt.FocusPolicy.TabFocus)
 
@@ -62,7 +67,6 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
 
     @override
     def _use_room(self) -> None:
-        self._layout.setSpacing(GRID // 2 if self._room.is_narrow else GRID)
         self._name_swing()
 
     def lean(self, posture: Posture) -> None:
@@ -95,8 +99,14 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
             (self.tr("Slip"), slip),
             (self.tr("Cover"), self.tr("Covers the LEDs for a moment")),
         )
-        for button, (text, tooltip) in zip(self._buttons, words, strict=True):
-            set_words(button, text, tooltip)
+        for action, (text, tooltip) in zip(self._actions, words, strict=True):
+            action.setText(text)
+            set_tooltip(action, tooltip)
+        set_words(
+            self._more,
+            self.tr("Other movements"),
+            self.tr("What else the simulated operator can do with the pen"),
+        )
 
     def _name_swing(self) -> None:
         set_words(
@@ -129,9 +139,6 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         self._live.set_following(True)
         self._command(Operator.seat)
 
-    def _on_seat_clicked(self) -> None:
-        self._command(Operator.seat)
-
     def _on_swing_clicked(self) -> None:
         self._lead_by_hand()
         self.led_by_itself.emit()
@@ -140,15 +147,3 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
     def _on_hold_clicked(self) -> None:
         self._lead_by_hand()
         self._command(Operator.hold)
-
-    def _on_lift_clicked(self) -> None:
-        self._command(Operator.lift)
-
-    def _on_leave_clicked(self) -> None:
-        self._command(Operator.leave)
-
-    def _on_slip_clicked(self) -> None:
-        self._command(lambda operator: operator.slip(SLIP_MM, SLIP_S))
-
-    def _on_cover_clicked(self) -> None:
-        self._command(lambda operator: operator.cover(COVER_S))

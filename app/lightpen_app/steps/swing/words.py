@@ -7,12 +7,13 @@ from PySide6.QtCore import QObject
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
+from lightpen.detection.reasons import Reason
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade, NextStep, Verdict
 from lightpen.messages import Message, message
-from lightpen.swing.capture.rules import COUNTDOWN, has_just_slipped
+from lightpen.swing.capture.rules import COUNTDOWN, SLIP_REPORTED, has_just_slipped
 from lightpen.swing.capture.shortfall import out_of_reach
-from lightpen.swing.capture.state import Pause, Phase
+from lightpen.swing.capture.state import Pause, Phase, SwingState
 from lightpen.swing_messages import SHOW_PEN, Code
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (
@@ -195,12 +196,14 @@ class SwingWords(QObject):
             return Instruction(instruction.short, self.tr("Computing the tip"))
         if message.code == Code.SHOW_PEN and view.is_simulated:
             hint = self.tr(
-                "Let the simulated operator swing; or press Seat and tilt the pen "
-                "by dragging the dial."
+                "Let the simulated operator swing; or choose Seat under Other "
+                "movements and tilt the pen by dragging the dial."
             )
             return Instruction(instruction.short, hint)
         if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
             instruction = lean_phrase(state.target, view.posture, heading)
+        if message.code != Code.TIP_SLIPPED and (slip := _slip_text(state)):
+            return replace(instruction, hint=slip)
         if view.setup.is_press_test and message.code in PRESSED:
             hint = self.tr("Press test: press the tip firmly into the cone.")
             return replace(instruction, hint=hint)
@@ -323,6 +326,18 @@ class SwingWords(QObject):
         if view.state.pause is Pause.BY_USER:
             return self.tr("Space: continue")
         return self.tr("Space: pause")
+
+
+def _slip_text(state: SwingState) -> str:
+    """Return what a slip cost for a while, although images are kept again."""
+    at = state.slipped_at
+    if state.phase is not Phase.CAPTURING or at is None:
+        return ""
+    if state.time - at >= SLIP_REPORTED:
+        return ""
+    n_dropped = state.n_dropped.get(Reason.SLIPPED, 0)
+    said = phrase(message(Code.TIP_SLIPPED, n_dropped=n_dropped))
+    return PARTED.join((said.short, said.hint))
 
 
 def images_period(times: FloatArray) -> float | None:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication, QTabBar
 from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
 from tests.app.patience import PATIENCE_MS
@@ -32,6 +33,7 @@ from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
 from lightpen_app.steps.swing.page import SwingPage
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.plots import TracePlot
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
@@ -113,6 +115,12 @@ class Desk:
     def click(self, text: str) -> None:
         (button,) = (each for each in self._buttons() if each.text() == text)
         QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def choose(self, text: str) -> None:
+        """Choose an entry of a menu."""
+        actions = self.page.findChildren(QAction)
+        (action,) = (each for each in actions if each.text() == text)
+        action.trigger()
 
     def let_operator_swing(self) -> None:
         text = "Let the simulated operator swing"
@@ -301,8 +309,8 @@ def test_a_record_that_cannot_be_made_is_reported_and_tried_again(
 
 def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> None:
     desk.window.go_to(1)
-    until(qtbot, lambda: "press Seat" in desk.value.hint)
-    desk.click("Seat")
+    until(qtbot, lambda: "choose Seat" in desk.value.hint)
+    desk.choose("Seat")
     until(qtbot, lambda: desk.value.instruction == "Tilt RIGHT")
     until(qtbot, lambda: desk.state.was_upright)
     dial = desk.page.findChild(LeaningDial)
@@ -363,12 +371,22 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_shows_the_review(
     qtbot: QtBot, at_verdict: Desk
 ) -> None:
     desk = at_verdict
-    desk.click("Hold")
+    desk.choose("Hold")
     desk.operator.lean(0.0, 0.0, 0.0)
 
     until(qtbot, lambda: desk.window.page().key == "review")
     filled = [value.state.fraction for value in desk.shown if value.state.fraction]
     assert filled[-1] > 0.5  # the ring was seen to fill
+
+
+def test_the_residuals_of_swing_and_review_agree(at_verdict: Desk) -> None:
+    solution = at_verdict.run.status.solution
+    assert solution is not None
+    during = at_verdict.state.kept.misfits
+    after = solution.misfits[solution.calibration.used]
+
+    # The review solves anew with more unknowns, hundreds of centres for each.
+    assert np.median(during) == pytest.approx(np.median(after), rel=0.2)
 
 
 @pytest.mark.slow
@@ -423,12 +441,49 @@ def test_a_covered_pen_is_reported_and_the_swing_goes_on_by_itself(
     def lost() -> list[OperatorValue]:
         return [v for v in capturing.shown[n_reported:] if v.state.word == "PEN LOST"]
 
-    capturing.click("Cover")
+    capturing.choose("Cover")
 
     until(qtbot, lambda: bool(lost()))
     assert lost()[0].instruction == "Pen not detected"
     assert Sound.LOST in capturing.recorder.sounds()[n_played:]
     keep_on(qtbot, capturing)
+
+
+def test_a_slip_is_said_in_a_sentence_although_images_are_kept_again(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    n_reported = len(capturing.shown)
+    capturing.choose("Slip")
+
+    def said() -> list[OperatorValue]:
+        return [
+            value
+            for value in capturing.shown[n_reported:]
+            if value.hint.startswith("Tip slipped") and "rejected" in value.hint
+        ]
+
+    until(qtbot, lambda: bool(said()))
+    keep_on(qtbot, capturing)
+
+
+def test_the_plots_can_be_read(qtbot: QtBot, capturing: Desk) -> None:
+    plots = capturing.page.findChildren(TracePlot)
+    choice = capturing.page.findChild(QTabBar)
+    assert isinstance(choice, QTabBar)
+
+    def names() -> list[str]:
+        seen = [plot for plot in plots if plot.isVisible()]
+        assert all(plot.height() >= 120 for plot in seen)
+        assert all(plot.toolTip() for plot in seen)
+        until(qtbot, lambda: all(len(plot.columns()) > 1 for plot in seen))
+        return [plot.accessibleName() for plot in seen]
+
+    assert names() == ["Residual of each image", "Uncertainty of the tip"]
+
+    choice.setCurrentIndex(1)
+
+    assert names() == ["Tip of each image", "Estimate of the tip"]
+    choice.setCurrentIndex(0)
 
 
 def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
@@ -518,7 +573,7 @@ def test_a_full_disk_pauses_with_its_sentence_and_space_goes_on(
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert capturing.value.instruction == "Paused"
-    assert "cannot be written" in capturing.words()
+    until(qtbot, lambda: "cannot be written" in capturing.words())
     n_before = capturing.state.n_kept
 
     capturing.type(Key.Key_Space)
