@@ -113,18 +113,6 @@ def test_the_rig_file_of_two_cameras_is_read_back(
     assert "Baseline" in capsys.readouterr().out
 
 
-def test_a_board_is_written_as_a_page(tmp_path: Path) -> None:
-    assert run("board", BOARD, tmp_path / "board.pdf") == 0
-    assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF-")
-
-
-def test_a_page_of_another_kind_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run("board", BOARD, tmp_path / "board.png") == 2
-    assert "does not end in .pdf" in capsys.readouterr().err
-
-
 def test_a_swing_says_whether_file_and_camera_agree(
     scene: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,7 +5,6 @@ MESSAGES = {
     "archive.no-server": "No archive server is set. Set the variable {variable} to its address, postgresql://user:password@host/database.",
     "log.no-such-level": "{variable} is {found}, which is not a log level. Set it to one of: {levels}.",
     "cli.no-such-file": "The file {path} does not exist. Check the name and the folder.",
-    "cli.board-suffix": "A board is written as PDF, but {name} does not end in .pdf. Choose a name that does.",
     "cli.rig-needed": "Several cameras need --rig FILE instead of --camera.",
     "cli.one-of-each-camera": "The rig has {n_cameras} cameras. Give one folder or file per camera, in the order of the rig file ({names}); put patterns in quotation marks.",
     "record.image-unacknowledged": "{image} is in the folder but not in the journal; its recording was not confirmed, and it is excluded.",

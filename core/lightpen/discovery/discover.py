@@ -24,7 +24,6 @@ from lightpen.discovery.hypotheses import (
     solve_seed,
 )
 from lightpen.discovery.labelling import Labelled, label, pixels_of
-from lightpen.discovery.lens_choice import pulled
 from lightpen.discovery.numbering import number_by_sketch
 from lightpen.discovery.request import Request
 from lightpen.discovery.requirements import (
@@ -156,9 +155,9 @@ def _adjusted(
             stated = second.separation
             unknown = ConeSeparation(stated.distance, stated.distance)
             free = replace(second, separation=unknown)
-            without, _ = _calibrated(start, choice, request, observations, free)
+            without = _calibrated(start, choice, request, observations, free)
             require_distance(without, stated, lengths)
-        calibration, choice = _calibrated(start, choice, request, observations, second)
+        calibration = _calibrated(start, choice, request, observations, second)
     except CalibrationError as error:
         if error.message.code not in NOT_SETTLED:
             raise
@@ -331,21 +330,14 @@ def _calibrated(
     request: Request,
     observations: Observations,
     second: SecondSwing | None,
-) -> tuple[Calibration, Choice | None]:
-    """Return the calibration, and the choice of the lens model.
+) -> Calibration:
+    """Return the calibration.
 
-    The camera is read from a file, or starts with a wide covariance and the weakest
-    regularisation that does not fold the image; None if every one folds it.
+    The camera is read from a file, or starts with a wide covariance.
     """
     pen, camera = start.pen, start.rig.cameras[0]
     if choice is None:  # the camera is known
         camera = request.camera or camera
-        return calibrate(camera, pen, observations, second=second), None
+        return calibrate(camera, pen, observations, second=second)
     of_any = replace(camera, covariance=any_covariance(camera))
-    found = []
-    for pull in choice.pulls:
-        near = of_any if pull is None else pulled(camera, pull)
-        found.append(calibrate(near, pen, observations, second=second))
-        if not found[-1].bundle.state.rig.cameras[0].folded_share:
-            return found[-1], replace(choice, pull=pull)
-    return found[0], choice
+    return calibrate(of_any, pen, observations, second=second)

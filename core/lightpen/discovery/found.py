@@ -96,8 +96,6 @@ def discovery_of(
     by, axes = instrument_mixing(bundle), across_normals(state.pen.normals)
     covariance = instrument.covariance + by @ normals.covariance(of_turn) @ by.T
     at = instrument.parameters
-    if choice is not None:
-        covariance = choice.with_shrinkage(covariance, at.cameras[0].start)
     budget = calibration.budget.covariance[:3, :3] - instrument.covariance[:3, :3]
     values, vectors = np.linalg.eigh(budget)
     beyond_fit = (vectors * np.maximum(values, 0.0)) @ vectors.T

@@ -17,15 +17,12 @@ from lightpen.discovery.starts import (
     Start,
     adjust_start,
     any_camera,
-    any_covariance,
 )
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.intrinsics.distortion import (
     FEW,
     FISHEYE,
-    FOLDING,
     MANY,
-    PULLS,
     WORTH,
     Choice,
     is_significantly_less,
@@ -41,11 +38,10 @@ OUTLYING = 4.0  # times the usual residual of an image: it tests no lens
 
 
 class _Trial(NamedTuple):
-    """The adjustment of a lens model; ``pull`` as in `Choice`."""
+    """The adjustment of a lens model."""
 
     start: Start
     prior: CameraPrior
-    pull: float | None = None
 
     @property
     def camera(self) -> Camera:
@@ -66,7 +62,7 @@ def choose_lens(
     if needed is not None and needed != FEW:
         only = _refitted(start, needed, pixels, lengths, worth=-np.inf)
         if only is not None:
-            return only.start.state, Choice(needed, {}, only.pull)
+            return only.start.state, Choice(needed, {})
     if needed is not None:
         return start.state, Choice(FEW, {})
     best = _Trial(start, any_camera(start.state.rig.cameras[0]))
@@ -86,7 +82,7 @@ def choose_lens(
         both = its_errors[usable], errors[usable]
         if is_significantly_less(held_out[n], held_out[n_best], *both):
             best, errors = trial, its_errors
-    choice = Choice(len(best.camera.distortion), held_out, best.pull)
+    choice = Choice(len(best.camera.distortion), held_out)
     return best.start.state, choice
 
 
@@ -104,33 +100,11 @@ def _refitted(
     near = convert_lens(start.state.rig.cameras[0], n)
     if near is None:
         return None
-    for pull in (None, *(PULLS if n in FOLDING else ())):
-        camera, prior = near, any_camera(near)
-        if pull is not None:
-            camera = pulled(near, pull)
-            prior = _prior(camera)
-        state = replace(start.state, rig=rig_of(camera))
-        found = adjust_start(state, pixels, prior, N_STEPS, lengths)
-        if found.sigma > (1 - worth) * start.sigma:
-            return None
-        if not found.state.rig.cameras[0].folded_share:
-            return _Trial(found, prior, pull)
-    return None
-
-
-def pulled(near: Camera, pull: float) -> Camera:
-    """Return a camera with wide priors, its folding coefficients drawn towards 0."""
-    folding = 4 + np.array(FOLDING[len(near.distortion)])
-    values, covariance = near.intrinsics.copy(), any_covariance(near)
-    values[folding] = 0.0
-    covariance[folding, folding] = pull**2
-    return replace(near.with_intrinsics(values), covariance=covariance)
-
-
-def _prior(camera: Camera) -> CameraPrior:
-    assert camera.covariance is not None
-    known = CameraPrior.of(camera, camera.covariance).information
-    return CameraPrior(any_camera(camera).intrinsics, known)
+    prior, state = any_camera(near), replace(start.state, rig=rig_of(near))
+    found = adjust_start(state, pixels, prior, N_STEPS, lengths)
+    is_better = found.sigma <= (1 - worth) * start.sigma
+    trial = _Trial(found, prior)
+    return trial if is_better and not trial.camera.folded_share else None
 
 
 def _held_out(

@@ -199,8 +199,8 @@ def _remarks_on_camera(discovery: Discovery) -> list[Message]:
     """Return the statement on the lens found, or on the file of the camera."""
     choice = discovery.lens_choice
     if choice is not None:
-        drawn = message("discover.drawn-in", coefficients=choice.drawn_coefficients)
-        return [drawn] if choice.pull is not None else []
+        share = 100 * discovery.camera.folded_share
+        return [message("camera-validity.fold", share=share)] if share else []
     stated = discovery.calibration.bundle.unknowns.start.rig.cameras[0]
     sigma = USUAL.focal_length * stated.fx
     if stated.covariance is not None:

@@ -16,6 +16,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration
+from lightpen.formats.camera_checks import LARGEST_FOLD
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.posture import tilts_of
@@ -129,7 +130,7 @@ def contradicting_distance(
 
 def require_lens(camera: Camera) -> None:
     """Refuse a lens that no camera file can state, as the corners were not seen."""
-    if camera.folded_share:
+    if camera.folded_share > LARGEST_FOLD:
         raise CalibrationError("discover.lens-folds")
 
 

@@ -23,6 +23,7 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.uncertainty.disc_normals import turned_normals, with_normal
+from lightpen.intrinsics.distortion import usual_distortion
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
@@ -93,6 +94,9 @@ def any_covariance(camera: Camera) -> FloatArray:
     """Return the covariance (k, k) of the intrinsics of cameras about ideal ones."""
     distortion = [DISTORTION.get(name, RADIAL) for name in camera.distortion_names]
     covariance = np.diag([0.0, 0.0, *(CENTER * camera.width,) * 2, *distortion]) ** 2
+    usual = np.diag(usual_distortion(camera))
+    at = np.flatnonzero(usual)
+    covariance[at, at] = 1 / usual[at]
     covariance[:2, :2] = (UNKNOWN * camera.fx) ** 2
     covariance[1, 1] += (ASPECT * camera.fx) ** 2
     return covariance

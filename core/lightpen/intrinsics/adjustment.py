@@ -75,7 +75,10 @@ class LinearSight(NamedTuple):
 
 
 def adjust_board(
-    views: Views, start: BoardState, stated: tuple[FloatArray | None, ...] = ()
+    views: Views,
+    start: BoardState,
+    stated: tuple[FloatArray | None, ...] = (),
+    origin: BoardState | None = None,
 ) -> BoardFit:
     """Fit everything to the points of all views.
 
@@ -84,12 +87,14 @@ def adjust_board(
     Parameters
     ----------
     start : BoardState
-        Start values; intrinsics as in the files where ``stated`` is set.
+        Start values.
     stated : tuple of (4 + n, 4 + n) array or None
         Information of the intrinsics of each camera beside the views; none where None.
+    origin : BoardState
+        What they state, and the shape of the board before; by default the start.
     """
     prior = _prior(start, stated)
-    origin, state = start, start
+    state, origin = start, origin or start
     sigma = max(_rms(board_residuals(views, state)), FINEST)
     for _ in range(NOISE_ROUNDS):
         state, system = _settled(views, state, origin, prior, sigma)

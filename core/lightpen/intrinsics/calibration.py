@@ -6,13 +6,14 @@ refused where that speaks against it, or where the views do not determine the ca
 anything else is a finding, and U contains it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import date
 
 import numpy as np
 
 from lightpen.errors import CalibrationError
+from lightpen.formats.camera_checks import LARGEST_FOLD
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.changes import (
     FEWEST,
@@ -52,9 +53,6 @@ FARTHEST = np.tan(np.radians(84.0))  # in the normalised plane
 MIN_POINTS = 6  # of a view
 LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
-CONTRADICTED = 3.0  # standard uncertainties of the shape of a board
-BENT = 0.3  # mm, beyond its uncertainty
-STRETCHED = 3e-3  # relative, beyond its uncertainty
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,30 +157,11 @@ def _calibrated(
     report(0.2)
     choice, fitted = choose_distortion(views, fitted, report)
     remarks = [*_message_on_alike(fitted)]
-    choice, effects = _fit_unfolded(views, choice, fitted)
+    effects = fit_effects(views, fitted)
     report(0.9)
     fit = effects.adjustment
-    remarks += [*_messages_on_board(fit), *_message_on_projection(fit)]
+    remarks += [*_messages_on_lens(fit)]
     return _Found(views, choice, effects, find_change(fit), tuple(remarks))
-
-
-def _fit_unfolded(
-    views: Views, choice: Choice, fitted: BoardFit
-) -> tuple[Choice, MixedFit]:
-    """Return the fit with effects; they may fold the image where the fit does not."""
-    near = fitted.state.cameras[0]
-    for pull in choice.pulls:
-        if pull != choice.pull:
-            fitted = fit_camera(views, near, pull)
-        try:
-            effects = fit_effects(views, fitted)
-        except CalibrationError as error:
-            if error.message.code != "camera.distortion-folds":
-                raise
-            continue
-        if not effects.adjustment.state.cameras[0].folded_share:
-            return replace(choice, pull=pull), effects
-    raise CalibrationError("intrinsics.folds")
 
 
 def _result(
@@ -193,7 +172,7 @@ def _result(
     at = fit.of_intrinsics(0)
     camera = replace(
         fit.state.cameras[0],
-        covariance=choice.with_shrinkage(fit.covariance[at, at]),
+        covariance=fit.covariance[at, at],
         calibrated_on=calibrated_on,
         lens_field=found.effects.field,
     )
@@ -203,8 +182,6 @@ def _result(
     if found.change is not None:
         remarks.append(message_on_change(found.change, views.names))
         camera = changed_camera(camera, found.change)
-    if choice.remark is not None:
-        remarks.append(choice.remark)
     counted = np.isin(given.names, views.names)
     others = set(given.names) - {*views.names, *duplicates}
     return CameraCalibration(
@@ -264,34 +241,17 @@ def without_outliers(views: Views, fitted: BoardFit) -> Views:
     return left
 
 
-def _messages_on_board(fitted: BoardFit) -> tuple[Message, ...]:
-    """Return messages on a board that is not as it should be."""
-    shape, sigmas = fitted.state.shape, np.sqrt(np.diag(fitted.covariance))
-    beyond = np.abs(shape) - CONTRADICTED * sigmas[fitted.of_shape]
-    stretch, shear = shape[:2].tolist()
-    remarks = []
-    if beyond[:2].max() > STRETCHED:
-        remarks.append(
-            message(
-                "intrinsics.board-stretched",
-                board=fitted.board.name,
-                stretch=stretch,
-                shear=float(np.degrees(shear)),
-            )
-        )
-    if beyond[2:].max() > BENT:
-        bend = float(np.abs(shape[2:]).max())
-        remarks.append(message("intrinsics.board-bent", bend=bend))
-    return tuple(remarks)
-
-
-def _message_on_projection(fitted: BoardFit) -> tuple[Message, ...]:
-    """Return the message on a lens that the views leave open."""
+def _messages_on_lens(fitted: BoardFit) -> Iterator[Message]:
+    """Yield the messages on a lens that the views leave open."""
     camera, at = fitted.state.cameras[0], fitted.of_intrinsics(0)
+    share = camera.folded_share
+    if share > LARGEST_FOLD:
+        raise CalibrationError("intrinsics.folds")
+    if share:
+        yield message("camera-validity.fold", share=100 * share)
     px = map_uncertainty(camera, fitted.covariance[at, at]).typical
-    if px < UNCERTAIN * max(camera.image_size):
-        return ()
-    return (message("intrinsics.uncertain", px=px),)
+    if px > UNCERTAIN * max(camera.image_size):
+        yield message("intrinsics.uncertain", px=px)
 
 
 def _message_on_alike(fitted: BoardFit) -> tuple[Message, ...]:

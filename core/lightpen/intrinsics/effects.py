@@ -209,7 +209,7 @@ def _design_of(views: Views, fitted: BoardFit) -> _Design:
     residuals = sight.residuals.reshape(n_views, 2 * n_points, 1)
     left = _without_poses(projector, residuals)[..., 0]
     pull = np.zeros(blocks.shape[-1])
-    # Priors are of what is 0 before: the shape, and folding coefficients.
+    # Priors are of what is 0 before: the shape, and coefficients of high orders.
     state = fitted.state
     pull[:n] = fitted.prior @ np.r_[state.cameras[0].intrinsics, state.shape]
     camera, depths = fitted.state.cameras[0], fitted.state.poses.translations[:, 2]
@@ -377,7 +377,9 @@ def _field(best: _Solution, total: FloatArray, fitted: BoardFit) -> LensField:
     both = total[np.ix_(np.r_[own, nodes], np.r_[own, nodes])]
     alone = np.hstack([np.eye(len(own)), -drawn])
     camera = fitted.state.cameras[0]
-    J = camera.intrinsics_jacobian(camera.unproject(field.nodes))
+    seen = camera.sees(field.nodes)
+    J = np.zeros((*field.nodes.shape, len(own)))
+    J[seen] = camera.intrinsics_jacobian(camera.unproject(field.nodes[seen]))
     by_field = np.eye(len(nodes)) + J.reshape(len(nodes), -1) @ drawn
     known = by_field @ total[np.ix_(nodes, nodes)] @ by_field.T
     return replace(

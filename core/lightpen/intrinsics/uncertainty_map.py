@@ -25,7 +25,7 @@ class UncertaintyMap:
     """Standard uncertainty of projections over the image."""
 
     pixels: FloatArray  # (7, 9, 2), positions in the image, px
-    # (7, 9), along the worst direction there, px; NaN where a fisheye sees nothing.
+    # (7, 9), along the worst direction there, px; NaN where nothing is seen.
     sigmas: FloatArray
 
     @property
@@ -56,12 +56,12 @@ def map_uncertainty(camera: Camera, covariance: FloatArray) -> UncertaintyMap:
 def error_fields(camera: Camera) -> FloatArray:
     """Return the derivatives of image points by the intrinsics, (63, 2, 4 + n), px.
 
-    The turn that explains most of each is left out; 0 where a fisheye sees nothing.
+    The turn that explains most of each is left out; 0 where the camera sees nothing.
     """
     pixels = _pixels(camera).reshape(-1, 2)
     seen = camera.sees(pixels)
-    directions = camera.unproject(pixels)
-    directions[~seen] = 0.0
+    directions = np.zeros_like(pixels)
+    directions[seen] = camera.unproject(pixels[seen])
     points = np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
     by_point = camera.project_with_jacobian(points).jacobian
     by_point[~seen] = 0.0

@@ -17,12 +17,6 @@ def _add_extrinsics(parser: ArgumentParser) -> None:
     add_extrinsics(parser)
 
 
-def _add_board(parser: ArgumentParser) -> None:
-    from lightpen.commands.board import add_board
-
-    add_board(parser)
-
-
 BOARDS = Extension(
     "boards",
     commands=(
@@ -32,6 +26,5 @@ BOARDS = Extension(
             "calibrate the extrinsics of two cameras with a board",
             _add_extrinsics,
         ),
-        Subcommand("board", "write a calibration board for printing", _add_board),
     ),
 )

@@ -186,10 +186,6 @@
 <context>
     <name>BoardCalibration</name>
     <message>
-        <source>Saved: {0}. Print it at 100 % and mount it on a flat plate.</source>
-        <translation>已保存：{0}。请按 100 % 打印，并固定在平板上。</translation>
-    </message>
-    <message>
         <source>Calibrating: {0:.0%}</source>
         <translation>正在标定：{0:.0%}</translation>
     </message>
@@ -264,10 +260,6 @@
         <translation>标定板图像</translation>
     </message>
     <message>
-        <source>Save the board</source>
-        <translation>保存标定板</translation>
-    </message>
-    <message>
         <source>{0}: RMS {1:.4f} px, cross-validated {2:.4f} px</source>
         <translation>{0}：均方根 {1:.4f} px，交叉验证 {2:.4f} px</translation>
     </message>
@@ -278,10 +270,6 @@
     <message>
         <source>Camera calibration</source>
         <translation>相机标定</translation>
-    </message>
-    <message>
-        <source>Print (PDF)...</source>
-        <translation>打印 (PDF)...</translation>
     </message>
     <message>
         <source>From a folder...</source>
@@ -6260,10 +6248,6 @@ mm</translation>
         <translation>相机组文件的基线与 LED 文件的尺度相互矛盾：按相机组，光笔为 {wanted:.6g} ± {wanted_u:.2g} 倍，按其文件为 1 ± {stated_u:.2g} (k = 2)。任一文件都可能有误。请检查两者是否配套，然后重新测量光笔或标定相机组。</translation>
     </message>
     <message>
-        <source>The board is bent by {bend:.2f} mm. The bend is taken into account; mount the board on a flat plate.</source>
-        <translation>标定板弯曲 {bend:.2f} mm。计算已计入该弯曲；请将标定板固定在平板上。</translation>
-    </message>
-    <message>
         <source>The camera is stable: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
         <translation>相机稳定：视野中固定的灯在光笔处偏移 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
@@ -8256,14 +8240,6 @@ mm</translation>
         <translation>测球大于要素 {name}。请检查测球直径以及计划中的内外侧。</translation>
     </message>
     <message>
-        <source>The board does not match {board}: lengths along the rows are {stretch:+.2%} longer than along the columns, and right angles deviate by {shear:+.2f}°. It may have been scaled in printing. Print it at true scale, or measure it again.</source>
-        <translation>标定板与 {board} 不符：沿行的长度比沿列长 {stretch:+.2%}，直角偏差 {shear:+.2f}°。打印时可能被缩放。请按实际尺寸打印，或重新测量。</translation>
-    </message>
-    <message>
-        <source>The board {board} is {width:.0f} x {height:.0f} mm and needs a white margin of {foot:g} mm, which exceeds the paper. Choose a larger paper, or a smaller board.</source>
-        <translation>标定板 {board} 为 {width:.0f} x {height:.0f} mm，还需 {foot:g} mm 白边，超出纸张。请选择更大的纸张或更小的标定板。</translation>
-    </message>
-    <message>
         <source>The board {text} has {columns} x {rows} points or squares; {least} to {most} are needed along each side. Count them again; of a chessboard count the inner corners.</source>
         <translation>标定板 {text} 有 {columns} x {rows} 个点或方格；每边需要 {least} 至 {most} 个。请重新计数；棋盘格请数内角点。</translation>
     </message>
@@ -8612,10 +8588,6 @@ mm</translation>
         <translation>测点记录之前光笔被抬起或移动，因此不计入。请保持不动直到记录完成。</translation>
     </message>
     <message>
-        <source>The pen was not seen in the corners of the image, where the distortion would fold it. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Keep the pen out of them, or repeat the swing over the whole image.</source>
-        <translation>图像四角未见光笔，那里的畸变会使图像折叠。已将 {coefficients} 减小到恰好避免折叠；四角为外推。请不要让光笔进入四角，或在整幅图像内重新摆动。</translation>
-    </message>
-    <message>
         <source>The pen was swung about one axis only, {axis}: this axis turned by {found:.1f}° (RMS); {needed:.0f}° are needed, so the tip along it is not determined. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
     </message>
@@ -8890,10 +8862,6 @@ mm</translation>
     <message>
         <source>The views disagree on the pose of the second camera: {n_agree} of {n_pairs} agree. A camera was moved, or image pairs are not simultaneous. Check the names and order of the images.</source>
         <translation>各视图给出的第二台相机位姿不一致：{n_pairs} 组中有 {n_agree} 组一致。可能有相机移动过，或图像对不是同一时刻。请检查图像的名称和顺序。</translation>
-    </message>
-    <message>
-        <source>The views do not cover the image corners, where the estimated distortion would fold the image. {coefficients} was reduced just enough to avoid this; the corners are extrapolated. Add views with the board in each corner, or keep the pen out of the corners.</source>
-        <translation>视图未覆盖图像四角，由其得出的畸变会使图像在那里折叠。已将 {coefficients} 减小到恰好不折叠；四角为外推值。请补充标定板位于各角的视图，或不要让光笔进入四角。</translation>
     </message>
     <message>
         <source>The {kind} {id} expired on {due}. Send it for inspection.</source>

@@ -7,7 +7,6 @@ from tests.simulated_stations import errors_of, random_station, seen_station
 
 from lightpen.arrays import FloatArray
 from lightpen.discovery.lens_choice import choose_lens
-from lightpen.discovery.report import remarks_of
 from lightpen.discovery.requirements import require_lens
 from lightpen.discovery.starts import KnownLength, adjust_start, any_camera
 from lightpen.errors import CalibrationError
@@ -71,14 +70,11 @@ def test_a_lens_that_folds_the_corners_is_refused_with_advice() -> None:
 
 
 @pytest.mark.slow
-def test_a_lens_is_drawn_towards_a_plain_one_where_it_would_fold_the_corners(
+def test_a_lens_seen_far_from_the_corners_is_found_within_its_uncertainty(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(simulated_stations, "FILLED", 0.3)  # far from the corners
     station = random_station(29, n_images=150)
     found = station.discovered()
     require_lens(found.camera)
-    assert found.lens_choice is not None
-    assert found.lens_choice.pull is not None
-    assert any("k3" in str(each) for each in remarks_of(found))
     assert (np.abs(errors_of(found, station).tip) < found.expanded_uncertainty).all()

@@ -7,17 +7,13 @@ from datetime import date
 import numpy as np
 import pytest
 
-from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics import calibration
-from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import (
     MIN_VIEWS,
     CameraCalibration,
     calibrate_camera,
 )
-from lightpen.intrinsics.distortion import PULLS, choose_distortion, fit_camera
-from lightpen.intrinsics.effects import MixedFit, fit_effects
+from lightpen.intrinsics.distortion import choose_distortion, fit_camera
 from lightpen.intrinsics.report import measure_regions
 from lightpen.intrinsics.start import start_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
@@ -153,21 +149,14 @@ def test_views_that_are_alike_are_refused_or_a_finding(make_views: MakeViews) ->
 
 
 @pytest.mark.slow
-def test_a_board_printed_to_fit_the_page_is_remarked(make_views: MakeViews) -> None:
-    stretched = np.array([0.03, 0, 0, 0, 0])
-    found = calibrate_camera(make_views(shape=stretched))
+@pytest.mark.parametrize("shape", [(0.03, 0, 0, 0, 0), (0, 0, 1.5, 0, 0)])
+def test_a_stretched_or_bent_board_is_estimated(
+    make_views: MakeViews, shape: tuple[float, ...]
+) -> None:
+    fitted = calibrate_camera(make_views(shape=np.array(shape))).adjustment
 
-    (remark,) = found.remarks
-    assert remark.code == "intrinsics.board-stretched"
-    assert remark.values["stretch"] == pytest.approx(0.03, abs=5e-4)
-
-
-@pytest.mark.slow
-def test_a_bent_board_is_remarked(make_views: MakeViews) -> None:
-    bent = np.array([0, 0, 1.5, 0, 0])
-    found = calibrate_camera(make_views(shape=bent))
-
-    assert [remark.code for remark in found.remarks] == ["intrinsics.board-bent"]
+    u = np.sqrt(np.diag(fitted.covariance))[fitted.of_shape]
+    assert (np.abs(fitted.state.shape - shape) < 4 * u).all()
 
 
 def test_points_of_another_board_are_refused(make_views: MakeViews) -> None:
@@ -217,21 +206,3 @@ def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
     assert found.adjustment.rms < 1.1 * NOISE * 2**0.5
     assert found.camera.covariance is not None
     assert np.isfinite(map_uncertainty(found.camera, found.camera.covariance).worst)
-
-
-def test_effects_that_fold_the_image_are_fitted_again_with_a_weaker_lens(
-    make_views: MakeViews, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    tried: list[FloatArray] = []
-
-    def fit_or_fold(views: Views, fitted: BoardFit) -> MixedFit:
-        tried.append(np.diag(fitted.prior))
-        if len(tried) == 1:
-            raise CalibrationError("camera.distortion-folds")
-        return fit_effects(views, fitted)
-
-    monkeypatch.setattr(calibration, "fit_effects", fit_or_fold)
-    found = calibrate_camera(make_views())
-
-    assert found.choice.pull == PULLS[0]
-    assert tried[1][8] == PULLS[0] ** -2  # of k3

@@ -9,13 +9,11 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication, QObject, Signal
 
 from lightpen.formats.camera_file_writing import write_camera
-from lightpen.formats.files import write_whole
 from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.page import board_page
 from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.intrinsics.views import Views
 from lightpen.local_time import local_now
@@ -101,18 +99,6 @@ class BoardCalibration(QObject):
         camera = replace(found.camera, serial=trial.serial)
         job = Job(partial(save_camera, camera, path), self)
         job.start(partial(self._on_saved, trial), partial(self._on_save_refused, trial))
-
-    def print_board(self, board: Board, path: Path) -> None:
-        """Write a board as a PDF page at true scale, and report it."""
-        job = Job(lambda _: write_whole(path, board_page(board)), self)
-        job.start(
-            lambda _: self.set_remark(partial(self._printed_message, path)),
-            self._on_refused,
-        )
-
-    def _printed_message(self, path: Path) -> StatusMessage:
-        words = self.tr("Saved: {0}. Print it at 100 % and mount it on a flat plate.")
-        return StatusMessage.good(words.format(path))
 
     def conclude(self) -> None:
         """Discard the result, and report the outcome of the attempt."""

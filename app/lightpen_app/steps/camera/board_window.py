@@ -66,7 +66,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._image = BoardView()
         self._remark = SignLabel()
         self.board = BoardForm()
-        self._print = PushButton()
         self._begin = PushButton()
         self._folder = PushButton()
         self._compute = PushButton()
@@ -85,7 +84,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
         # Layout
         panel = QWidget()
-        side = vertical_layout(panel, self.board, self._print, margins=None)
+        side = vertical_layout(panel, self.board, margins=None)
         horizontal_layout(side, self._begin, self._folder, spacing=-1)
         fill(side, self._count, (self._outcome, 1), 1)
         outcome = vertical_layout(self._outcome, self._facts)
@@ -112,7 +111,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._calibration.saved.connect(self.saved)
         self._calibration.concluded.connect(self.concluded)
         self._begin.clicked.connect(self._on_begin_clicked)
-        self._print.clicked.connect(self._on_print_clicked)
         self._folder.clicked.connect(self._on_folder_clicked)
         self._compute.clicked.connect(self._calibration.calibrate_by_capture)
         self._remove.clicked.connect(self._on_remove_clicked)
@@ -187,17 +185,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         if folder:
             self.read_folder(folder)
 
-    def print_board(self, path: Path) -> None:
-        """Write the board as a page at true scale."""
-        board = self._named_board()
-        if board is not None:
-            self._place.remember(path.parent)
-            self._calibration.print_board(board, path)
-
-    def _on_print_clicked(self) -> None:
-        path = self._place.folder() / "board.pdf"
-        ask_file(self, self.tr("Save the board"), path, self.print_board)
-
     def _on_remove_clicked(self) -> None:
         item = self._worst.currentItem()
         if item is not None:
@@ -236,7 +223,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Camera calibration"))
-        self._print.setText(self.tr("Print (PDF)..."))
         self._folder.setText(self.tr("From a folder..."))
         self._compute.setText(self.tr("Calibrate"))
         self._worst_title.setText(self.tr("Views (worst first)"))

@@ -12,13 +12,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QSize, Qt, QThreadPool
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import (
-    QApplication,
-    QFileDialog,
-    QLabel,
-    QListWidget,
-    QPushButton,
-)
+from PySide6.QtWidgets import QApplication, QLabel, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import Image
@@ -26,7 +20,6 @@ from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
 from lightpen.intrinsics.boards import Board, BoardKind, parse_board
-from lightpen.intrinsics.page import board_page
 from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
 from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
@@ -161,31 +154,10 @@ def test_a_board_that_is_none_is_refused(window: BoardWindow) -> None:
 @pytest.mark.parametrize(
     "name", ["charuco:12x9:20:15:DICT_5X5_100", "asymmetric-circles:4x11:20:10", BOARD]
 )
-def test_the_fields_tell_the_board_and_print_it(
-    window: BoardWindow, name: str, tmp_path: Path, qtbot: QtBot
-) -> None:
-    board, path = parse_board(name), tmp_path / "board.pdf"
-    window.board.set_board(board)
-    assert window.board.board() == board
+def test_the_fields_tell_the_board(window: BoardWindow, name: str) -> None:
+    window.board.set_board(parse_board(name))
 
-    window.print_board(path)
-
-    qtbot.waitUntil(lambda: "board.pdf" in remark(window))
-    assert path.read_bytes() == board_page(board)
-
-
-def test_a_file_is_offered_where_files_were_saved_last(
-    window: BoardWindow, tmp_path: Path, qtbot: QtBot
-) -> None:
-    window.print_board(tmp_path / "one.pdf")
-    qtbot.waitUntil(lambda: "one.pdf" in remark(window))
-
-    buttons = {each.text(): each for each in window.findChildren(QPushButton)}
-    buttons["Print (PDF)..."].click()
-
-    (dialog,) = window.findChildren(QFileDialog)
-    assert Path(dialog.directory().absolutePath()) == tmp_path
-    dialog.reject()
+    assert window.board.board() == parse_board(name)
 
 
 @pytest.mark.slow
