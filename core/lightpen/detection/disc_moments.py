@@ -17,11 +17,9 @@ from cv2.typing import MatLike
 
 from lightpen.arrays import Image
 from lightpen.detection.edge_fit import EdgeStart, fit_edges
-from lightpen.detection.pixel_box import PixelBox, bounding_box
+from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.region_moments import (
     GAUSSIAN_RISE,
-    HIGH,
-    LOW,
     MIN_AREA,
     DiscMoments,
     Value,
@@ -30,13 +28,7 @@ from lightpen.detection.region_moments import (
     moments_of_rim,
 )
 
-LOW_SIGMAS = 3.5  # the noise of the background stays below `low`
-MAX_LOW = 0.3
-MAX_FLOOR = 0.85  # higher, the noise of the plateau makes the outline
-MIN_RAMP = 0.2  # least high - low, fraction of the contrast
 MIN_SIZE = 3  # px, of the box of a region
-MIN_SIGMAS = 6.0  # least contrast in terms of the noise
-MARGIN = 5  # px around a box: the foot of the rim and some background
 SAMPLES = 16  # per side of a window, to find background and plateau
 
 # The shading of a disc is measured where its radius is so many widths of its rim, and
@@ -102,93 +94,6 @@ class Disc(NamedTuple):
         return (self.cut_level - self.levels.background) / self.levels.contrast
 
 
-def measure_disc(
-    image: Image, box: PixelBox, level: float, noise: float, floor: float = 0.0
-) -> Disc | None:
-    """Return the disc in a box; None if nothing there is large and bright enough.
-
-    Parameters
-    ----------
-    image : (H, W) array
-        The whole image.
-    box : PixelBox
-        Bounding box of the region; it may be a few pixels too small.
-    level : float
-        An intensity that the region exceeds and its background does not, digital
-        numbers.
-    noise : float
-        Standard deviation of the background, digital numbers.
-    floor : float
-        The intensity above which the region is apart from its neighbours, digital
-        numbers; zero for a region that stands alone.
-    """
-    margin = MARGIN + box.size // 10
-    disc = _measure_window(image, box, margin, level, noise, floor)
-    if disc is not None and disc.leaves_window:
-        wider = MARGIN + disc.box.size // 4
-        disc = _measure_window(image, disc.box, wider, level, noise, floor)
-    return disc
-
-
-def _measure_window(
-    image: Image, box: PixelBox, margin: int, level: float, noise: float, floor: float
-) -> Disc | None:
-    frame = box.grown(margin, image.shape)
-    window = image[frame.top : frame.bottom, frame.left : frame.right]
-    levels = window_levels(window, level)
-    contrast = levels.contrast
-    if contrast < MIN_SIGMAS * noise:
-        return None
-
-    foot = min(max(LOW, LOW_SIGMAS * noise / contrast), MAX_LOW)
-    if floor > levels.background + MAX_FLOOR * contrast:
-        return None
-    low = round(max(levels.background + foot * contrast, floor))
-    high = max(levels.background + HIGH * contrast, low + MIN_RAMP * contrast)
-    gain = 255.0 / (high - low)
-    soft = cv2.convertScaleAbs(np.maximum(window, low), alpha=gain, beta=-gain * low)
-    regions, soft = _separate(soft, box, frame)
-    if not regions:
-        return None
-    ramp = (high - low) / contrast
-    region, *others = regions
-    # Beside its region soft is 0; half as many pixels take half the time.
-    near = region.moved(-frame.left, -frame.top).grown(1, soft.shape)
-    soft = soft[near.top : near.bottom, near.left : near.right]
-    window = window[near.top : near.bottom, near.left : near.right]
-    moments = moments_of_region(soft, near.moved(frame.left, frame.top), ramp)
-    if moments is None:
-        return None
-    _, inner = cv2.threshold(cv2.erode(soft, BESIDE), 254, 1, cv2.THRESH_BINARY)
-    background = round(levels.background)
-    light = np.maximum(window, background) - background
-    moments, is_whole, is_even, is_balanced = assessed(
-        moments,
-        cv2.moments(inner),
-        cv2.moments(cv2.copyTo(window, inner)),
-        cv2.moments(cv2.copyTo(light, soft)),
-        near.moved(frame.left, frame.top),
-        levels,
-        noise / contrast,
-    )
-    sides = zip(region, frame, (0, 0, *image.shape[::-1]), strict=True)
-    reached = [there == of_image for here, there, of_image in sides if here == there]
-    disc = Disc(
-        DiscMoments(*map(float, moments)),
-        levels,
-        float(low),
-        region,
-        is_whole=bool(is_whole) and not reached,
-        is_even=bool(is_whole & is_even) and not reached,
-        is_balanced=bool(is_balanced),
-        leaves_image=any(reached),
-        leaves_window=not all(reached),
-        others=tuple(others),
-    )
-    around = near.moved(frame.left, frame.top)
-    return disc if reached else with_start(disc, soft, around, ramp, noise)
-
-
 def with_start(
     disc: Disc, soft: MatLike, frame: PixelBox, ramp: float, noise: float
 ) -> Disc:
@@ -247,22 +152,6 @@ def _starts(discs: Sequence[Disc], before: Sequence[EdgeStart]) -> list[EdgeStar
         if gaps[i, nearest] <= 2 * sqrt(near.shape[0, 0] + near.shape[1, 1]):
             starts[i] = near._replace(center=starts[i].center - near.offset)
     return starts
-
-
-def _separate(
-    soft: MatLike, box: PixelBox, frame: PixelBox
-) -> tuple[list[PixelBox], MatLike]:
-    """Return the regions that a box was drawn around, and the first of them alone."""
-    contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    regions = [bounding_box(c).moved(frame.left, frame.top) for c in contours]
-    if len(regions) < 2:
-        return regions, soft
-    chosen = max(range(len(regions)), key=lambda i: regions[i].overlap(box))
-    alone = np.zeros_like(soft)
-    cv2.drawContours(alone, contours, chosen, 255, cv2.FILLED)
-    first = regions.pop(chosen)
-    others = [r for r in regions if r.size >= MIN_SIZE and box.holds_center_of(r)]
-    return [first, *others], cv2.bitwise_and(soft, alone)
 
 
 def assessed(

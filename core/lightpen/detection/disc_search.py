@@ -16,8 +16,8 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.disc_moments import Disc, measure_disc, with_rims
-from lightpen.detection.disc_stack import measure_alone
+from lightpen.detection.disc_moments import Disc, with_rims
+from lightpen.detection.disc_stack import measure_discs
 from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pixel_box import PixelBox, bounding_box
 from lightpen.model.quantiles import normal_quantile
@@ -138,19 +138,10 @@ def find_discs(
     if len(boxes) > MAX_BOXES:
         boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
 
-    measured: list[Disc] = []
-    unclear: list[tuple[PixelBox, Disc | None]] = []
-    alone = measure_alone(scene.image, boxes, level, scene.noise)
-    for box, disc in zip(boxes, alone, strict=True):
-        if disc is not None and _stands_out(scene, disc):
-            measured.append(disc)
-        elif _is_too_large(scene, box):
-            unclear.append((box, None))
-        else:
-            found = list(_measured(scene, box, level, 0.0, budget))
-            measured += found
-            if not found and scene.hides_light(box, level):
-                unclear.append((box, None))
+    large = [box for box in boxes if _is_too_large(scene, box)]
+    small = [box for box in boxes if not _is_too_large(scene, box)]
+    measured, bare = _measured(scene, small, level, 0.0, budget)
+    unclear: list[tuple[PixelBox, Disc | None]] = [(box, None) for box in large + bare]
     measured = with_rims(scene.image, measured, before)
     discs = [disc for disc in measured if disc.is_whole]
     unclear += [(disc.box, disc) for disc in measured if not disc.is_whole]
@@ -174,18 +165,16 @@ def _parted(
         if len(parts) != 1 or not parts[0].is_close_to(box):
             break
     blocks: list[Disc] = []
-    for part in parts:
-        if _is_too_large(scene, part):
-            blocks += _parted(scene, part, level, None, budget)
-            continue
-        found = list(_measured(scene, part, level, level, budget))
-        if not found and scene.hides_light(part, level):
-            blocks += _parted(scene, part, level, None, budget)
-        for block in with_rims(scene.image, found):
-            if block.is_whole:
-                blocks.append(block)
-            else:
-                blocks += _parted(scene, block.box, level, block, budget)
+    large = [part for part in parts if _is_too_large(scene, part)]
+    small = [part for part in parts if not _is_too_large(scene, part)]
+    found, bare = _measured(scene, small, level, level, budget)
+    for part in large + bare:
+        blocks += _parted(scene, part, level, None, budget)
+    for block in with_rims(scene.image, found):
+        if block.is_whole:
+            blocks.append(block)
+        else:
+            blocks += _parted(scene, block.box, level, block, budget)
     is_parted = len(blocks) > 1 or any(block.is_whole for block in blocks)
     if disc is None or is_parted or not _resembles_disc(disc):
         return blocks
@@ -245,22 +234,32 @@ def _is_too_large(scene: Survey, box: PixelBox) -> bool:
 
 
 def _measured(
-    scene: Survey, box: PixelBox, level: float, floor: float, budget: Iterator[int]
-) -> Iterator[Disc]:
-    """Measure the region in a box, and further ones that coarse sampling merged."""
-    boxes, seen = [box], {box}
-    while boxes and next(budget, None) is not None:
-        disc = measure_disc(scene.image, boxes.pop(), level, scene.noise, floor)
-        if disc is None:
-            continue
+    scene: Survey,
+    boxes: list[PixelBox],
+    level: float,
+    floor: float,
+    budget: Iterator[int],
+) -> tuple[list[Disc], list[PixelBox]]:
+    """Return the discs in boxes, and the boxes that hide what may be some.
+
+    Further regions that coarse sampling merged are measured too.
+    """
+    found, bare, seen = [], [], set(boxes)
+    while boxes := [box for box, _ in zip(boxes, budget, strict=False)]:
+        discs = measure_discs(scene.image, boxes, level, scene.noise, floor)
+        more = []
+        for box, disc in zip(boxes, discs, strict=True):
+            if disc is not None:
+                seen.add(disc.box)
+                more += [each for each in disc.others if each.size < box.size]
+            if disc is not None and _stands_out(scene, disc):
+                found.append(disc)
+            elif scene.hides_light(box, level):
+                bare.append(box)
         # Two regions that each lead to the other would loop for ever.
-        new = [
-            each for each in disc.others if each.size < box.size and each not in seen
-        ]
-        boxes += new
-        seen |= {disc.box, *new}
-        if _stands_out(scene, disc):
-            yield disc
+        boxes = [box for box in dict.fromkeys(more) if box not in seen]
+        seen |= set(boxes)
+    return found, bare
 
 
 def _stands_out(scene: Survey, disc: Disc) -> bool:

@@ -1,19 +1,18 @@
-"""Discs that stand alone, measured all at once as one stack of windows."""
+"""Discs measured all at once, as stacks of windows."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from cv2.typing import MatLike
 
-from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
+from lightpen.arrays import FloatArray, Image
 from lightpen.detection.disc_moments import (
     BESIDE,
-    LOW_SIGMAS,
-    MARGIN,
-    MAX_LOW,
-    MIN_RAMP,
-    MIN_SIGMAS,
+    MIN_SIZE,
     Disc,
     Levels,
     assessed,
@@ -23,134 +22,206 @@ from lightpen.detection.disc_moments import (
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.region_moments import HIGH, LOW, DiscMoments, moments_by_sums
 
-LARGEST = 128  # px, of a region; larger ones are few
-LARGER = 2.0  # times the usual size: others would make all windows large
-NAMES = ["m00", "m10", "m01", "mu20", "mu11", "mu02", "mu30", "mu21", "mu12", "mu03"]
+LOW_SIGMAS = 3.5  # the noise of the background stays below `low`
+MAX_LOW = 0.3
+MAX_FLOOR = 0.85  # higher, the noise of the plateau makes the outline
+MIN_RAMP = 0.2  # least high - low, fraction of the contrast
+MIN_SIGMAS = 6.0  # least contrast in terms of the noise
+MARGIN = 5  # px around a box: the foot of the rim and some background
+ALIKE = 2  # times the smallest of a stack, at most, is its largest box
+
+Reals: TypeAlias = npt.NDArray[np.float32]
 
 
-def measure_alone(
-    image: Image, boxes: Sequence[PixelBox], level: float, noise: float
+def measure_discs(
+    image: Image,
+    boxes: Sequence[PixelBox],
+    level: float,
+    noise: float,
+    floor: float = 0.0,
 ) -> list[Disc | None]:
-    """Return the discs in boxes that hold one each, as `measure_disc` measures them.
+    """Return the discs in boxes; None if nothing there is large and bright enough.
 
-    None where something else is near, or nothing is found.
+    Parameters
+    ----------
+    image : (H, W) array
+        The whole image.
+    boxes : sequence of PixelBox
+        Bounding boxes of the regions; they may be a few pixels too small.
+    level : float
+        An intensity that the regions exceed and their background does not, digital
+        numbers.
+    noise : float
+        Standard deviation of the background, digital numbers.
+    floor : float
+        The intensity above which the regions are apart from their neighbours, digital
+        numbers; zero for regions that stand alone.
     """
     found: list[Disc | None] = [None] * len(boxes)
-    sizes = np.array([box.size for box in boxes])
-    usual = float(np.median(sizes)) if len(boxes) else 0.0
-    chosen = np.flatnonzero(sizes <= min(LARGEST, LARGER * usual))
-    if len(chosen) < 2:
-        return found
-    side = int(sizes[chosen].max())
-    side += 2 * (MARGIN + side // 10)
-    ends = np.array([boxes[i] for i in chosen.tolist()])
-    corners = (ends[:, :2] + ends[:, 2:] - side) // 2
-    inside = (corners >= 0) & (corners + side <= image.shape[::-1])
-    chosen, corners = chosen[inside.all(axis=1)], corners[inside.all(axis=1)]
-    if len(chosen) < 2:
-        return found
-    # A dark row below each window separates it from the next.
-    windows = np.zeros((len(chosen), side + 1, side), image.dtype)
-    for window, (x, y) in zip(windows, corners.tolist(), strict=True):
-        window[:-1] = image[y : y + side, x : x + side]
-    levels = np.array([_own_levels(image, boxes[i], level) for i in chosen.tolist()])
-    background, plateau = levels[:, 0], levels[:, 1]
-    contrast = np.maximum(plateau - background, 1)
-    foot = np.clip(LOW_SIGMAS * noise / contrast, LOW, MAX_LOW)
-    low = np.rint(background + foot * contrast)
-    high = np.maximum(background + HIGH * contrast, low + MIN_RAMP * contrast)
-    light = windows.astype(np.float32)
-    scaled = light - _of_each(low)
-    scaled *= _of_each(255 / (high - low))
-    soft = np.rint(np.clip(scaled, 0, 255, out=scaled), out=scaled).astype(np.uint8)
-    regions, are_alone = _regions(soft)
-    inner = cv2.erode(soft.reshape(-1, side), BESIDE).reshape(soft.shape) == 255
-    layers = np.empty((4, *soft.shape), np.float32)
-    layers[0], layers[1] = soft, inner
-    np.multiply(light, inner, out=layers[2])
-    light -= _of_each(background)
-    np.multiply(light, soft > 0, out=layers[3])
-    sums, inside, weighted, lit = _sums(layers)
-    squares = np.einsum("nyx,nyx->n", layers[0], layers[0])
-    sums["m00"] = np.maximum(sums["m00"], 1.0)
-    left, top, ramp = corners[:, 0], corners[:, 1], (high - low) / contrast
-    moments = moments_by_sums(sums, squares, left, top, ramp)
-    frames = PixelBox(left, top, left + side, top + side)
-    moments, are_whole, are_even, are_balanced = assessed(
-        *(moments, inside, weighted, lit, frames, Levels(*levels.T), noise / contrast)
-    )
-    fit = are_alone & moments.are_enough & (contrast >= MIN_SIGMAS * noise)
-    rows = np.stack(moments, axis=1).tolist()
-    for k in np.flatnonzero(fit).tolist():
-        x, y = corners[k].tolist()
-        disc = Disc(
-            DiscMoments(*rows[k]),
-            Levels(*levels[k].tolist()),
-            float(low[k]),
-            PixelBox(*regions[k].tolist()).moved(x, y),
-            is_whole=bool(are_whole[k]),
-            is_even=bool(are_whole[k] & are_even[k]),
-            is_balanced=bool(are_balanced[k]),
-        )
-        frame = PixelBox(x, y, x + side, y + side)
-        disc = with_start(disc, soft[k], frame, float(ramp[k]), noise)
-        if disc.is_whole or disc.rim is not None:
-            found[chosen[k]] = disc
+    for stack in _alike(boxes):
+        own = [boxes[i] for i in stack]
+        discs = _measured(image, own, 10, level, noise, floor)
+        wide = [k for k, disc in enumerate(discs) if disc and disc.leaves_window]
+        if wide:
+            regions = [disc.box for disc in discs if disc and disc.leaves_window]
+            again = _measured(image, regions, 4, level, noise, floor)
+            for k, disc in zip(wide, again, strict=True):
+                discs[k] = disc
+        for i, disc in zip(stack, discs, strict=True):
+            found[i] = disc
     return found
 
 
-def _own_levels(image: Image, box: PixelBox, level: float) -> Levels:
-    frame = box.grown(MARGIN + box.size // 10, image.shape)
-    return window_levels(
-        image[frame.top : frame.bottom, frame.left : frame.right], level
+def _alike(boxes: Sequence[PixelBox]) -> Iterator[list[int]]:
+    """Yield the indices of boxes of like sizes."""
+    left = sorted(range(len(boxes)), key=lambda i: boxes[i].size)
+    while left:
+        largest = ALIKE * boxes[left[0]].size
+        n = sum(boxes[i].size <= largest for i in left)
+        yield left[:n]
+        left = left[n:]
+
+
+def _measured(
+    image: Image,
+    boxes: Sequence[PixelBox],
+    margin: int,
+    level: float,
+    noise: float,
+    floor: float,
+) -> list[Disc | None]:
+    """Measure the discs in boxes grown by a share of their size, one over a number."""
+    frames = [box.grown(MARGIN + box.size // margin, image.shape) for box in boxes]
+    windows = [image[f.top : f.bottom, f.left : f.right] for f in frames]
+    light = _stack(windows)
+    levels = np.array([window_levels(window, level) for window in windows])
+    background, plateau = levels[:, 0], levels[:, 1]
+    contrast = np.maximum(plateau - background, 1)
+    foot = np.minimum(np.maximum(LOW_SIGMAS * noise / contrast, LOW), MAX_LOW)
+    low = np.rint(np.maximum(background + foot * contrast, floor))
+    high = np.maximum(background + HIGH * contrast, low + MIN_RAMP * contrast)
+    scaled = light - _of_each(low)
+    scaled *= _of_each(255 / (high - low))
+    np.maximum(scaled, 0, out=scaled)
+    flat = cv2.convertScaleAbs(scaled.reshape(-1, light.shape[2]))
+    soft = np.asarray(flat, np.uint8).reshape(light.shape)
+    regions = _regions(soft, frames, boxes)
+    inner = cv2.erode(flat, BESIDE)
+    layers = np.empty((4, *soft.shape), np.float32)
+    layers[0], layers[1] = soft, np.asarray(inner).reshape(soft.shape) == 255
+    np.multiply(light, layers[1], out=layers[2])
+    light -= _of_each(background)
+    np.minimum(layers[0], 1, out=layers[3])
+    layers[3] *= light
+    sums, inside, weighted, lit = _sums(layers)
+    squares = np.einsum("nyx,nyx->n", layers[0], layers[0])
+    ends, ramp = np.array(frames).T, (high - low) / contrast
+    moments, are_whole, are_even, are_balanced = assessed(
+        moments_by_sums(sums, squares, ends[0], ends[1], ramp),
+        *(inside, weighted, lit, PixelBox(*ends), Levels(*levels.T), noise / contrast),
     )
+    enough = moments.are_enough & (plateau - background >= MIN_SIGMAS * noise)
+    enough &= floor <= background + MAX_FLOOR * contrast
+    are_even &= are_whole
+    found: list[Disc | None] = [None] * len(boxes)
+    columns = (np.stack(moments, axis=1), levels, low, are_whole, are_even)
+    of_each = zip(*(each.tolist() for each in (*columns, are_balanced)), strict=True)
+    for k, (row, of_window, cut, whole, even, balanced) in enumerate(of_each):
+        if not enough[k]:
+            continue
+        region, *others = regions[k]
+        sides = zip(region, frames[k], (0, 0, *image.shape[::-1]), strict=True)
+        reached = [there == end for here, there, end in sides if here == there]
+        disc = Disc(
+            *(DiscMoments(*row), Levels(*of_window), cut, region),
+            is_whole=whole and not reached,
+            is_even=even and not reached,
+            is_balanced=balanced,
+            leaves_image=any(reached),
+            leaves_window=not all(reached),
+            others=tuple(others),
+        )
+        if not reached:
+            disc = with_start(disc, soft[k], frames[k], float(ramp[k]), noise)
+        found[k] = disc
+    return found
 
 
-def _of_each(values: FloatArray) -> npt.NDArray[np.float32]:
+def _stack(windows: Sequence[Image]) -> Reals:
+    """Return windows as one array, dark beside and below each, which parts them."""
+    height = 1 + max(window.shape[0] for window in windows)
+    width = 1 + max(window.shape[1] for window in windows)
+    stack = np.zeros((len(windows), height, width), np.float32)
+    for slot, window in zip(stack, windows, strict=True):
+        slot[: window.shape[0], : window.shape[1]] = window
+    return stack
+
+
+def _regions(
+    soft: Image, frames: Sequence[PixelBox], boxes: Sequence[PixelBox]
+) -> dict[int, list[PixelBox]]:
+    """Return the regions of windows, first those that the boxes were drawn around.
+
+    The others vanish from ``soft``; they are returned if they are in the box.
+    """
+    height, width = soft.shape[1:]
+    found: dict[int, list[tuple[PixelBox, MatLike]]] = {}
+    contours, _ = cv2.findContours(
+        soft.reshape(-1, width), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
+    )
+    for contour in contours:
+        x, y, right, down = cv2.boundingRect(contour)
+        k, y = divmod(y, height)
+        region = PixelBox(x, y, x + right, y + down)
+        region = region.moved(frames[k].left, frames[k].top)
+        found.setdefault(k, []).append((region, contour))
+    regions = {}
+    for k, here in found.items():
+        (first, contour), *others = sorted(here, key=lambda r: -r[0].overlap(boxes[k]))
+        if others:
+            alone: Image = np.zeros_like(soft[k])
+            at = (0, -k * height)
+            cv2.drawContours(alone, [contour], 0, 255, cv2.FILLED, offset=at)
+            soft[k] &= alone
+        boxed = (o for o, _ in others if boxes[k].holds_center_of(o))
+        regions[k] = [first, *(other for other in boxed if other.size >= MIN_SIZE)]
+    return regions
+
+
+def _of_each(values: FloatArray) -> Reals:
     return values.astype(np.float32)[:, None, None]
 
 
-def _regions(soft: Image) -> tuple[IntArray, BoolArray]:
-    """Return the boxes (N, 4) of light in windows, and whether each holds one region.
-
-    Others show as gaps between columns or rows, or as light at the border.
-    """
-    ends, alone = [], np.ones(len(soft), dtype=bool)
-    for axis in (1, 2):
-        lit = soft.max(axis=axis) > 0
-        first, beyond = lit.argmax(axis=1), lit.shape[1] - lit[:, ::-1].argmax(axis=1)
-        alone &= (beyond - first == lit.sum(axis=1)) & (first > 0)
-        alone &= beyond < soft.shape[2]
-        ends.append((first, beyond))
-    return np.stack([*ends[0], *ends[1]], axis=1)[:, [0, 2, 1, 3]], alone
-
-
-def _sums(layers: npt.NDArray[np.float32]) -> list[dict[str, FloatArray]]:
-    """Return the sums of windows (K, N, H, W), (N,), by layer."""
-    height, side = layers.shape[2:]
-    middle = side // 2  # from where powers stay small
-    powers = np.arange(4)
-    x = (np.arange(side)[:, None] - middle) ** powers
-    y = (np.arange(height)[:, None] - middle) ** powers
-    by_rows = layers @ x.astype(np.float32)
-    m = (y.T.astype(np.float32) @ by_rows).astype(np.float64)  # [..., power of y, of x]
-    m00 = m[..., 0, 0]
-    amount = np.maximum(m00, 1e-9)
-    u, v = m[..., 0, 1] / amount, m[..., 1, 0] / amount
-    m20, m11, m02 = m[..., 0, 2], m[..., 1, 1], m[..., 2, 0]
-    values = [
-        m00,
-        m[..., 0, 1] + middle * m00,
-        m[..., 1, 0] + middle * m00,
-        m20 - u * u * m00,
-        m11 - u * v * m00,
-        m02 - v * v * m00,
-        m[..., 0, 3] - 3 * u * m20 + 2 * u**3 * m00,
-        m[..., 1, 2] - 2 * u * m11 - v * m20 + 2 * u * u * v * m00,
-        m[..., 2, 1] - 2 * v * m11 - u * m02 + 2 * v * v * u * m00,
-        m[..., 3, 0] - 3 * v * m02 + 2 * v**3 * m00,
+def _sums(layers: Reals) -> list[dict[str, FloatArray]]:
+    """Return the sums over windows (4, N, H, W), (N,); of the first central moments."""
+    height, width = layers.shape[2:]
+    middle = width // 2  # from where powers stay small
+    x, y = _powers(width, middle), _powers(height, middle).T
+    # Places are the power of y, and of x.
+    m = np.moveaxis((y @ (layers @ x)).astype(np.float64), (2, 3), (0, 1))
+    m00 = np.maximum(m[0, 0], 1.0)
+    m10, m01 = m[0, 1] + middle * m00, m[1, 0] + middle * m00
+    sums = [
+        {"m00": area, "m10": along_x, "m01": along_y}
+        for area, along_x, along_y in zip(m00, m10, m01, strict=True)
     ]
-    return [
-        {name: value[k] for name, value in zip(NAMES, values, strict=True)}
-        for k in range(len(layers))
-    ]
+    m, area = m[:, :, 0], m00[0]
+    u, v = m[0, 1] / area, m[1, 0] / area
+    m20, m11, m02 = m[0, 2], m[1, 1], m[2, 0]
+    sums[0] |= {
+        "mu20": m20 - u * u * area,
+        "mu11": m11 - u * v * area,
+        "mu02": m02 - v * v * area,
+        "mu30": m[0, 3] - 3 * u * m20 + 2 * u**3 * area,
+        "mu21": m[1, 2] - 2 * u * m11 - v * m20 + 2 * u * u * v * area,
+        "mu12": m[2, 1] - 2 * v * m11 - u * m02 + 2 * v * v * u * area,
+        "mu03": m[3, 0] - 3 * v * m02 + 2 * v**3 * area,
+    }
+    return sums
+
+
+@lru_cache(maxsize=64)
+def _powers(n: int, middle: int) -> Reals:
+    """Return the powers of n places from the middle, (n, 4)."""
+    places = (np.arange(n)[:, None] - middle) ** np.arange(4)
+    return places.astype(np.float32)

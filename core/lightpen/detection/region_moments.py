@@ -83,8 +83,11 @@ class DiscMoments(NamedTuple):
         """Semi-axes of the ellipse with the same second moments, the longer first."""
         half_trace = (self.var_x + self.var_y) / 2.0
         half_span = np.hypot((self.var_x - self.var_y) / 2.0, self.cov_xy)
-        shorter = np.maximum(half_trace - half_span, 0.05)
-        return 2.0 * np.sqrt(half_trace + half_span), 2.0 * np.sqrt(shorter)
+        longer, shorter = (
+            2.0 * np.sqrt(np.maximum(square, 0.05))
+            for square in (half_trace + half_span, half_trace - half_span)
+        )
+        return longer, shorter
 
 
 def is_ellipse(moments: DiscMoments, relative_noise: Value) -> Value:
