@@ -97,11 +97,6 @@ def _verdict(calibration_file: CalibrationFile) -> Block:
     lines = [worded(calibration_file.why)]
     if calibration_file.accepted is None:
         lines.append(translate("paper", "This tip has not been accepted."))
-    elif calibration_file.restores is not None:
-        text = translate(
-            "paper", "This tip was reinstated from an earlier calibration. Reason: {0}"
-        )
-        lines.append(text.format(calibration_file.reason))
     elif calibration_file.origin is Origin.SIMULATED:
         lines.append(translate("paper", "Practice: not used for any pen."))
     elif calibration_file.grade is Grade.PASS:

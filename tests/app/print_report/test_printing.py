@@ -80,19 +80,6 @@ def test_every_page_says_that_a_tip_is_retired_or_overdue(
         assert {"RETIRED", "OVERDUE"} <= set(page)
 
 
-def test_a_tip_that_is_in_force_again_is_reported_as_such(
-    result: Result, printed: Printed, words: Words
-) -> None:
-    again = replace(result, restores="0" * 64, reason="The new ball is bent.")
-
-    reported = " ".join(words(printed(again))[0])
-
-    assert "reinstated from an earlier calibration. Reason: The new ball is bent." in (
-        reported
-    )
-    assert "The tip was accepted" not in reported
-
-
 def test_the_tip_is_reported_to_the_second_digit_of_its_uncertainty(
     result: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:

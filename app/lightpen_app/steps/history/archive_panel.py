@@ -24,17 +24,12 @@ class SaveFormat(Enum):
     """Format to save."""
 
     TABLE = auto()
-    JSON = auto()
     WHOLE = auto()
 
     @property
     def suffix(self) -> str:
         """Of the file."""
-        return {
-            SaveFormat.TABLE: ".csv",
-            SaveFormat.JSON: ".json",
-            SaveFormat.WHOLE: ".jsonl",
-        }[self]
+        return {SaveFormat.TABLE: ".csv", SaveFormat.WHOLE: ".jsonl"}[self]
 
 
 class ArchivePanel(Translated, QWidget):
@@ -119,7 +114,6 @@ class ArchivePanel(Translated, QWidget):
         self._cancel.setText(self.tr("Cancel"))
         for saving, text in (
             (SaveFormat.TABLE, self.tr("Listed entries (CSV)...")),
-            (SaveFormat.JSON, self.tr("Listed entries (JSON)...")),
             (SaveFormat.WHOLE, self.tr("All entries (JSON lines)...")),
         ):
             self._savings[saving].setText(text)

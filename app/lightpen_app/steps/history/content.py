@@ -14,16 +14,13 @@ from lightpen.archive.checks.check import ArchiveCheckResult
 from lightpen.archive.history.history import Line
 from lightpen.archive.history.queries import EntryFilter
 from lightpen.model.limits import DueRule
-from lightpen.record.library.supervision import Signature
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.record.results.results import Result
 from lightpen.verification.history.pen_over_time import NewLedFile, adjust_together
 from lightpen.verification.history.trend import Trend
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
-from lightpen_app.look.words import shortened
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.history.archive_control import NOTICE, ArchiveControl
 from lightpen_app.steps.history.archive_panel import ArchivePanel
@@ -54,7 +51,7 @@ class HistoryContent(Translated, QWidget):
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
         self._chosen, self._tips = workbench.selection, workbench.library
-        self._streaming, self._notices = workbench.streaming, workbench.notifications
+        self._notices = workbench.notifications
         self._folder, self._now = workbench.folder, workbench.around.now
         self._logbook = workbench.run.logbook
         self._reader = HistoryReader(self._logbook, self)
@@ -96,7 +93,6 @@ class HistoryContent(Translated, QWidget):
         self.table.block_wanted.connect(reader.read_block)
         self.table.selection_changed.connect(self._on_selection_changed)
         self._entry.note_given.connect(self._enter_note)
-        self._entry.restore_requested.connect(self._restore)
         self._entry.report_requested.connect(self._show_report)
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
@@ -202,7 +198,6 @@ class HistoryContent(Translated, QWidget):
     def _show_rule(self) -> None:
         is_guarded = self._chosen.supervision.is_guarded
         self._due.set_rule(self._chosen.limits.due, is_guarded=is_guarded)
-        self._entry.set_guarded(is_guarded)
 
     def _on_workbench_changed(self) -> None:
         before = self._due.rule()
@@ -258,30 +253,12 @@ class HistoryContent(Translated, QWidget):
             lambda _: self.read_anew(),
         )
 
-    def _restore(
-        self, entry: StoredEntry, reason: str, signature: Signature | None
-    ) -> None:
-        logbook, names = self._logbook, self._chosen.preparation.names
-        self._enter(
-            lambda _: logbook.opened().restore(entry, names, reason, signature),
-            self._on_restored,
-        )
-
     def _enter(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], object]
     ) -> None:
         """Enter something, also during operations on the whole archive."""
         job = Job(function, self)
         job.start(on_succeeded, self._show_fault)
-
-    def _on_restored(self, result: Result) -> None:
-        self.read_anew()
-        self._tips.refresh()
-        self._streaming.read_tip()
-        text = self.tr("Tip {0} of pen {1} reinstated from the earlier calibration.")
-        names = result.names
-        words = (shortened(names.tip), shortened(names.pen))
-        self._notices.show_status(text.format(*words))
 
     # What is printed
 

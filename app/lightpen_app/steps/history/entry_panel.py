@@ -5,14 +5,8 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.chains.entries import (
-    BESIDE_SWINGS,
-    IN_FORCE_BY,
-    Event,
-    Kind,
-    StoredEntry,
-)
-from lightpen.archive.history.history import Line, TipState
+from lightpen.archive.chains.entries import BESIDE_SWINGS, Event, Kind, StoredEntry
+from lightpen.archive.history.history import Line
 from lightpen.record.library.supervision import Signature
 from lightpen.verification.history.trend import VERIFIED
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
@@ -35,18 +29,15 @@ SHORT = 12  # characters of a hash
 
 
 class EntryPanel(Translated, QWidget):
-    """Shows an entry with its comments; adds a comment, or reinstates its tip."""
+    """Shows an entry with its comments; adds a comment."""
 
     note_given = Signal(object, str)  # Written, str: a note on an entry
-    # Written, str, Signature or None: entry whose tip to reinstate, and reason.
-    restore_requested = Signal(object, str, object)
     report_requested = Signal(object)  # Written: entry whose printed report to show
 
     def __init__(self) -> None:
         super().__init__()
         self._line: Line | None = None
         self._asked: StoredEntry | None = None
-        self._restores = self._is_guarded = False
         self._messages: tuple[StoredEntry, ...] = ()
 
         # Widgets
@@ -58,7 +49,6 @@ class EntryPanel(Translated, QWidget):
         self._notes = text_label(TextSize.BODY)
         self._texts = (self._what, self._who, self._why, self._notes, self._kept)
         self._note = PushButton()
-        self._restore = PushButton()
         self._report = PushButton()
         self._reason = ReasonBar()
 
@@ -71,12 +61,11 @@ class EntryPanel(Translated, QWidget):
             self, self._changed, *self._texts, spacing=GRID // 2, margins=margins
         )
         layout.addSpacing(GRID)
-        horizontal_layout(layout, self._note, self._restore, self._report, 1)
+        horizontal_layout(layout, self._note, self._report, 1)
         fill(layout, self._reason, 1)
 
         # Connections
-        self._note.clicked.connect(lambda: self._ask(restores=False))
-        self._restore.clicked.connect(lambda: self._ask(restores=True))
+        self._note.clicked.connect(self._ask)
         self._report.clicked.connect(self._request_report)
         self._reason.given.connect(self._on_given)
 
@@ -94,10 +83,6 @@ class EntryPanel(Translated, QWidget):
         self._reason.hide()
         self._retranslate()
 
-    def set_guarded(self, is_guarded: bool) -> None:
-        """Ask for a supervisor before a tip is reinstated, or for none."""
-        self._is_guarded = is_guarded
-
     def set_messages(self, remarks: Sequence[StoredEntry]) -> None:
         """Show the messages on the entry."""
         self._messages = tuple(remarks)
@@ -108,42 +93,27 @@ class EntryPanel(Translated, QWidget):
         texts = (self._changed.value().text, *(text.text() for text in self._texts))
         return tuple(filter(None, texts))
 
-    def _ask(self, *, restores: bool) -> None:
+    def _ask(self) -> None:
         line = self._line
         if line is None or line.entry is None:
             return
-        self._asked, self._restores = line.entry, restores
-        self._word_question()
-        self._reason.ask(of_supervisor=restores and self._is_guarded)
+        self._asked = line.entry
+        self._reason.ask(of_supervisor=False)
 
     def _word_question(self) -> None:
-        if self._restores:
-            self._reason.set_words(
-                self.tr(
-                    "Reinstate this tip? A new entry is added; the current tip "
-                    "stays in the archive."
-                ),
-                self.tr("Reason"),
-                self.tr("Reinstate"),
-                self.tr("Cancel"),
-            )
-        else:
-            self._reason.set_words(
-                self.tr("Comment on this entry. It cannot be changed later."),
-                self.tr("Comment"),
-                self.tr("Add"),
-                self.tr("Cancel"),
-            )
+        self._reason.set_words(
+            self.tr("Comment on this entry. It cannot be changed later."),
+            self.tr("Comment"),
+            self.tr("Add"),
+            self.tr("Cancel"),
+        )
 
     def _request_report(self) -> None:
         if self._line is not None and self._line.entry is not None:
             self.report_requested.emit(self._line.entry)
 
     def _on_given(self, text: str, signature: Signature | None) -> None:
-        if self._restores:
-            self.restore_requested.emit(self._asked, text, signature)
-        else:
-            self.note_given.emit(self._asked, text)
+        self.note_given.emit(self._asked, text)
 
     def _retranslate(self) -> None:
         line, entry = self._line, None if self._line is None else self._line.entry
@@ -161,12 +131,8 @@ class EntryPanel(Translated, QWidget):
             label.setText(breakable(text))
             label.setVisible(bool(text))
         self._note.setText(self.tr("Add comment..."))
-        self._restore.setText(self.tr("Reinstate..."))
         nothing = "" if entry is not None else self.tr("Select an entry.")
         self._note.set_why_not(nothing, self.tr("Add a comment"))
-        self._restore.set_why_not(
-            nothing or self._why_not_restored(line), self.tr("Adds a new entry")
-        )
         kind = None if entry is None else entry.entry.event.kind
         self._report.setText(
             self.tr("Verification report...")
@@ -212,19 +178,10 @@ class EntryPanel(Translated, QWidget):
             lines.append(f"{heading}: {event.reason}" if event.reason else heading)
         return "\n".join(lines)
 
-    def _why_not_restored(self, line: Line | None) -> str:
-        if line is None or line.entry is None:
-            return ""
-        if line.entry.entry.event.kind not in IN_FORCE_BY:
-            return self.tr("Only an accepted tip can be reinstated.")
-        if line.state is TipState.IN_FORCE:
-            return self.tr("This tip is current.")
-        return ""
-
     def _why_no_report(self, line: Line | None) -> str:
         if line is None or line.entry is None:
             return ""
-        if line.entry.entry.event.kind not in (*IN_FORCE_BY, Kind.VERIFICATION):
+        if line.entry.entry.event.kind not in (Kind.ACCEPTED, Kind.VERIFICATION):
             return self.tr("Only accepted tips and verifications have a report.")
         return ""
 

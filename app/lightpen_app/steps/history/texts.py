@@ -29,7 +29,6 @@ MARKED = (Origin.SIMULATED, Origin.RECORDED)
 
 _KINDS: dict[Kind, str] = {
     Kind.ACCEPTED: QT_TRANSLATE_NOOP("history", "Calibration"),
-    Kind.RESTORED: QT_TRANSLATE_NOOP("history", "Reinstated"),
     Kind.REFUSED: QT_TRANSLATE_NOOP("history", "Rejected"),
     Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Abandoned"),
     Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Revocation"),

@@ -45,7 +45,6 @@ class Kind(StrEnum):
     """Kind of an entry."""
 
     ACCEPTED = "accepted"
-    RESTORED = "restored"
     REFUSED = "refused"
     ABANDONED = "abandoned"
     TAKEN_BACK = "taken back"
@@ -57,7 +56,6 @@ class Kind(StrEnum):
 
 
 BESIDE_SWINGS = (Kind.VERIFICATION, Kind.CAMERA, Kind.LIMITS)
-IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that make a tip current
 
 
 class FileHash(Struct, frozen=True):
@@ -88,7 +86,7 @@ class Event(Struct, frozen=True):
     result: FileHash | None = None  # makes a tip current, revokes it, or states this
     files: tuple[FileHash, ...] = ()  # swing's record, touches' journals, picture
     record_sha256: Digest | None = None  # of ``result`` as a text, or a calibration
-    concerns: Digest | None = None  # the entry that it restores, revokes or is on
+    concerns: Digest | None = None  # the entry that it revokes or is on
     approval: str = ""  # of the supervisor whom the file names, see `approval_of`
 
     def __post_init__(self) -> None:

@@ -162,7 +162,7 @@ def _event_of_acceptance(
     results: FolderArchive, place: FileHash, result: Result
 ) -> Event:
     event = Event(
-        kind=Kind.ACCEPTED if result.restores is None else Kind.RESTORED,
+        kind=Kind.ACCEPTED,
         at=result.accepted,
         names=result.names,
         program=str(result.calibration.program),
@@ -176,7 +176,6 @@ def _event_of_acceptance(
         swing=results.place_of(result.record),
         result=place,
         record_sha256=place.sha256,
-        concerns=result.restores,
     )
     with suppress(FileError):  # a result outlives the record of its swing
         record = open_record(result.record)

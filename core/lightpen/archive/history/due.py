@@ -11,7 +11,7 @@ from sqlalchemy import select
 from lightpen.archive.chains.entries import Kind, StoredEntry, since_us
 from lightpen.archive.chains.rows import searchable
 from lightpen.archive.history.history import known_names
-from lightpen.archive.history.queries import calibrating, last_accepted, of_chain
+from lightpen.archive.history.queries import last_accepted, of_chain
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.model.limits import DueRule
@@ -27,7 +27,7 @@ class DueTip:
     """A current tip."""
 
     entry: StoredEntry  # of the acceptance
-    calibrated: datetime  # also if the result was reinstated later
+    calibrated: datetime
     due: datetime  # by age
     n_swings: int  # of the pen since the calibration
     n_left: int | None  # until it is due by their count; None for any number
@@ -59,14 +59,10 @@ def due_tips(
     entries = [entry for entry in found if entry is not None]
     if not entries:
         return ()
-    origins = [calibrating(database, each) for each in entries]
-    swings = _swings(database, chain, min(each.entry.since for each in origins))
+    swings = _swings(database, chain, min(each.entry.since for each in entries))
     return tuple(
         sorted(
-            (
-                _due_tip(entry, origin, swings, rule, library)
-                for entry, origin in zip(entries, origins, strict=True)
-            ),
+            (_due_tip(entry, swings, rule, library) for entry in entries),
             key=lambda tip: (tip.n_left is None or tip.n_left > 0, tip.due),
         )
     )
@@ -74,15 +70,14 @@ def due_tips(
 
 def _due_tip(
     entry: StoredEntry,
-    origin: StoredEntry,
     swings: Mapping[str, list[int]],
     usual: DueRule,
     library: Library,
 ) -> DueTip:
-    names, calibrated = entry.entry.event.names, origin.entry.event.at
+    names, calibrated = entry.entry.event.names, entry.entry.event.at
     rule = library.rule_of(names.tip, usual)
     of_pen = swings.get(searchable(names.pen), [])
-    n_swings = len(of_pen) - bisect_right(of_pen, since_us(origin.entry.since))
+    n_swings = len(of_pen) - bisect_right(of_pen, since_us(entry.entry.since))
     return DueTip(
         entry,
         calibrated,

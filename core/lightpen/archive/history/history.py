@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Row, select
 
-from lightpen.archive.chains.entries import IN_FORCE_BY, StoredEntry
+from lightpen.archive.chains.entries import Kind, StoredEntry
 from lightpen.archive.chains.rows import READ, read_entries, sound_entry
 from lightpen.archive.history.queries import (
     IN_ORDER,
@@ -85,7 +85,7 @@ def lines(
 
 
 def messages_on(database: Database, entry: StoredEntry) -> tuple[StoredEntry, ...]:
-    """Return the entries on an entry: comments, revocation, reinstatement."""
+    """Return the entries on an entry: comments, revocation."""
     found = select(*READ).where(ENTRIES.c.concerns == entry.sha256).order_by(*IN_ORDER)
     return read_entries(database, found)
 
@@ -103,7 +103,7 @@ def known_names(database: Database) -> KnownNames:
 def _line(row: Row[Any]) -> Line:
     entry = sound_entry(row)
     state = TipState.NONE
-    if entry is not None and entry.entry.event.kind in IN_FORCE_BY:
+    if entry is not None and entry.entry.event.kind is Kind.ACCEPTED:
         state = TipState.REPLACED if row.is_replaced else TipState.IN_FORCE
         state = TipState.TAKEN_BACK if row.is_taken_back else state
     return Line(row.chain, row.number, entry, state)

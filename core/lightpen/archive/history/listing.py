@@ -1,6 +1,5 @@
-"""Entries for other programs: as a table, and as JSON."""
+"""Entries as a table for other programs."""
 
-import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -22,26 +21,15 @@ BATCH = 1000  # entries that are read at one time
 
 
 def save_entries(database: Database, wanted: EntryFilter, path: Path) -> int:
-    """Write the entries of a filter, newest first; return their number.
-
-    The file is a table if its name ends in ``.csv``, else JSON.
-    """
+    """Write the entries of a filter as a table, newest first; return their number."""
     entries = tuple(_all(database, wanted))
-    is_table = path.suffix.lower() == ".csv"
-    text = (entries_csv if is_table else entries_json)(entries)
-    write_whole(path, text.encode("utf-8", "backslashreplace"))
+    write_whole(path, entries_csv(entries).encode("utf-8", "backslashreplace"))
     return len(entries)
 
 
 def entries_csv(entries: Iterable[StoredEntry]) -> str:
     """Return entries as a table."""
     return csv_table([COLUMNS, *map(_row, entries)])
-
-
-def entries_json(entries: Iterable[StoredEntry]) -> str:
-    """Return stored entries with their hashes as JSON."""
-    listed = [{"sha256": each.sha256, **json.loads(each.text)} for each in entries]
-    return json.dumps(listed, indent=1) + "\n"
 
 
 def _all(database: Database, wanted: EntryFilter) -> Iterator[StoredEntry]:

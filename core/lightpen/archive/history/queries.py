@@ -15,20 +15,13 @@ from sqlalchemy import (
     tuple_,
 )
 
-from lightpen.archive.chains.entries import (
-    IN_FORCE_BY,
-    Entry,
-    Kind,
-    StoredEntry,
-    since_us,
-)
+from lightpen.archive.chains.entries import Entry, Kind, StoredEntry, since_us
 from lightpen.archive.chains.rows import READ, read_entries, searchable
 from lightpen.archive.store.database import Database
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.model.names import folded_name
 
 IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
-_KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
 
 
 @dataclass(frozen=True)
@@ -98,27 +91,13 @@ def last_accepted(
         (ENTRIES.c.pen == searchable(pen))
         & (ENTRIES.c.tip == searchable(tip))
         & (ENTRIES.c.is_simulated == is_simulated)
-        & ENTRIES.c.kind.in_(_KINDS_IN_FORCE)
+        & (ENTRIES.c.kind == Kind.ACCEPTED.value)
         & ~revoked(ENTRIES)
     )
     if chain is not None:
         condition &= of_chain(chain)
     found = select(*READ).where(condition).order_by(ENTRIES.c.since_us.desc()).limit(1)
     return next(iter(read_entries(database, found)), None)
-
-
-def calibrating(database: Database, entry: StoredEntry) -> StoredEntry:
-    """Return the calibration entry of a reinstated tip.
-
-    It is the entry itself if that was the calibration, or if the other is not here.
-    """
-    while entry.entry.event.kind is Kind.RESTORED:
-        found = select(*READ).where(ENTRIES.c.sha256 == entry.entry.event.concerns)
-        origin = read_entries(database, found.limit(1))
-        if not origin:
-            break
-        (entry,) = origin
-    return entry
 
 
 def of_chain(chain: str) -> ColumnElement[bool]:
@@ -146,7 +125,7 @@ def replaced(entries: FromClause) -> Exists:
         later.c.pen == entries.c.pen,
         later.c.tip == entries.c.tip,
         later.c.is_simulated == entries.c.is_simulated,
-        later.c.kind.in_(_KINDS_IN_FORCE),
+        later.c.kind == Kind.ACCEPTED.value,
         later.c.since_us > entries.c.since_us,
         later.c.chain == entries.c.chain,
         ~revoked(later),

@@ -19,12 +19,7 @@ from threading import Lock
 
 from msgspec import structs
 
-from lightpen.archive.chains.chains import (
-    chain_head,
-    entry_of_result,
-    is_swing_entered,
-    records_of,
-)
+from lightpen.archive.chains.chains import chain_head, entry_of_result, is_swing_entered
 from lightpen.archive.chains.entries import Event, Kind, StoredEntry, this_program
 from lightpen.archive.chains.growth import append, own_chain
 from lightpen.archive.events.event_extraction import (
@@ -36,32 +31,20 @@ from lightpen.archive.events.event_extraction import (
     event_of_unreadable,
 )
 from lightpen.archive.events.station_events import event_of_station, is_station_file
-from lightpen.archive.logbook.reinstating import (
-    due_doubts,
-    require_restorable,
-    restored_result,
-    with_change,
-)
 from lightpen.archive.replication.replication import Replicator
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.formats.files import FOLDER, sha256, unreadable
-from lightpen.formats.stored_messages import StoredMessage
 from lightpen.local_time import local_now
 from lightpen.messages import Message
-from lightpen.model.limits import StationLimits
 from lightpen.record.library.entered_files import ARCHIVE, entered_files
 from lightpen.record.library.signing.account import OwedFile, forget_owed, owed_files
 from lightpen.record.library.signing.keys import chain_of, station_key
-from lightpen.record.library.supervision import Signature, approval_of_change
 from lightpen.record.library.supervision_changes import renew_station_key
 from lightpen.record.library.tip_library import LIBRARY
-from lightpen.record.results.acceptance import require_in_use
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
-from lightpen.record.results.results import Result
 from lightpen.record.swings.journal import JOURNAL, last_verdict
-from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.solving import Solution
 
@@ -144,48 +127,6 @@ class Logbook:
         )
         with self._lock:
             self._enter(ExtractedEvent(event))
-
-    def restore(
-        self,
-        entry: StoredEntry,
-        by: Names,
-        reason: str,
-        signature: Signature | None = None,
-    ) -> Result:
-        """Reinstate the tip of an entry, and enter that.
-
-        ``by`` names the operator who reinstates it, and the station. Raises
-        `ArchiveError` if the entry made no tip current, its files are not as they were
-        entered, or it cannot be entered; it stays owed then.
-        Raises `AcceptanceError` if the tip is retired, there is no reason, or there is
-        a password and no supervisor signs.
-        """
-        require_in_use(self._results, entry.entry.event.names.tip)
-        event, now = entry.entry.event, local_now()
-        with self._lock:
-            require_restorable(entry, self._data)
-            text = records_of(self.database, [entry]).get(event.record_sha256 or "")
-            result = restored_result(entry, text, self._data, by, reason, now)
-            supervision = self._results.supervision()
-            key = approval_of_change(supervision, signature, reason)
-            last = self._results.in_force(
-                event.names.pen, event.names.tip, is_simulated=event.is_simulated
-            )
-            doubts = due_doubts(
-                self.database,
-                entry,
-                self._results.library(),
-                now,
-                supervision.limits_at(by.station, StationLimits()).due,
-            )
-            result = replace(
-                with_change(result, last),
-                doubts=tuple(map(StoredMessage.of, doubts)),
-                supervisor=signature.name.strip() if key and signature else "",
-            )
-            self._results.store(result, key)
-        self.enter_owed()
-        return result
 
     def delivery(self) -> ReplicationState | None:
         """Return the progress of the replication; None without a server."""

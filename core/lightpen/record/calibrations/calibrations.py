@@ -49,9 +49,8 @@ class CalibrationFile:
     origin: Origin | None
     names: Names = NOBODY  # empty of a record that nobody accepted
     accepted: datetime | None = None  # None also for such a record
-    reason: str = ""  # for acceptance despite a CHECK, or for reinstating
+    reason: str = ""  # for acceptance despite a CHECK
     change: TipChange | None = None
-    restores: str | None = None  # hash of the entry that it reinstates
     swing: Path | None = None  # folder of the swing as a result names it
     measured: datetime | None = None  # start of its swing, if looked up
     library_status: tuple[str, ...] = ()  # retired, overdue, if looked up
@@ -192,7 +191,6 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
             accepted=result.accepted,
             reason=result.reason,
             change=result.change,
-            restores=result.restores,
             swing=result.record,
             supervisor=result.supervisor,
         )

@@ -132,14 +132,13 @@ class _Head(Struct):
     ball_diameter_mm: float | None
     grade: Grade
     record: str
-    images: tuple[int, ...] | None
+    images: tuple[int, ...]
     origin: Origin | None
     reason: str
     supervisor: str
     why: StoredMessage | None
     doubts: tuple[StoredMessage, ...]
     change: TipChange | None
-    restores: Digest | None
     calibration_sha256: Digest
 
     def __post_init__(self) -> None:
@@ -159,7 +158,7 @@ class Result:
     accepted: datetime
     grade: Grade
     record: Path  # folder of the swing that it comes from
-    images: tuple[int, ...] | None  # not excluded; None for a reinstated tip
+    images: tuple[int, ...]  # not excluded
     calibration: CalibrationRecord
     origin: Origin | None = None  # None if neither it nor its swing states it
     reason: str = ""  # why it was accepted though it does not pass, by who did
@@ -167,7 +166,6 @@ class Result:
     doubts: tuple[StoredMessage, ...] = ()
     change: TipChange | None = None  # since the previous result, if any
     supervisor: str = ""  # who approved it; empty if not needed
-    restores: str | None = None  # hash of the entry whose tip it reinstates
 
     @property
     def is_simulated(self) -> bool:
@@ -213,7 +211,6 @@ def result_bytes(result: Result, record: str) -> bytes:
         why=result.why,
         doubts=result.doubts,
         change=result.change,
-        restores=result.restores,
         calibration_sha256=sha256(rest).hexdigest(),
     )
     return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
@@ -276,7 +273,6 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
             why=entries.why,
             doubts=entries.doubts,
             change=entries.change,
-            restores=entries.restores,
         )
     except LaterFormatError as error:
         raise _of_later_version(file, error.number) from error

@@ -33,10 +33,7 @@ LIMIT = "max_uncertainty_mm"  # the same
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """The calibrations of a tip that were accepted and not revoked.
-
-    A calibration whose tip was reinstated counts once.
-    """
+    """The calibrations of a tip that were accepted and not revoked."""
 
     pen: str = ""
     tip: str = ""
@@ -133,13 +130,11 @@ def repeatability_of(
 ) -> Repeatability | None:
     """Return the repeatability; None for fewer than two calibrations or several tips.
 
-    Reinstated tips are ignored, since nothing was measured; see
-    `measure_repeatability`.
+    See `measure_repeatability`.
     """
-    measured = [e for e in entries if e.entry.event.kind is not Kind.RESTORED]
-    if len(measured) < MIN_TIPS or len({_subject(each) for each in measured}) > 1:
+    if len(entries) < MIN_TIPS or len({_subject(each) for each in entries}) > 1:
         return None
-    in_order = sorted(measured, key=lambda each: each.entry.since)
+    in_order = sorted(entries, key=lambda each: each.entry.since)
     tips = [tip_of(each) for each in in_order]
     return measure_repeatability(
         tips, limits, tolerance=tolerance, reference=reference, touched=touched

@@ -598,7 +598,7 @@ def store(folder: Path, n: int) -> Result:
         accepted=NOON + timedelta(days=n),
         grade=Grade.PASS,
         record=folder / "records" / "gone",
-        images=None,
+        images=(),
         calibration=small_record(
             {
                 "tip_pen_mm": [float(n), 2.0, 3.0],
@@ -611,28 +611,6 @@ def store(folder: Path, n: int) -> Result:
     )
     FolderArchive(folder).store(result)
     return result
-
-
-@pytest.mark.slow
-def test_an_older_tip_is_put_in_force_again_for_a_reason(desk: Desk) -> None:
-    folder = desk.workbench.folder
-    for n in range(2):
-        store(folder, n)
-    desk.workbench.run.logbook.enter_owed()
-    desk.open()
-    desk.show_tab(ENTRY)
-    desk.select(1)
-    desk.click("Reinstate...")
-    desk.type_reason("The new one is bent.")
-
-    desk.until(lambda: len(desk.column(WHAT)) == 3)
-    assert desk.column(WHAT) == [
-        *("Reinstated, current", "Calibration, replaced", "Calibration, replaced")
-    ]
-    found = FolderArchive(folder).in_force("LP-04", "T-10")
-    assert found is not None
-    assert (found.tip_pen[0], found.reason) == (0.0, "The new one is bent.")
-    assert desk.notices == []
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def accepted(folder: Path) -> Result:
         accepted=NOON,
         grade=Grade.PASS,
         record=folder,
-        images=None,
+        images=(),
         calibration=small_record(
             {
                 "tip_pen_mm": [1.0, 2.0, 3.0],

@@ -33,7 +33,7 @@ def result(tmp_path: Path, record: Path) -> Path:
             accepted=datetime(2026, 8, 14, 9, 5, tzinfo=UTC),
             grade=Grade.PASS,
             record=record,
-            images=None,
+            images=(),
             calibration=small_record(),
         )
     )

@@ -63,7 +63,6 @@ def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
     assert trend_of(database, WANTED).control is None  # of nine
     enter(database, values[-1])
     enter(database, 9.0, Kind.REFUSED)
-    enter(database, 1.0, Kind.RESTORED)
     enter(database, 9.0, tip="T-11")
     trend = trend_of(database, WANTED)
 
@@ -150,12 +149,11 @@ def test_the_change_of_two_is_from_the_earlier_to_the_later(database: Database) 
 def test_repeatability_needs_two_calibrations_of_one_tip(database: Database) -> None:
     one, other = enter(database, 1.0), enter(database, 1.02)
     limits = VerificationLimits()
-    again = enter(database, 1.0, Kind.RESTORED)
-    found = repeatability_of((other, one, again), limits)
+    found = repeatability_of((other, one), limits)
 
     assert found is not None
     assert found.scatter.deviation[0] == pytest.approx(0.02 / np.sqrt(2))
-    assert repeatability_of((one, again), limits) is None
+    assert repeatability_of((one,), limits) is None
     assert repeatability_of((one, enter(database, 1.0, tip="T-11")), limits) is None
 
 
