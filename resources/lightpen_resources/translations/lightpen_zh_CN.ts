@@ -53,10 +53,6 @@
         <translation>所列条目 (CSV)...</translation>
     </message>
     <message>
-        <source>Listed entries (JSON)...</source>
-        <translation>所列条目 (JSON)...</translation>
-    </message>
-    <message>
         <source>Another operation is in progress.</source>
         <translation>另一项操作正在进行。</translation>
     </message>
@@ -908,18 +904,6 @@
 <context>
     <name>EntryPanel</name>
     <message>
-        <source>Reason</source>
-        <translation>理由</translation>
-    </message>
-    <message>
-        <source>Reinstate this tip? A new entry is added; the current tip stays in the archive.</source>
-        <translation>恢复使用该测头吗？将新增一个条目；当前测头保留在档案库中。</translation>
-    </message>
-    <message>
-        <source>Reinstate</source>
-        <translation>恢复使用</translation>
-    </message>
-    <message>
         <source>Cancel</source>
         <translation>取消</translation>
     </message>
@@ -944,20 +928,12 @@
         <translation>添加备注...</translation>
     </message>
     <message>
-        <source>Reinstate...</source>
-        <translation>恢复使用...</translation>
-    </message>
-    <message>
         <source>Select an entry.</source>
         <translation>请选择一个条目。</translation>
     </message>
     <message>
         <source>Add a comment</source>
         <translation>添加备注</translation>
-    </message>
-    <message>
-        <source>Adds a new entry</source>
-        <translation>新增一个条目</translation>
     </message>
     <message>
         <source>Verification report...</source>
@@ -986,14 +962,6 @@
     <message>
         <source>Operator {0}</source>
         <translation>操作员 {0}</translation>
-    </message>
-    <message>
-        <source>Only an accepted tip can be reinstated.</source>
-        <translation>只有已接受的测头才能恢复使用。</translation>
-    </message>
-    <message>
-        <source>This tip is current.</source>
-        <translation>该测头为当前测头。</translation>
     </message>
     <message>
         <source>Only accepted tips and verifications have a report.</source>
@@ -1380,10 +1348,6 @@
     <message>
         <source>Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with the old file {4} px.</source>
         <translation>已保存到 {0}：{1} 和 {2}。留出的摆动的残差：{3} px，用旧文件时为 {4} px。</translation>
-    </message>
-    <message>
-        <source>Tip {0} of pen {1} reinstated from the earlier calibration.</source>
-        <translation>光笔 {1} 的测头 {0} 已恢复为该次标定的结果。</translation>
     </message>
     <message>
         <source>Saved in {0}</source>
@@ -7740,20 +7704,8 @@ mm</translation>
         <translation>标定板的不同位姿：{n_views} 个；至少需要 {least} 个，最好 15 个。请在各视图之间移动并倾斜标定板。</translation>
     </message>
     <message>
-        <source>Enter the reason for reinstating this tip.</source>
-        <translation>请输入恢复此测头的理由。</translation>
-    </message>
-    <message>
         <source>Entries {first} to {last} of chain {chain} are missing.</source>
         <translation>链 {chain} 的第 {first} 至第 {last} 个条目缺失。</translation>
-    </message>
-    <message>
-        <source>Entry {number} has no complete calibration record and cannot be reinstated. Calibrate the tip again.</source>
-        <translation>条目 {number} 没有完整的标定记录，无法恢复使用。请重新标定该测头。</translation>
-    </message>
-    <message>
-        <source>Entry {number} is not an accepted tip. Choose the entry of an accepted tip.</source>
-        <translation>条目 {number} 不是已接受的测头。请选择已接受测头的条目。</translation>
     </message>
     <message>
         <source>Entry {number} of chain {chain} does not match its predecessor: one of the two was replaced.</source>
@@ -9719,10 +9671,6 @@ mm</translation>
         <translation>标定</translation>
     </message>
     <message>
-        <source>Reinstated</source>
-        <translation>恢复使用</translation>
-    </message>
-    <message>
         <source>Rejected</source>
         <translation>已拒绝</translation>
     </message>
@@ -9962,10 +9910,6 @@ mm</translation>
     <message>
         <source>This tip has not been accepted.</source>
         <translation>该测头未被接受。</translation>
-    </message>
-    <message>
-        <source>This tip was reinstated from an earlier calibration. Reason: {0}</source>
-        <translation>该测头由较早一次标定恢复使用。理由：{0}</translation>
     </message>
     <message>
         <source>The tip was accepted. Reason: {0}</source>

@@ -1,6 +1,5 @@
 """The step History shows what the archive tells, and enters what is added to it."""
 
-import json
 import sqlite3
 import threading
 from collections.abc import Callable, Iterator
@@ -787,10 +786,10 @@ def test_entries_are_saved(desk: Desk, tmp_path: Path) -> None:
     desk.enter(2)
     desk.open()
     desk.show_tab(WHOLE)
-    desk.click("Listed entries (JSON)...")
-    desk.choose_file(tmp_path / "shown.json")
+    desk.click("Listed entries (CSV)...")
+    desk.choose_file(tmp_path / "shown.csv")
     desk.until(lambda: "2 entries saved" in desk.statuses[-1])
-    assert len(json.loads((tmp_path / "shown.json").read_text("utf-8"))) == 2
+    assert len((tmp_path / "shown.csv").read_text("utf-8").splitlines()) == 3
 
     desk.wait_idle()
     desk.click("All entries (JSON lines)...")
