@@ -9,13 +9,19 @@ from PySide6.QtGui import QColor, QPainter
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
 from lightpen_app.look.arrows import MANY, arrow_lines, arrow_scale, cell_means
-from lightpen_app.look.phrases import share_text
-from lightpen_app.look.quantities import AXES, MICROMETRES
+from lightpen_app.look.budget_figure import Drawing, budget_figure, paint_budget
+from lightpen_app.look.quantities import AXES, MICROMETRES, micrometres_text
 from lightpen_app.look.theme import LIGHT
-from lightpen_app.print_report.blocks import CENTER, HAIRLINE, draw_text, line_pen
+from lightpen_app.print_report.blocks import (
+    CENTER,
+    HAIRLINE,
+    PrintSize,
+    draw_text,
+    line_pen,
+    print_font,
+)
 from lightpen_app.print_report.charts import (
     LABEL_ROOM,
     LETTERS,
@@ -74,15 +80,23 @@ def led_chart(calibration: CalibrationRecord) -> Chart:
 
 
 def budget_chart(calibration: CalibrationRecord) -> Chart:
-    """Return the parts of U along each axis."""
-    shares = calibration.uncertainty.shares
-    parts = [np.array(share.standard_uncertainty_mm) for share in shares]
-    whole = np.array(calibration.expanded_uncertainty_mm) / COVERAGE_FACTOR
-    expanded = COVERAGE_FACTOR * MICROMETRES * np.array([*parts, whole])
-    labels = (*(share_text(s.name) for s in shares), translate("paper", "all"))
-    title = translate("paper", "Uncertainty budget U (k = 2) / µm")
-    words = AxisWords("", labels)
-    return _bar_chart(title, labels, tuple(expanded.T), AXES, words)
+    """Return the parts of U along its weakest direction."""
+    figure = budget_figure(
+        (
+            (share.name, share.weakest_expanded_uncertainty_mm, share.assumed)
+            for share in calibration.uncertainty.shares
+        ),
+        calibration.weakest_direction.expanded_uncertainty_mm,
+        calibration.verdict.limits.max_uncertainty_mm,
+    )
+    letters = print_font(PrintSize.BODY), print_font(PrintSize.BODY, bold=True)
+    drawing = Drawing(*letters, LIGHT, HAIRLINE, micrometres_text)
+
+    def paint(painter: QPainter, area: QRectF) -> None:
+        paint_budget(painter, area, figure, drawing)
+
+    title = translate("paper", "U (k = 2) by source, weakest direction / µm")
+    return Chart(title, paint)
 
 
 def tips_chart(calibration: CalibrationRecord) -> Chart:

@@ -9,7 +9,6 @@ from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from typing_extensions import override
 
 from lightpen_app.look.quantities import number_text
-from lightpen_app.look.theme import GRID
 
 LABELLED = (1, 2, 5)  # of each decade
 LEAST_LABELLED = 2  # else all are
@@ -57,33 +56,6 @@ def _with_equal_decimals(words: list[TextSpec]) -> list[TextSpec]:
         return words
     n = max((len(text.partition(".")[2]) for _, _, text in words), default=0)
     return [(place, flags, number_text(float(text), n)) for place, flags, text in words]
-
-
-class LabelAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """A bottom axis whose labels can be written upwards, where they lack width."""
-
-    # Labels written upwards at 0, 1, 2, ... instead of the usual ones.
-    upright: Sequence[str] = ()
-
-    @override
-    def drawPicture(
-        self,
-        p: QPainter,
-        axisSpec: object,
-        tickSpecs: object,
-        textSpecs: list[TextSpec],
-    ) -> None:
-        super().drawPicture(p, axisSpec, tickSpecs, [] if self.upright else textSpecs)
-        left, right = self.range
-        p.setClipping(False)
-        room, line = self.height(), p.fontMetrics().lineSpacing()
-        flags = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        for place, text in enumerate(self.upright):
-            p.save()
-            p.translate((place - left) / (right - left) * self.width(), 0.0)
-            p.rotate(-90.0)  # to the right is upwards
-            p.drawText(QRectF(-room, -line / 2, room - GRID // 2, line), flags, text)
-            p.restore()
 
 
 def _is_between_decades(spec: TextSpec) -> bool:

@@ -4,30 +4,17 @@ Making a plot again costs fifty times more than `setData` on one that is there.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import zip_longest
-from typing import TypeAlias
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import (
-    QBuffer,
-    QByteArray,
-    QEvent,
-    QPoint,
-    QRectF,
-    QSize,
-    Qt,
-    Signal,
-)
-from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFontMetricsF, QResizeEvent
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.csv_cells import csv_table
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.theme import (
     GRID,
@@ -38,10 +25,9 @@ from lightpen_app.look.theme import (
     font,
     scaled,
 )
-from lightpen_app.widgets.plot_canvas import Canvas, LabelAxis, ReadableAxis
+from lightpen_app.widgets.figure import Axes, Figure
+from lightpen_app.widgets.plot_canvas import Canvas, ReadableAxis
 
-PNG_SCALE = 2
-MARK_HEIGHT = 3 * GRID  # px, below a saved plot
 LEFT_WIDTH = 9 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = 6 * GRID  # px that a title leaves free, as for a button
 LEAST_TITLE = 9  # px
@@ -65,36 +51,22 @@ NEWEST = 0.25  # of the values, which are in sight whatever they are
 
 pg.setConfigOptions(antialias=True)
 
-Column: TypeAlias = FloatArray | tuple[str, ...]
 
-
-@dataclass(frozen=True)
-class Axes:
-    """Words of a plot."""
-
-    title: str  # quantity with its unit
-    x: str = ""  # name of the axis; empty to leave it out
-    y: str = ""  # likewise
-
-
-class Plot(QWidget):
+class Plot(Figure):
     """Base of the plots: its frame, its colours, and how it is saved.
 
     The mouse moves nothing: a plot always shows all of its data.
     """
 
-    titled = Signal()  # title or labels changed
     has_symbols = False  # whether its curves have the `SYMBOLS`
 
     def __init__(self, axes: Axes) -> None:
         super().__init__()
-        self._columns: dict[str, Column] = {}
         self._title_px = 0
         self._y_range = (0.0, 0.0)  # shown by `_fit`
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
         # Widgets
-        axes_of_sides = {"left": ReadableAxis("left"), "bottom": LabelAxis("bottom")}
+        axes_of_sides = {"left": ReadableAxis("left"), "bottom": pg.AxisItem("bottom")}
         self._graphics = Canvas(parent=self, axisItems=axes_of_sides, enableMenu=False)
         self._item = self._graphics.getPlotItem()
         self._item.hideButtons()
@@ -115,47 +87,6 @@ class Plot(QWidget):
 
         self.set_axes(axes)
 
-    def set_axes(self, axes: Axes) -> None:
-        """Change the words, as when the language changes."""
-        self._axes = axes
-        self.setAccessibleName(axes.title)
-        self._restyle()
-        self.titled.emit()
-
-    def png(self, mark: str = "") -> bytes:
-        """Return the plot, with a mark below it, as a picture at twice the size."""
-        self.grab()  # lays out a plot that was never shown
-        below = MARK_HEIGHT if mark else 0
-        colors = colors_of(self.palette())
-        size = self.size() + QSize(0, below)
-        image = QImage(size * PNG_SCALE, QImage.Format.Format_RGB32)
-        image.setDevicePixelRatio(PNG_SCALE)
-        image.fill(QColor(colors.panel))
-        painter = QPainter(image)
-        self.render(painter, QPoint())
-        painter.setFont(font(TextSize.SMALL, bold=True))
-        painter.setPen(QColor(colors.warn))
-        place = QRectF(GRID, self.height(), self.width() - 2 * GRID, below)
-        side = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(place, side, mark)
-        painter.end()
-        data = QByteArray()
-        buffer = QBuffer(data)
-        buffer.open(QBuffer.OpenModeFlag.WriteOnly)
-        # The stub of Qt wants bytes for the format, Qt itself a text.
-        image.save(buffer, "PNG")  # type: ignore[call-overload]
-        return bytes(data.data())
-
-    def csv(self) -> bytes:
-        """Return the numbers behind the plot, one column each."""
-        rows = zip_longest(*self._columns.values(), fillvalue="")
-        cells = (map(_cell, row) for row in rows)
-        return csv_table([self._columns, *cells]).encode()
-
-    def columns(self) -> Mapping[str, Column]:
-        """Return the displayed data by CSV column."""
-        return self._columns
-
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return least and greatest x, and least and greatest y, that are shown."""
         (left, right), (low, high) = self._item.viewRange()
@@ -164,14 +95,6 @@ class Plot(QWidget):
     def n_items(self) -> int:
         """Return the number of plot items."""
         return len(self._item.items)
-
-    @override
-    def sizeHint(self) -> QSize:
-        return QSize(360, 200)
-
-    @override
-    def minimumSizeHint(self) -> QSize:
-        return QSize(160, 152)
 
     @override
     def changeEvent(self, event: QEvent) -> None:
@@ -271,14 +194,6 @@ def title_with_names(title: str, names: Sequence[str], colors: Colors) -> str:
         for name, tone in zip(names, TONES, strict=False)
     )
     return "&nbsp; ".join((escape(title), *words))
-
-
-def _cell(value: float | str) -> float | str:
-    """Return an entry of a CSV file; numbers with nine digits."""
-    if isinstance(value, str):
-        return value
-    rounded = float(f"{value:.9g}")
-    return int(rounded) if rounded.is_integer() else rounded
 
 
 @dataclass(frozen=True)

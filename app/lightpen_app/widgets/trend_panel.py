@@ -12,7 +12,8 @@ from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.quantities import AXES
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import day_text, shortened
-from lightpen_app.widgets.plots import Axes, Plot
+from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.plots import Plot
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 

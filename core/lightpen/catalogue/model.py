@@ -1,9 +1,9 @@
 """Messages of model: code, then template with named values."""
 
 MESSAGES = {
-    "bending.assumed": "Bending: {assumed:.0f} µm assumed; a press test measures it.",
-    "bending.measured": "Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}.",
-    "bending.overdue": "Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}, overdue since {due}; at least {assumed:.0f} µm count. Repeat the press test.",
+    "bending.assumed": "Bending: {assumed:.3f} mm assumed; a press test measures it.",
+    "bending.measured": "Bending: {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.",
+    "bending.overdue": "Bending: {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.",
     "camera.distortion-folds": "The distortion of the intrinsics file is not invertible for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.",
     "camera-validity.fold": "The distortion of the intrinsics file has no inverse in {share:.1f} % of the image, at its corners. LEDs there are not used; calibrate the camera with views that reach into the corners.",
     "camera-validity.serial": "The intrinsics file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.",

@@ -53,9 +53,9 @@ class Bending:
     def words(self) -> Message:
         """Return its size and where it is from."""
         if self.measured is None:
-            return message("bending.assumed", assumed=1000 * ASSUMED)
-        bending = 1000 * abs(self.measured.bending_mm)
-        uncertainty = 1000 * self.measured.expanded_uncertainty_mm
+            return message("bending.assumed", assumed=ASSUMED)
+        bending = abs(self.measured.bending_mm)
+        uncertainty = self.measured.expanded_uncertainty_mm
         day = self.measured.measured.isoformat()
         if not self.is_overdue:
             return message(
@@ -67,7 +67,7 @@ class Bending:
             uncertainty=uncertainty,
             day=day,
             due=self.measured.due.isoformat(),
-            assumed=1000 * ASSUMED,
+            assumed=ASSUMED,
         )
 
 

@@ -357,6 +357,21 @@
     </message>
 </context>
 <context>
+    <name>BudgetFigure</name>
+    <message>
+        <source>combined</source>
+        <translation>合成</translation>
+    </message>
+    <message>
+        <source>limit {0}</source>
+        <translation>限值 {0}</translation>
+    </message>
+    <message>
+        <source>{0}, assumed</source>
+        <translation>{0}，假定</translation>
+    </message>
+</context>
+<context>
     <name>CameraPage</name>
     <message>
         <source>Camera</source>
@@ -2845,10 +2860,6 @@
         <translation>迭代次数</translation>
     </message>
     <message>
-        <source>Difference from final value / µm</source>
-        <translation>与终值之差 / µm</translation>
-    </message>
-    <message>
         <source>Two-stage method and joint fit</source>
         <translation>两步法与联合拟合</translation>
     </message>
@@ -2879,6 +2890,10 @@
     <message>
         <source>Also for later swings here</source>
         <translation>也用于此工位以后的摆动</translation>
+    </message>
+    <message>
+        <source>Difference from final value / mm</source>
+        <translation>与最终值之差 / mm</translation>
     </message>
     <message>
         <source>Two-stage (paper)</source>
@@ -2920,20 +2935,20 @@
         <translation>{0} 次试验成功，{1} 次失败。</translation>
     </message>
     <message>
-        <source>its standard error / µm</source>
-        <translation>其标准误差 / µm</translation>
+        <source>U (k = 2) by Monte Carlo / mm</source>
+        <translation>蒙特卡洛法的 U (k = 2) / mm</translation>
     </message>
     <message>
-        <source>U (k = 2) by uncertainty budget / µm</source>
-        <translation>不确定度报告的 U (k = 2) / µm</translation>
+        <source>its standard error / mm</source>
+        <translation>其标准误差 / mm</translation>
+    </message>
+    <message>
+        <source>U (k = 2) by uncertainty budget / mm</source>
+        <translation>不确定度报告的 U (k = 2) / mm</translation>
     </message>
     <message>
         <source>Difference / standard error</source>
         <translation>差值 / 标准误差</translation>
-    </message>
-    <message>
-        <source>U (k = 2) by Monte Carlo / µm</source>
-        <translation>蒙特卡洛法的 U (k = 2) / µm</translation>
     </message>
 </context>
 <context>
@@ -3664,8 +3679,28 @@ needed</source>
         <translation>所计入图像的姿态</translation>
     </message>
     <message>
+        <source>The tip beside others</source>
+        <translation>测头与其他值的比较</translation>
+    </message>
+    <message>
         <source>{0} of {1} images included</source>
         <translation>计入 {0} / {1} 幅图像</translation>
+    </message>
+    <message>
+        <source>Previous, {0} / mm</source>
+        <translation>上次，{0} / mm</translation>
+    </message>
+    <message>
+        <source>Change / mm</source>
+        <translation>变化 / mm</translation>
+    </message>
+    <message>
+        <source>Nominal / mm</source>
+        <translation>标称值 / mm</translation>
+    </message>
+    <message>
+        <source>Deviation / mm</source>
+        <translation>偏差 / mm</translation>
     </message>
     <message>
         <source>No earlier result</source>
@@ -3686,14 +3721,6 @@ needed</source>
     <message>
         <source>Self-check of the LEDs: {0}, limit {1}</source>
         <translation>LED 自检：{0}，限值 {1}</translation>
-    </message>
-    <message>
-        <source>Tip in the pen frame, U (k = 2)</source>
-        <translation>光笔坐标系中的测头中心，U (k = 2)</translation>
-    </message>
-    <message>
-        <source>Tip {0} in the frame of pen {1}, U&#xa0;(k&#xa0;=&#xa0;2)</source>
-        <translation>测头 {0} 在光笔 {1} 坐标系中的中心，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
     </message>
     <message>
         <source>As found: {0} mm from the previous calibration, limit {1} mm</source>
@@ -5063,42 +5090,22 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>TipReadout</name>
+    <name>TipSummary</name>
     <message>
-        <source>Value
-mm</source>
-        <translation>数值
-mm</translation>
+        <source>U (k = 2) of the tip in its weakest direction</source>
+        <translation>测头在最弱方向上的 U (k = 2)</translation>
     </message>
     <message>
-        <source>U
-mm</source>
-        <translation>U
-mm</translation>
+        <source>Tip in the pen frame / mm, U (k = 2)</source>
+        <translation>光笔坐标系中的测头 / mm，U (k = 2)</translation>
     </message>
     <message>
-        <source>Change
-µm</source>
-        <translation>变化
-µm</translation>
+        <source>Tip {0} in the frame of pen {1} / mm, U&#xa0;(k&#xa0;=&#xa0;2)</source>
+        <translation>光笔 {1} 坐标系中的测头 {0} / mm，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
     </message>
     <message>
-        <source>Previous
-mm</source>
-        <translation>上次
-mm</translation>
-    </message>
-    <message>
-        <source>Nominal
-mm</source>
-        <translation>标称
-mm</translation>
-    </message>
-    <message>
-        <source>Deviation
-mm</source>
-        <translation>偏差
-mm</translation>
+        <source>limit {0} mm</source>
+        <translation>限值 {0} mm</translation>
     </message>
 </context>
 <context>
@@ -5135,8 +5142,8 @@ mm</translation>
 <context>
     <name>UncertaintyPanel</name>
     <message>
-        <source>U (k = 2) by source / µm</source>
-        <translation>各来源的 U (k = 2) / µm</translation>
+        <source>U (k = 2) by source, weakest direction / mm</source>
+        <translation>各来源的 U (k = 2)，最弱方向 / mm</translation>
     </message>
     <message>
         <source>Postures: tilt / °</source>
@@ -5151,16 +5158,12 @@ mm</translation>
         <translation>远离相机</translation>
     </message>
     <message>
-        <source>combined</source>
-        <translation>合成</translation>
+        <source>Weakest direction: ({0})</source>
+        <translation>最弱方向：({0})</translation>
     </message>
     <message>
-        <source>Weakest direction ({0}): U = {1} µm</source>
-        <translation>最弱方向 ({0})：U = {1} µm</translation>
-    </message>
-    <message>
-        <source>* Assumed: not stated in file</source>
-        <translation>* 假定值：文件未给出</translation>
+        <source>Assumed: not stated in file</source>
+        <translation>假定：文件中未给出</translation>
     </message>
     <message>
         <source>Images are correlated: noise variance × {0}</source>
@@ -5648,18 +5651,6 @@ mm</translation>
         <translation>请输入主管的姓名。</translation>
     </message>
     <message>
-        <source>Bending: {assumed:.0f} µm assumed; a press test measures it.</source>
-        <translation>弯曲：假定为 {assumed:.0f} µm；压力试验可测出实际值。</translation>
-    </message>
-    <message>
-        <source>Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}, overdue since {due}; at least {assumed:.0f} µm count. Repeat the press test.</source>
-        <translation>弯曲：{bending:.0f} ± {uncertainty:.0f} µm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.0f} µm 计算。请重做压力试验。</translation>
-    </message>
-    <message>
-        <source>Bending: {bending:.0f} ± {uncertainty:.0f} µm by press test of {day}.</source>
-        <translation>弯曲：{bending:.0f} ± {uncertainty:.0f} µm（{day} 的压力试验）。</translation>
-    </message>
-    <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
         <translation>Brown 镜头模型，{n_coefficients} 个系数；交叉验证误差 {held_out:.4f} px。</translation>
     </message>
@@ -6034,14 +6025,6 @@ mm</translation>
     <message>
         <source>Press test: U of the bending is {uncertainty:.4f} mm, too large to count.</source>
         <translation>压力试验：弯曲的 U 为 {uncertainty:.4f} mm，过大，不予采用。</translation>
-    </message>
-    <message>
-        <source>Press test: bending {bending:.0f} ± {uncertainty:.0f} µm.</source>
-        <translation>压力试验：弯曲 {bending:.0f} ± {uncertainty:.0f} µm。</translation>
-    </message>
-    <message>
-        <source>Press test: bending {bending:.0f} ± {uncertainty:.0f} µm: the stylus, its thread or the seat gives way. U of what the tip measures includes this.</source>
-        <translation>压力试验：弯曲 {bending:.0f} ± {uncertainty:.0f} µm：测杆、其螺纹或锥座发生变形。用该测头测量的 U 已包含此项。</translation>
     </message>
     <message>
         <source>Press the tip into the cone and keep it there.</source>
@@ -8248,6 +8231,18 @@ mm</translation>
         <translation>各姿态下该点的（最大 - 最小）/ 2：u {u:.4f}，v {v:.4f}，w {w:.4f} mm。</translation>
     </message>
     <message>
+        <source>Bending: {assumed:.3f} mm assumed; a press test measures it.</source>
+        <translation>弯曲：假定为 {assumed:.3f} mm；压力试验可测出实际值。</translation>
+    </message>
+    <message>
+        <source>Bending: {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}, overdue since {due}; at least {assumed:.3f} mm count. Repeat the press test.</source>
+        <translation>弯曲：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验，已于 {due} 到期）；至少按 {assumed:.3f} mm 计算。请重做压力试验。</translation>
+    </message>
+    <message>
+        <source>Bending: {bending:.3f} ± {uncertainty:.3f} mm by press test of {day}.</source>
+        <translation>弯曲：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
+    </message>
+    <message>
         <source>It is a whole project: save the calibration of the one camera by Tools, Camera Calibration, Save, as XML.</source>
         <translation>它是整个项目：请通过 Tools、Camera Calibration、Save 将这一台相机的标定保存为 XML。</translation>
     </message>
@@ -8262,6 +8257,14 @@ mm</translation>
     <message>
         <source>Lean the pen in the cone to all sides</source>
         <translation>在锥孔中向各方向倾斜光笔</translation>
+    </message>
+    <message>
+        <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm.</source>
+        <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm。</translation>
+    </message>
+    <message>
+        <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm: the stylus, its thread or the seat gives way. U of what the tip measures includes this.</source>
+        <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm：测杆、其螺纹或锥座发生变形。用该测头测量的 U 已包含此项。</translation>
     </message>
     <message>
         <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.</source>
@@ -9820,6 +9823,10 @@ mm</translation>
         <translation>各 LED 的残差 / px</translation>
     </message>
     <message>
+        <source>U (k = 2) by source, weakest direction / µm</source>
+        <translation>各来源的 U (k = 2)，最弱方向 / µm</translation>
+    </message>
+    <message>
         <source>Tip per image relative to the cone / µm</source>
         <translation>单幅图像测头相对锥孔的偏差 / µm</translation>
     </message>
@@ -9844,16 +9851,8 @@ mm</translation>
         <translation>LED</translation>
     </message>
     <message>
-        <source>all</source>
-        <translation>合成</translation>
-    </message>
-    <message>
         <source>RMS residual per image / px</source>
         <translation>各图像的残差均方根 / px</translation>
-    </message>
-    <message>
-        <source>Uncertainty budget U (k = 2) / µm</source>
-        <translation>各来源的 U (k = 2) / µm</translation>
     </message>
     <message>
         <source>Residuals over the image × {0}</source>

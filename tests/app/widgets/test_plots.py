@@ -12,8 +12,11 @@ from pytestqt.qtbot import QtBot
 from tests.app.pictures import colors_in
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.arrows import arrow_scale
+from lightpen_app.look.budget_figure import budget_figure
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
+from lightpen_app.steps.review.budget_plot import BudgetPlot
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import (
     ArrowPlot,
@@ -22,8 +25,9 @@ from lightpen_app.steps.review.residual_plots import (
     MisfitPlot,
 )
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.plot_canvas import Canvas
-from lightpen_app.widgets.plots import Axes, Curve, Plot, TracePlot
+from lightpen_app.widgets.plots import Curve, Plot, TracePlot
 
 IMAGES = np.arange(1.0, 6.0)
 VALUES = np.array([0.06, 0.05, np.nan, 0.07, 0.06])
@@ -34,14 +38,14 @@ def numbers(plot: Plot, column: str) -> FloatArray:
     return np.array(plot.columns()[column], dtype=np.float64)
 
 
-def show(qtbot: QtBot, plot: Plot) -> None:
+def show(qtbot: QtBot, plot: Figure) -> None:
     qtbot.addWidget(plot)
     plot.resize(360, 240)
     plot.show()
     QApplication.processEvents()
 
 
-def shown_colors(plot: Plot) -> set[str]:
+def shown_colors(plot: Figure) -> set[str]:
     QApplication.processEvents()
     return colors_in(plot.grab().toImage())
 
@@ -273,35 +277,50 @@ def test_a_label_in_a_csv_file_is_one_cell_and_no_formula(qtbot: QtBot) -> None:
     assert plot.csv().decode().splitlines() == lines
 
 
-def test_labels_that_have_no_room_beside_each_other_stand_on_lines(
+def test_the_budget_is_sorted_and_says_what_is_assumed_and_the_limit(
     qtbot: QtBot,
 ) -> None:
-    plot = BarPlot(Axes("Parts"), [Curve("x_um", "x")], "part")
+    shares = (
+        (ContributionName.NOISE, 0.003, False),
+        (ContributionName.FORM, 0.004, True),
+        (ContributionName.CAMERA, 0.0, False),
+    )
+    plot = BudgetPlot()
     show(qtbot, plot)
-    parts = ["noise", "ball, cone *", "warmth *", "camera", "all"]
 
-    plot.resize(900, 300)
-    plot.set_data(parts, np.ones(5))
-    assert plot.labels() == tuple(parts)
+    plot.set_value(budget_figure(shares, 0.005, 0.012))
 
-    plot.resize(300, 300)
-    qtbot.waitUntil(lambda: plot.labels() != tuple(parts))
+    assert plot.csv().decode().splitlines() == [
+        "part,expanded_uncertainty_mm,assumed",
+        "combined,0.005,false",
+        '"form of ball, cone",0.004,true',
+        "noise,0.003,false",
+        "camera,0,false",
+    ]
+    within = shown_colors(plot)
+    assert DARK.accent in within
+    assert DARK.bad not in within
 
-    assert plot.labels() == ("noise", "\nball, cone *", "warmth *", "\ncamera", "all")
+    plot.set_value(budget_figure(shares, 0.005, 0.004))
+
+    assert DARK.bad in shown_colors(plot)  # beyond its limit
 
 
-def test_labels_of_many_bars_are_written_upwards(qtbot: QtBot) -> None:
-    plot = BarPlot(Axes("Parts"), [Curve("x_um", "x")], "part")
+def test_the_bars_of_a_budget_are_as_long_as_their_values(qtbot: QtBot) -> None:
+    plot = BudgetPlot()
     show(qtbot, plot)
-    plot.resize(260, 300)
-    labels = ("form of ball, cone *",) * 14
+    shares = ((ContributionName.NOISE, 0.001, False),)
 
-    plot.set_data(labels, np.ones(14))
+    plot.set_value(budget_figure(shares, 0.004, None))
 
-    qtbot.waitUntil(lambda: plot.labels() == labels)  # none on a second line
-    shown = plot.grab().toImage()
-    plot.set_data((*labels[:-1], ""), np.ones(14))
-    qtbot.waitUntil(lambda: plot.grab().toImage() != shown)  # the last one was drawn
+    image = plot.grab().toImage()
+    lengths = [
+        sum(image.pixelColor(x, y).name() == DARK.accent for x in range(image.width()))
+        for y in range(image.height())
+    ]
+    longest = max(lengths)
+    others = [n for n in lengths if 0 < n < 0.9 * longest]
+    assert max(others) == pytest.approx(longest / 4, abs=2)
 
 
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:

@@ -9,8 +9,9 @@ from PySide6.QtGui import QImage, QPainter
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.theme import TextSize, font
+from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.plot_canvas import Canvas
-from lightpen_app.widgets.plots import Axes, Curve, TracePlot
+from lightpen_app.widgets.plots import Curve, TracePlot
 
 
 def shown(qtbot: QtBot, plot: TracePlot) -> TracePlot:

@@ -91,9 +91,10 @@ class DetailTabs(QTabWidget):
 
     def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
         solution, failure = self._run.status.solution, self._run.status.failure
-        if panel.value() is not solution:
-            panel.set_value(solution)
         setup, residuals = self._run.status.setup, self._residuals.content_so_far()
+        if panel.value() is not solution:
+            limit = None if setup is None else setup.limits.max_uncertainty
+            panel.set_value(solution, limit)
         if failure is not None and setup is not None and residuals is not None:
             residuals.set_failed(failure, setup.rig)
 

@@ -7,7 +7,8 @@ from functools import partial
 import numpy as np
 from PySide6.QtCore import QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeySequence, QShortcut, QUndoStack
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen.formats.decoding import full_scale_of
@@ -25,9 +26,10 @@ from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import NO_ARROWS, Arrows, ResidualView
 from lightpen_app.widgets.camera_switch import CameraSwitch
+from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.image_view import Marker
-from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
 from lightpen_app.work.job import LatestJob, Report
@@ -49,11 +51,13 @@ class _Decoded:
     size: QSize
 
 
-class ImagesPanel(Translated, QWidget):
+class ImagesPanel(ResponsiveLayout, Translated, QWidget):
     """Shows the images of a solution; requests to exclude or include some.
 
     Delete excludes the selected images, Insert includes them.
     """
+
+    narrow_below = 90 * GRID  # px; then the plot is below the image
 
     # list of int: numbers of images
     exclude_requested = Signal(list)
@@ -65,6 +69,7 @@ class ImagesPanel(Translated, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._solution: Solution | None = None
+        self._room = NO_ROOM
         self._why_locked = ""
         self._job = LatestJob(self)
         self._loading: tuple[RecordSource, int, int] | None = None
@@ -87,19 +92,15 @@ class ImagesPanel(Translated, QWidget):
         self._card = PlotCard(self._misfits, "misfit-of-images")
 
         # Layout
-        layout = grid_layout(self, margins=(0, GRID, 0, 0))
+        self._grid = layout = grid_layout(self, margins=(0, GRID, 0, 0))
         layout.addWidget(self._table, 0, 0, 4, 1)
         layout.addWidget(self._switch, 4, 0)  # the image is too narrow for it
         layout.addWidget(self._count, 5, 0)
         horizontal_layout(layout, (self._exclude, 1), (self._include, 1), at=(6, 0))
         layout.addWidget(self._undo, 7, 0)
-        layout.addWidget(self._view, 0, 1)
-        layout.addWidget(self._caption, 1, 1)
-        layout.addWidget(self._card, 3, 1, 5, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
-        layout.setRowStretch(0, VIEW_SHARE)
-        layout.setRowStretch(3, PLOT_SHARE)
+        self._use_room()
 
         # Connections
         self._table.number_changed.connect(self._on_choice_changed)
@@ -117,6 +118,20 @@ class ImagesPanel(Translated, QWidget):
 
         self._retranslate()
 
+    @override
+    def _use_room(self) -> None:
+        """Place the plot beside the image, or below it."""
+        is_narrow, grid = self._room.is_narrow, self._grid
+        grid.addWidget(self._view, 0, 1, 1 if is_narrow else 7, 1)
+        grid.addWidget(self._caption, 1 if is_narrow else 7, 1)
+        if is_narrow:
+            grid.addWidget(self._card, 3, 1, 5, 1)
+        else:
+            grid.addWidget(self._card, 0, 2, 8, 1)
+        grid.setColumnStretch(2, 0 if is_narrow else 1)
+        grid.setRowStretch(0, VIEW_SHARE)
+        grid.setRowStretch(3, PLOT_SHARE if is_narrow else 0)
+
     def cards(self) -> Sequence[PlotCard]:
         """Return the plot with its menu."""
         return (self._card,)
@@ -125,7 +140,7 @@ class ImagesPanel(Translated, QWidget):
         """Return the displayed solution."""
         return self._solution
 
-    def set_value(self, solution: Solution | None) -> None:
+    def set_value(self, solution: Solution | None, _limit: float | None = None) -> None:
         """Show the images of another solution; the chosen ones stay chosen."""
         before, self._solution = self._solution, solution
         self._is_awaited = False
@@ -329,10 +344,11 @@ class ImagesPanel(Translated, QWidget):
         ):
             widget.setVisible(not enlarged)
         self._switch.setVisible(not enlarged and self._is_of_rig())
-        layout = self.layout()
-        assert isinstance(layout, QGridLayout)
-        layout.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
-        layout.setRowStretch(0, 0 if enlarged else VIEW_SHARE)
+        self._grid.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
+        if self._room.is_narrow:
+            self._grid.setRowStretch(0, 0 if enlarged else VIEW_SHARE)
+        else:
+            self._grid.setColumnStretch(1, 0 if enlarged else 1)
 
     def _on_exclude_clicked(self) -> None:
         self._exclude_images(

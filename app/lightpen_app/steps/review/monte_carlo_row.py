@@ -10,7 +10,7 @@ from lightpen.estimation.statistics.workers import local_workers
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.record.swings.solving import Solution
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
-from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, text_label
@@ -169,13 +169,13 @@ class MonteCarloRow(Translated, QWidget):
 
     def _figures(self, found: MonteCarlo) -> Figures:
         """Return U by both, and their difference over its standard error."""
-        by_trials = COVERAGE_FACTOR * found.deviation * MICROMETRES
-        within = COVERAGE_FACTOR * found.precision * MICROMETRES
-        by_budget = COVERAGE_FACTOR * found.linear * MICROMETRES
+        by_trials = COVERAGE_FACTOR * found.deviation
+        within = COVERAGE_FACTOR * found.precision
+        by_budget = COVERAGE_FACTOR * found.linear
         rows = (
-            (self.tr("U (k = 2) by Monte Carlo / \xb5m"), by_trials, within),
-            (self.tr("its standard error / µm"), within, within),
-            (self.tr("U (k = 2) by uncertainty budget / µm"), by_budget, within),
+            (self.tr("U (k = 2) by Monte Carlo / mm"), by_trials, within),
+            (self.tr("its standard error / mm"), within, within),
+            (self.tr("U (k = 2) by uncertainty budget / mm"), by_budget, within),
         )
         cells = [
             tuple(

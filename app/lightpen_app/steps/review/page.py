@@ -197,7 +197,9 @@ class ReviewPage(Page):
         self._view.set_solving(now.is_solving)
         self._press.follow(now)
         if now.assessment is not before.assessment:
-            self._view.result.set_value(reviewed_result(now))  # also while hidden
+            reviewed = reviewed_result(now)
+            self._view.summary.set_value(reviewed)
+            self._view.result.set_value(reviewed)  # also while hidden
         if self.isVisible():
             self._refresh()
         self.changed.emit()

@@ -13,7 +13,7 @@ from lightpen.formats.files import write_whole
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.plots import Plot
+from lightpen_app.widgets.figure import Figure
 from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
@@ -40,7 +40,7 @@ class PlotCard(Translated, QFrame):
     saved = Signal(str)  # text for the user: where
     failed = Signal(str)  # text for the user
 
-    def __init__(self, plot: Plot, file_stem: str) -> None:
+    def __init__(self, plot: Figure, file_stem: str) -> None:
         super().__init__()
         self.plot = plot
         self._file_stem = file_stem

@@ -14,23 +14,24 @@ from lightpen.estimation.reports.methods import (
     two_stage_difference,
 )
 from lightpen.model.camera import Camera
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rig import Rig
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.failed_swing import FailedSwing
+from lightpen_app.look.budget_figure import budget_figure
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.phrases import share_text
-from lightpen_app.look.quantities import AXES, MICROMETRES, micrometres_text, mm_text
+from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED
+from lightpen_app.steps.review.budget_plot import BudgetPlot
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import ArrowPlot, DotPlot, Histogram
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
 from lightpen_app.widgets.camera_switch import CameraSwitch
+from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.plots import Axes, Curve
+from lightpen_app.widgets.plots import Curve
 from lightpen_app.widgets.translated import Translated
 
 SETTLED = 1e-5  # mm; later steps of the iteration cannot be distinguished on a plot
@@ -46,6 +47,7 @@ class PlotsPanel(Translated, QWidget):
     def __init__(self, cards: Sequence[PlotCard]) -> None:
         super().__init__()
         self._solution: Solution | None = None
+        self._limit: float | None = None  # of U, mm
 
         # Widgets
         self._grid = PlotGrid(cards)
@@ -61,9 +63,9 @@ class PlotsPanel(Translated, QWidget):
         """Return the solution that is shown."""
         return self._solution
 
-    def set_value(self, solution: Solution | None) -> None:
-        """Show another solution."""
-        self._solution = solution
+    def set_value(self, solution: Solution | None, limit: float | None = None) -> None:
+        """Show another solution, with its limit of U in mm."""
+        self._solution, self._limit = solution, limit
         if solution is not None:
             self._show(solution)
 
@@ -212,9 +214,7 @@ class UncertaintyPanel(PlotsPanel):
 
     def __init__(self) -> None:
         # Widgets
-        self._budget = BarPlot(
-            Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES], "part"
-        )
+        self._budget = BudgetPlot()
         self._postures = PosturePlot(Axes(""))
         super().__init__(
             [
@@ -244,7 +244,9 @@ class UncertaintyPanel(PlotsPanel):
 
     @override
     def _retranslate(self) -> None:
-        self._budget.set_axes(Axes(self.tr("U (k = 2) by source / µm")))
+        self._budget.set_axes(
+            Axes(self.tr("U (k = 2) by source, weakest direction / mm"))
+        )
         self._postures.set_axes(
             Axes(
                 self.tr("Postures: tilt / \xb0"),
@@ -257,20 +259,13 @@ class UncertaintyPanel(PlotsPanel):
 
     def _show_budget(self, solution: Solution) -> None:
         budget = reported(solution.calibration).budget
-        parts = {
-            share_text(share.name) + (" *" if share.assumed else ""): share.covariance
-            for share in budget.shares
-        }
-        parts[self.tr("combined")] = budget.covariance
-        expanded = np.array([_expanded(part) for part in parts.values()]) * MICROMETRES
-        self._budget.set_data(list(parts), *expanded.T)
-        weakest = self.tr("Weakest direction ({0}): U = {1} µm").format(
-            ", ".join(f"{share:.2f}" for share in budget.weakest_direction.tolist()),
-            micrometres_text(budget.weakest_uncertainty),
-        )
-        texts = [weakest]
+        parts = ((s.name, budget.weakest_share(s), s.assumed) for s in budget.shares)
+        whole = budget.weakest_uncertainty
+        self._budget.set_value(budget_figure(parts, whole, self._limit))
+        along = ", ".join(f"{x:.2f}" for x in budget.weakest_direction.tolist())
+        texts = [self.tr("Weakest direction: ({0})").format(along)]
         if any(share.assumed for share in budget.shares):
-            texts.append(self.tr("* Assumed: not stated in file"))
+            texts.append(self.tr("Assumed: not stated in file"))
         if budget.correlation_factor > 1:
             text = self.tr("Images are correlated: noise variance \u00d7 {0}")
             texts.append(text.format(f"{budget.correlation_factor:.2f}"))
@@ -285,7 +280,7 @@ class MethodsPanel(PlotsPanel):
     def __init__(self) -> None:
         # Widgets
         self._objective = LinePlot(Axes(""), [Curve("objective_mm2")])
-        self._change = LinePlot(Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES])
+        self._change = LinePlot(Axes(""), [Curve(f"{axis}_mm", axis) for axis in AXES])
         super().__init__(
             [
                 PlotCard(self._objective, "convergence-objective"),
@@ -318,7 +313,7 @@ class MethodsPanel(PlotsPanel):
         steps = np.arange(len(fit.objectives), dtype=np.float64)
         settled = float(np.sum(fit.increments > SETTLED) + 1)
         self._objective.set_data(steps, fit.objectives, until=settled)
-        tips = (fit.iterates[:, :3] - fit.tip_pen) * MICROMETRES
+        tips = fit.iterates[:, :3] - fit.tip_pen
         self._change.set_data(steps, *tips.T, until=settled)
         self._retranslate()
 
@@ -328,7 +323,7 @@ class MethodsPanel(PlotsPanel):
             Axes(self.tr("Objective / mm\xb2"), self.tr("iteration"))
         )
         self._change.set_axes(
-            Axes(self.tr("Difference from final value / µm"), self.tr("iteration"))
+            Axes(self.tr("Difference from final value / mm"), self.tr("iteration"))
         )
         self._table.setAccessibleName(self.tr("Two-stage method and joint fit"))
         self._reports.setText(self.tr("Report this method"))
@@ -354,11 +349,6 @@ class MethodsPanel(PlotsPanel):
             for _, values, rms in rows
         )
         return Figures(columns, tuple(name for name, *_ in rows), cells)
-
-
-def _expanded(covariance: FloatArray) -> FloatArray:
-    """Return U (k = 2) of the tip, (3,), mm, from a covariance (6, 6), mm^2."""
-    return COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[:3])
 
 
 def _rounded(values: FloatArray) -> tuple[str, ...]:

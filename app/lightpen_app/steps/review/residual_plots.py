@@ -11,7 +11,8 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen_app.look.arrows import MANY, arrow_lines, arrow_scale, cell_means
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
-from lightpen_app.widgets.plots import Axes, Plot
+from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.plots import Plot
 
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.94

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
 from lightpen.arrays import FloatArray
@@ -17,13 +18,14 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.quantities import AXES, micrometres_text, mm_text
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import day_text, shortened
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -41,6 +43,7 @@ class ReviewedResult:
     solution: Solution
     names: Names  # of the swing
     assessment: SwingAssessment
+    limit: float | None = None  # of U, mm
 
     @property
     def tip_pen(self) -> FloatArray:
@@ -52,16 +55,22 @@ class ReviewedResult:
         """U (k = 2) along x, y and z, (3,), mm."""
         return reported(self.solution.calibration).expanded_uncertainty[:3]
 
+    @property
+    def weakest_uncertainty(self) -> float:
+        """U (k = 2) along the weakest direction, mm."""
+        return reported(self.solution.calibration).budget.weakest_uncertainty
+
 
 def reviewed_result(status: SwingStatus) -> ReviewedResult | None:
     """Return what a swing is solved to; None until it is."""
     if status.solution is None or status.assessment is None:
         return None
-    return ReviewedResult(status.solution, status.names, status.assessment)
+    limit = None if status.setup is None else status.setup.limits.max_uncertainty
+    return ReviewedResult(status.solution, status.names, status.assessment, limit)
 
 
-class ResultPanel(Translated, QFrame):
-    """Shows an outcome."""
+class TipSummary(Translated, QFrame):
+    """Shows U beside its limit, in large figures, and the tip."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -69,8 +78,60 @@ class ResultPanel(Translated, QFrame):
         self.setProperty("area", "panel")
 
         # Widgets
+        self._of_u = text_label(TextSize.SMALL, Tone.QUIET)
+        self._u = text_label(TextSize.DISPLAY)
+        self._limit = text_label(TextSize.LEAD, Tone.QUIET)
+        for label in (self._u, self._limit):
+            label.setWordWrap(False)
         self._heading = text_label(TextSize.SMALL, Tone.QUIET)
         self._readout = TipReadout()
+
+        # Layout
+        margins = 2 * GRID, GRID, 2 * GRID, GRID
+        layout = horizontal_layout(self, spacing=4 * GRID, margins=margins)
+        left = vertical_layout(layout, self._of_u, spacing=0, stretch=1)
+        bottom = Qt.AlignmentFlag.AlignBottom
+        row = (self._u, 0, bottom), (self._limit, 0, bottom), 1
+        horizontal_layout(left, *row, spacing=2 * GRID)
+        vertical_layout(layout, self._heading, self._readout, spacing=0, stretch=1)
+
+        self._retranslate()
+
+    def set_value(self, value: ReviewedResult | None) -> None:
+        """Show another outcome, or none."""
+        self._value = value
+        self._retranslate()
+
+    def _retranslate(self) -> None:
+        self._of_u.setText(self.tr("U (k = 2) of the tip in its weakest direction"))
+        outcome = self._value
+        if outcome is None:
+            self._heading.setText(self.tr("Tip in the pen frame / mm, U (k = 2)"))
+            self._readout.set_value(None)
+            self._u.setText("\N{EN DASH}")
+            self._limit.clear()
+            return
+        text = self.tr("Tip {0} in the frame of pen {1} / mm, U\xa0(k\xa0=\xa02)")
+        names = shortened(outcome.names.tip), shortened(outcome.names.pen)
+        self._heading.setText(text.format(*names))
+        self._readout.set_value(_tip_value(outcome))
+        u, limit = outcome.weakest_uncertainty, outcome.limit
+        self._u.setText(f"{mm_text(u)} mm")
+        set_tone(self._u, Tone.BAD if limit is not None and u > limit else Tone.PLAIN)
+        limit_words = self.tr("limit {0} mm")
+        self._limit.setText("" if limit is None else limit_words.format(mm_text(limit)))
+
+
+class ResultPanel(Translated, QFrame):
+    """Shows what an outcome is compared with."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value: ReviewedResult | None = None
+        self.setProperty("area", "panel")
+
+        # Widgets
+        self._comparison = NumberTable()
         self._as_found = SignLabel()
         self._halves = SignLabel()
         self._self_check = SignLabel()
@@ -87,22 +148,18 @@ class ResultPanel(Translated, QFrame):
         )
 
         # Layout
-        layout = vertical_layout(
-            self, self._heading, self._readout, spacing=GRID // 2, margins=2 * GRID
-        )
-        layout.addSpacing(GRID)
+        layout = vertical_layout(self, spacing=GRID // 2, margins=2 * GRID)
         fill(layout, self._as_found, self._halves, self._self_check, self._bending)
         fill(layout, self._images)
         layout.addSpacing(GRID)
+        fill(layout, self._comparison)
         fill(layout, self._postures, (self._dial, 100), 1)
 
         self.set_large(False)
         self._retranslate()
 
     def set_large(self, large: bool) -> None:
-        """Show larger figures, and the postures, in a large window."""
-        self._readout.set_large(large)
-        set_size(self._heading, TextSize.LEAD if large else TextSize.SMALL)
+        """Show the postures, too, in a large window."""
         for widget in (self._postures, self._dial):
             widget.setVisible(large)
 
@@ -142,9 +199,8 @@ class ResultPanel(Translated, QFrame):
     def _refresh(self) -> None:
         outcome = self._value
         self._show_bending()
-        self._heading.setText(self._heading_text(outcome))
         if outcome is None:
-            self._readout.set_value(None)
+            self._comparison.set_value(Figures())
             self._as_found.set_value(StatusMessage())
             self._halves.set_value(StatusMessage())
             self._self_check.set_value(StatusMessage())
@@ -152,7 +208,8 @@ class ResultPanel(Translated, QFrame):
             self._dial.set_value(DialValue())
             return
         self._dial.set_value(_postures(outcome.solution.calibration.coverage))
-        self._readout.set_value(_tip_value(outcome))
+        self._comparison.setAccessibleName(self.tr("The tip beside others"))
+        self._comparison.set_value(self._compared(_tip_value(outcome)))
         self._as_found.set_value(self._as_found_message(outcome.assessment))
         self._halves.set_value(self._halves_message(outcome.solution))
         check = outcome.solution.calibration.self_check
@@ -167,11 +224,17 @@ class ResultPanel(Translated, QFrame):
             else StatusMessage(text, Sign.RING, Tone.PLAIN)
         )
 
-    def _heading_text(self, outcome: ReviewedResult | None) -> str:
-        if outcome is None:
-            return self.tr("Tip in the pen frame, U (k = 2)")
-        text = self.tr("Tip {0} in the frame of pen {1}, U\xa0(k\xa0=\xa02)")
-        return text.format(shortened(outcome.names.tip), shortened(outcome.names.pen))
+    def _compared(self, value: TipValue) -> Figures:
+        """Return the tip beside the previous and the nominal one, mm."""
+        names = (
+            self.tr("Previous, {0} / mm").format(value.since),
+            self.tr("Change / mm"),
+            self.tr("Nominal / mm"),
+            self.tr("Deviation / mm"),
+        )
+        rows = zip(names, value.comparisons(), strict=True)
+        known = [(name, cells) for name, cells in rows if cells]
+        return Figures(AXES, tuple(n for n, _ in known), tuple(c for _, c in known))
 
     def _as_found_message(self, assessment: SwingAssessment) -> StatusMessage:
         """Return the deviation of the tip as found, with its limit."""
@@ -198,7 +261,7 @@ class ResultPanel(Translated, QFrame):
             else self.tr("Odd and even images differ significantly: {0}")
         )
         parts = map("\xa0".join, zip(AXES, figures, strict=True))
-        text = text.format(", ".join(parts) + "\xa0\xb5m")
+        text = text.format(", ".join(parts) + "\xa0mm")
         return StatusMessage.good(text) if agree else StatusMessage.warning(text)
 
     def _self_check_message(self, check: SelfCheck | None) -> StatusMessage:
@@ -248,16 +311,11 @@ def _postures(coverage: Coverage) -> DialValue:
 
 
 def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:
-    """Return lengths in micrometres, each with its U."""
-    pairs = zip(_texts(values), _texts(u), strict=True)
+    """Return lengths in mm, each with its U."""
+    pairs = zip(_in_mm(values), _in_mm(u), strict=True)
     return tuple(map("\xa0\N{PLUS-MINUS SIGN}\xa0".join, pairs))
 
 
 def _in_mm(values: FloatArray) -> tuple[str, ...]:
     """Return lengths in mm."""
     return tuple(map(mm_text, values.tolist()))
-
-
-def _texts(values: FloatArray) -> tuple[str, ...]:
-    """Return lengths in micrometres."""
-    return tuple(map(micrometres_text, values.tolist()))

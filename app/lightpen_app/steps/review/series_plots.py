@@ -1,32 +1,20 @@
 """Plots of few values: bars side by side, curves with marks, and postures as dots."""
 
 from collections.abc import Sequence
-from math import ceil
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF
-from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QGraphicsEllipseItem
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen_app.look.theme import GRID, TextSize, colors_of, font
+from lightpen_app.look.theme import colors_of
 from lightpen_app.steps.review.residual_plots import SquarePlot
-from lightpen_app.widgets.plots import (
-    DASHES,
-    LINE,
-    SYMBOL,
-    SYMBOLS,
-    TONES,
-    Axes,
-    Column,
-    Curve,
-    Plot,
-)
+from lightpen_app.widgets.figure import Axes, Column
+from lightpen_app.widgets.plots import DASHES, LINE, SYMBOL, SYMBOLS, TONES, Curve, Plot
 
-MOST_LINES = 2  # of labels below the bars; where more are needed, they stand upright
 GROUP = 0.8  # of the room for a label, that its bars fill
 FARTHEST = 36.0  # degrees of tilt that are always shown
 
@@ -65,24 +53,14 @@ class BarPlot(NamedPlot):
 
     def __init__(self, axes: Axes, series: Sequence[Curve], label_column: str) -> None:
         self._bars: list[pg.BarGraphItem] = []
-        self._labels: tuple[str, ...] = ()
-        self._labels_on_lines: tuple[str, ...] = ()
         super().__init__(axes, series)
         self._label_column = label_column
-        self._item.getAxis("bottom").setStyle(hideOverlappingLabels=False)
         for _ in series:
             bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
             self._item.addItem(bars)
             self._bars.append(bars)
 
-        # Connections
-        self._item.vb.sigResized.connect(self._show_labels)
-
         self._restyle()
-
-    def labels(self) -> tuple[str, ...]:
-        """Return the labels as they are drawn, each with the ends of lines above it."""
-        return self._labels_on_lines
 
     def set_data(self, labels: Sequence[str], *values: FloatArray) -> None:
         """Show values (N,) of each series for N labels; NaN leaves a gap."""
@@ -93,33 +71,10 @@ class BarPlot(NamedPlot):
             bars.setOpts(
                 x=places + offset, height=np.nan_to_num(value), width=0.9 * width
             )
-        self._labels = tuple(labels)
-        self._show_labels()
+        self._item.getAxis("bottom").setTicks([list(enumerate(labels))])
         self._columns = {self._label_column: tuple(labels), **self._named(*values)}
         edges = np.array([-0.5, len(labels) - 0.5])
         self._fit(edges, np.concatenate(values), y_zero=True)
-
-    def _show_labels(self) -> None:
-        """Write the labels on lines that keep them clear of each other, or upwards."""
-        metrics = QFontMetricsF(font(TextSize.SMALL))
-        widest = max(map(metrics.horizontalAdvance, self._labels), default=0.0)
-        self._graphics.fit()
-        slot = self._item.vb.width() / max(len(self._labels), 1)
-        n_lines = ceil((widest + GRID) / max(slot, 1.0))
-        axis = self._item.getAxis("bottom")
-        axis.upright = self._labels if n_lines > MOST_LINES else ()
-        if axis.upright:
-            n_lines = 1
-        self._labels_on_lines = tuple(
-            "\n" * (i % n_lines) + label for i, label in enumerate(self._labels)
-        )
-        axis.setTicks([list(enumerate(self._labels_on_lines))])
-        # pyqtgraph gives lines of text four fifths of the height that they take.
-        height = n_lines * metrics.lineSpacing() + GRID
-        if axis.upright:
-            height = widest + 2 * GRID
-        is_fixed = axis.upright or (n_lines > 1 and not self._axes.x)
-        axis.setHeight(height if is_fixed else None)
 
     @override
     def _restyle(self) -> None:

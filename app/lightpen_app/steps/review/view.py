@@ -15,7 +15,7 @@ from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.review.detail_tabs import DetailTabs
 from lightpen_app.steps.review.message_list import StatusMessageList
 from lightpen_app.steps.review.next_tips import NextTipsRow
-from lightpen_app.steps.review.result_panel import ResultPanel
+from lightpen_app.steps.review.result_panel import ResultPanel, TipSummary
 from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.view_state import ReviewPageState
 from lightpen_app.widgets.page_scroll import PageScroll
@@ -30,15 +30,14 @@ from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
-RESULT_WIDTH, LARGE_RESULT_WIDTH = 57 * GRID, 88 * GRID
-ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 
 
 class ReviewView(ResponsiveLayout, Translated, QWidget):
-    """Shows a solved swing: result and details."""
+    """Shows a solved swing: U, the tip and a sentence; all else in tabs."""
 
-    narrow_below = 112 * GRID  # px; then it has the result in a tab
-    very_large_from = QSize(190 * GRID, 100 * GRID)  # px; then the result is larger
+    # px; then tip and buttons are in the first tab, too
+    narrow_below, low_below = 112 * GRID, 60 * GRID
+    very_large_from = QSize(190 * GRID, 100 * GRID)  # px; then it has the postures
 
     def __init__(self, run: SwingRun, place: SavePlace) -> None:
         super().__init__()
@@ -61,25 +60,24 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.tools = ResultTools()
         self.next_tips = NextTipsRow()
         self.tabs = DetailTabs(run, place)
-        self._result_side = QWidget()
+        self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
         # Layout
         horizontal_layout(self._solving, (self._progress, 1), self.cancel)
         self._solving.hide()
-        self._scroll.setWidget(self.result)
-        self._result_box = vertical_layout(self._result_side, (self._scroll, 1))
-        self._buttons = vertical_layout(self._result_box, self.tools)
-        buttons = horizontal_layout(
-            self._buttons, (self.repeat, 1), (self.capture_more, 1)
-        )
-        fill(buttons, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
-        fill(self._result_box, self.next_tips)
-        layout = vertical_layout(self, self._banner, self.question, self.reason)
-        fill(layout, self.withdrawal)
-        fill(layout, self._solving, self._messages)
-        self._columns = horizontal_layout(layout, stretch=1, spacing=2 * GRID)
-        self._use_room()  # before the tabs: the order of the Tab key
-        self._columns.addWidget(self.tabs, 1)
+        self._scroll.setWidget(self._first)
+        self._first_box = vertical_layout(self._first, (self.result, 1))
+        row = horizontal_layout(self._buttons, (self.tools, 3))
+        self._button_rows = row
+        others = horizontal_layout(row, (self.repeat, 1), (self.capture_more, 1))
+        row.setStretchFactor(others, 2)
+        fill(others, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
+        self._box = layout = vertical_layout(self, self._banner, self.question)
+        fill(layout, self.reason, self.withdrawal, self._solving, self._messages)
+        fill(layout, (self.tabs, 1), self.next_tips)
+        self.tabs.insertTab(0, self._scroll, "")
+        self.tabs.setCurrentIndex(0)
+        self._use_room()
 
         # Connections
         self._patience.timeout.connect(self._solving.show)
@@ -134,14 +132,13 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
+        self.tabs.setTabText(0, self.tr("Result"))
         self.tabs.set_names(
             self.tr("Images"),
             self.tr("Residuals"),
             self.tr("Uncertainty"),
             self.tr("Two-stage"),
         )
-        if self._room.is_narrow:
-            self.tabs.setTabText(0, self.tr("Result"))
         self._scroll.setAccessibleName(self.tr("Result"))
         self.tabs.setAccessibleName(self.tr("Details"))
         self._progress.setAccessibleName(self.tr("Progress of the computation"))
@@ -170,18 +167,15 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
 
     @override
     def _use_room(self) -> None:
-        """Place the result beside the tabs, or as first tab of a narrow page."""
-        side = self._result_side
+        """Place tip and buttons around the tabs, or in the first of a small page."""
+        is_small = self._room.is_narrow or self._room.is_low
         self.result.set_large(self._room.is_very_large)
-        set_stacked(self._buttons, not self._room.is_narrow)
-        if self._room.is_narrow:
-            side.setMinimumWidth(0)
-            side.setMaximumWidth(ANY_WIDTH)
-            self.tabs.insertTab(0, side, self.tr("Result"))
-            self.tabs.setCurrentIndex(0)
-        else:
-            is_very_large = self._room.is_very_large
-            side.setFixedWidth(LARGE_RESULT_WIDTH if is_very_large else RESULT_WIDTH)
-            self._columns.insertWidget(0, side)
-            if side.parentWidget() is not None:  # else it would be a window
-                side.show()  # a tab that is not the current one is hidden
+        set_stacked(self._button_rows, self._room.is_narrow)
+        box = self._first_box if is_small else self._box
+        if box.indexOf(self.summary) >= 0:
+            return
+        around = self.result if is_small else self.tabs
+        box.insertWidget(box.indexOf(around), self.summary)
+        box.insertWidget(box.indexOf(around) + (not is_small), self._buttons)
+        for each in (self.summary, self._buttons):
+            each.show()

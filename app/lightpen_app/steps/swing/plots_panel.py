@@ -15,7 +15,8 @@ from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.plots import Axes, Curve, TracePlot
+from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.plots import Curve, TracePlot
 from lightpen_app.widgets.translated import Translated
 
 LEAST_HEIGHT = 15 * GRID

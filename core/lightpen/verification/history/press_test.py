@@ -115,9 +115,9 @@ def _assessment(bending: float, uncertainty: float) -> VerificationAssessment:
         return check(message("press-test.coarse", uncertainty=uncertainty), MORE_IMAGES)
     sigma = uncertainty / COVERAGE_FACTOR
     is_bent = bending**2 > chi_square_quantile(1, BY_CHANCE) * sigma**2
-    shown, u = 1000 * abs(bending), 1000 * uncertainty
+    shown = abs(bending)
     if is_bent and abs(bending) > ASSUMED:
-        said = message("press-test.gives-way", bending=shown, uncertainty=u)
+        said = message("press-test.gives-way", bending=shown, uncertainty=uncertainty)
         return check(said, STIFFEN)
-    said = message("press-test.steady", bending=shown, uncertainty=u)
+    said = message("press-test.steady", bending=shown, uncertainty=uncertainty)
     return accepted(said, KEEP, Grade.STEADY)

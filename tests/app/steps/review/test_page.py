@@ -79,12 +79,12 @@ from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import ResidualView
-from lightpen_app.steps.review.result_panel import ResultPanel
+from lightpen_app.steps.review.result_panel import ResultPanel, TipSummary
 from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.widgets.figure import MARK_HEIGHT, PNG_SCALE, Figure
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
-from lightpen_app.widgets.plots import MARK_HEIGHT, PNG_SCALE
 from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -228,6 +228,7 @@ class Bed:
         page.resize(1000, 600)
         page.show()
         page.entered()
+        choose_tab(page, "Images")
         self.qtbot.waitUntil(lambda: the(page, ResultPanel).value() is not None)
         self.qtbot.waitUntil(lambda: not is_unread(page))
         return page
@@ -341,6 +342,12 @@ def drag(canvas: QWidget, start: QPoint, end: QPoint) -> None:
         move = QMouseEvent(kind, place, seen_at, Qt.MouseButton.NoButton, LEFT, none)
         QApplication.sendEvent(canvas, move)
     QTest.mouseRelease(canvas, LEFT, pos=end)
+
+
+def choose_tab(page: ReviewPage, name: str) -> None:
+    tabs = the(page, QTabWidget)
+    names = [tabs.tabText(i) for i in range(tabs.count())]
+    tabs.setCurrentIndex(names.index(name))
 
 
 def look_at_all_tabs(page: ReviewPage) -> None:
@@ -555,18 +562,44 @@ def test_the_part_before_a_tip_turned_is_used_by_one_click(
     assert banner(page).word == "CHECK: More images"
 
 
+def test_one_number_is_large_and_the_page_has_one_unit(
+    page: ReviewPage, workbench: Workbench
+) -> None:
+    page.resize(1040, 640)
+    solution, setup = workbench.run.status.solution, workbench.run.status.setup
+    assert solution is not None
+    assert setup is not None
+    summary = the(page, TipSummary)
+    labels = [label for label in summary.findChildren(QLabel) if label.isVisible()]
+    largest = max(labels, key=lambda label: label.fontMetrics().height())
+    u = solution.calibration.budget.weakest_uncertainty
+    limit = setup.limits.max_uncertainty
+
+    assert largest.text() == f"{u:.4f} mm"
+    assert f"limit {limit:.4f} mm" in [label.text() for label in labels]
+    tabs = the(page, QTabWidget)
+    assert not tabs.isAncestorOf(summary)
+    for index in range(tabs.count()):
+        tabs.setCurrentIndex(index)
+        shown = [each for each in page.findChildren(QLabel) if each.isVisible()]
+        figures = [each for each in page.findChildren(Figure) if each.isVisible()]
+        words = [each.text() for each in shown]
+        words += [each.accessibleName() for each in figures]
+        assert not [text for text in words if "\u00b5m" in text]
+
+
 def test_without_an_earlier_result_that_is_reported(page: ReviewPage) -> None:
     assert readout(page).previous == readout(page).change == ()
     assert "No earlier result" in reported_of_result(page)
     assert page.lead() == "Next: accept the tip."  # none is in force until then
-    figure = r"-?\d\.\d\s\u00b1\s\d\.\d"
-    figures = f"x\\s{figure}, y\\s{figure}, z\\s{figure}\u00a0\u00b5m"
+    figure = r"-?0\.\d{4}\s\u00b1\s0\.\d{4}"
+    figures = f"x\\s{figure}, y\\s{figure}, z\\s{figure}\u00a0mm"
     agree = f"Odd and even images agree: {figures}"
     assert re.search(agree, reported_of_result(page)), reported_of_result(page)
     assert remarks(page) == ""
 
 
-def test_a_small_change_since_the_last_result_is_reported_in_micrometres(
+def test_a_small_change_since_the_last_result_is_reported_in_the_unit_of_the_page(
     bed: Bed,
 ) -> None:
     u = u_x(bed.solve())
@@ -577,7 +610,7 @@ def test_a_small_change_since_the_last_result_is_reported_in_micrometres(
     shown = readout(page)
     assert shown.since == f"{THEN:%Y-%m-%d}"
     x, y, z = (float(each.split()[0]) for each in shown.change)
-    assert (x, y, z) == pytest.approx((500 * u, 0.0, 0.0), abs=0.5)
+    assert (x, y, z) == pytest.approx((0.5 * u, 0.0, 0.0), abs=0.0005)
     assert banner(page).word == "PASS: Within limits"
 
 
@@ -600,7 +633,7 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> N
     bed.solve()
     page = bed.show()
     texts = [each.text() for each in page.findChildren(QLabel)]
-    assert "Tip T-10 in the frame of pen LP-04, U\xa0(k\xa0=\xa02)" in texts
+    assert "Tip T-10 in the frame of pen LP-04 / mm, U\xa0(k\xa0=\xa02)" in texts
     assert remarks(page) == ""
 
     names = replace(workbench.selection.preparation.names, tip="T-11")
@@ -961,9 +994,7 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
 def test_the_budget_is_checked_by_monte_carlo_on_request(
     page: ReviewPage, qtbot: QtBot
 ) -> None:
-    tabs = the(page, QTabWidget)
-    names = [tabs.tabText(i) for i in range(tabs.count())]
-    tabs.setCurrentIndex(names.index("Uncertainty"))
+    choose_tab(page, "Uncertainty")
     row = the(page, MonteCarloRow)
     type_number(the(row, NumberField), 20)
     start, cancel = row.findChildren(PushButton)
@@ -1254,17 +1285,17 @@ def test_the_plot_beside_the_images_is_enlarged_over_all_about_it(
 ) -> None:
     panel = the(page, ImagesPanel)
     card = the(panel, PlotCard)
-    before = card.height()
+    before = card.width()
     enlarge, *_ = card.actions_offered()
 
     enlarge.trigger()
     QApplication.processEvents()
-    assert card.height() > 1.5 * before
+    assert card.width() > 1.5 * before
     assert not the(panel, ImageTable).isVisible()
 
     enlarge.trigger()
     QApplication.processEvents()
-    assert card.height() == before
+    assert card.width() == before
     assert the(panel, ImageTable).isVisible()
 
 
@@ -1405,7 +1436,7 @@ def test_a_press_test_begins_a_swing_and_stands_below_the_tip(
     assert first.solution is not None
     firm = solve_again(first.solution, {2: str(Reason.TAKEN_OUT)})
     panel = the(page, ResultPanel)
-    assert any("4 µm assumed" in each for each in texts_of(panel))
+    assert any("0.004 mm assumed" in each for each in texts_of(panel))
 
     run.post(replace(first, pressed=firm, origin=Origin.LIVE), ())
     qtbot.waitUntil(lambda: any("Press test:" in each for each in texts_of(panel)))
@@ -1556,7 +1587,7 @@ def test_a_swing_without_a_tip_shows_its_cause_once_and_its_residuals(
     assert "did not converge" not in failed.lead()
     assert tabs.tabText(tabs.currentIndex()) == "Residuals"
     assert [tabs.isTabEnabled(i) for i in range(tabs.count())] == [
-        tabs.tabText(i) == "Residuals" for i in range(tabs.count())
+        tabs.tabText(i) in ("Result", "Residuals") for i in range(tabs.count())
     ]
     plots = [card.plot.columns() for card in failed.findChildren(PlotCard)]
     (leds,) = (columns for columns in plots if "rms_px" in columns)
