@@ -14,8 +14,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.labels import Labels, LabelStatus
 from lightpen.detection.labelling.spot_arrays import UNWHOLE
-from lightpen.detection.pose import Poses
-from lightpen.detection.single_pose import fit_pose
+from lightpen.detection.pose import Poses, fit_pose
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids

@@ -22,9 +22,8 @@ from lightpen.detection.labelling.labels import (
     track_spots,
 )
 from lightpen.detection.pixel_box import PixelBox
-from lightpen.detection.pose import MIN_POSE_LEDS, Poses
+from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_pose
 from lightpen.detection.reasons import UNFORESEEN, Reason
-from lightpen.detection.single_pose import fit_pose
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids

@@ -24,11 +24,9 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.robust_residuals import (
-    NOISE_FLOOR,
     cauchy_weights,
     disc_residuals,
     image_sigmas,
-    loss_curvature,
     normal_equations,
     robust_sigma,
 )
@@ -38,13 +36,13 @@ from lightpen.model.rigid import nearest_rotation, rotation_from_vector
 
 MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
-STEP_TOLERANCE = 1e-8  # of an angle in rad and of a translation over its length
-ROBUST_TOLERANCE = 1e-7  # likewise, of Newton's steps, which leave next to nothing
-ROUGHLY = 1e-4  # likewise; enough to begin to weight LEDs
-MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
+# Of an angle in rad and of a translation over its length:
+LINEAR = 1e-4  # leaves its square: the weights of LEDs are all that changes
+SETTLED = 1e-6  # leaves a sixteenth
+MAX_STEP = 0.2  # keeps an image of wrong LEDs from flying away
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
-RIDGE = 1e-12
-DIAGONAL = np.arange(6)
+TINY = 1e-12
+RIDGE, DAMPING = TINY * np.eye(6), 1 + 1e-9 * np.eye(6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +133,30 @@ def fit_poses(
     return replace(poses, residuals=poses.residuals * scales[..., None])
 
 
+def fit_pose(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    rotation: FloatArray,
+    translation: FloatArray,
+    sigmas: FloatArray,
+) -> Poses:
+    """Fit the pose of one image, (L, 2), from one near it; see `fit_poses`."""
+    R, t = rotation, translation
+    if camera.lens is LensModel.BROWN:  # by projected centres first, which is fast
+        seen = np.isfinite(pixels[:, 0])
+        vector, moved = cv2.solvePnPRefineLM(
+            *(pen.leds[seen], pixels[seen], camera.matrix, camera.distortion),
+            *(cv2.Rodrigues(R)[0], t.copy()),
+        )
+        R = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
+        t = np.asarray(moved, dtype=np.float64).reshape(3)
+    start = R[None], t[None]
+    return fit_poses(
+        camera, pen, pixels[None], *start, sigmas=sigmas[None], is_near=True
+    )
+
+
 def relative_sigmas(sigmas: FloatArray) -> FloatArray | None:
     """Return standard deviations (N, L) over the least of all, 1 or more.
 
@@ -175,9 +197,8 @@ def fit_reprojection(
     _require_seen(problem.pixels)
     R, t = rotations, translations
     if not is_near:
-        R, t = _descend(problem, R, t, robust=False, max_steps=3, tolerance=ROUGHLY)
-    R, t = _descend(problem, R, t, robust=True, tolerance=ROBUST_TOLERANCE)
-    return poses_at(R, t, *problem.residuals_with_jacobian(R, t), robust=True)
+        R, t, _, _ = _descend(problem, R, t, robust=False, max_steps=3)
+    return _poses_at(*_descend(problem, R, t, robust=True), robust=True)
 
 
 def fit_paper_poses(
@@ -210,8 +231,7 @@ def fit_paper_poses(
     ideal = replace(camera, distortion=np.zeros(5), lens=LensModel.BROWN)
     undistorted = ideal.pixels(normalised)
     problem = CameraReprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
-    R, t = _descend(problem, R, t, robust=False)
-    return poses_at(R, t, *problem.residuals_with_jacobian(R, t), robust=False)
+    return _poses_at(*_descend(problem, R, t, robust=False), robust=False)
 
 
 def start_poses(
@@ -272,13 +292,6 @@ class CameraReprojection:
         )
 
 
-def _own_sigma(residuals: FloatArray, weights: FloatArray, sigma: float) -> FloatArray:
-    """Return the noise of images that are clearly worse than the others, else 0, px."""
-    squares = np.nansum(weights[..., None] * residuals**2, axis=(1, 2))
-    own = np.sqrt(squares / np.maximum(2 * weights.sum(axis=1) - 6, 1))
-    return np.where(own > WORSE * sigma, own, 0.0)
-
-
 def _require_seen(pixels: FloatArray) -> None:
     n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
     if np.any(n_seen < MIN_POSE_LEDS):
@@ -294,47 +307,63 @@ def _descend(
     *,
     robust: bool,
     max_steps: int = MAX_STEPS,
-    tolerance: float = STEP_TOLERANCE,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the poses after Gauss-Newton steps, until these are small."""
-    seen = np.isfinite(problem.pixels[..., 0]).astype(float)
-    is_near = np.zeros(len(R), dtype=bool)
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return poses after Gauss-Newton steps, with residuals and derivatives there."""
     for _ in range(max_steps):
         residuals, J = problem.residuals_with_jacobian(R, t)
-        if robust:
-            sigmas = image_sigmas(residuals)
-            weights = cauchy_weights(residuals, sigmas)
-            H, g = normal_equations(J, residuals, weights)
-            if is_near.any():
-                curvature = loss_curvature(J, residuals, weights, sigmas)
-                H = H - is_near[:, None, None] * curvature
-        else:
-            H, g = normal_equations(J, residuals, seen)
-        step = np.einsum("nij,nj->ni", _inverse(H), g)
-        turn, move = step[:, :3], step[:, 3:]
-        squares = np.maximum(
-            np.einsum("ni,ni->n", turn, turn),
-            np.einsum("ni,ni->n", move, move) / np.einsum("ni,ni->n", t, t),
-        )
-        size = np.sqrt(squares)
-        step *= np.minimum(1, MAX_STEP / np.maximum(size, NOISE_FLOOR))[:, None]
+        distances = np.sqrt(np.einsum("ni,ni->n", t, t))
+        step = _step(residuals, J, distances, robust=robust)
         R = rotation_from_vector(step[:, :3]) @ R
         t = t + step[:, 3:]
-        if size.max() < tolerance:
+        if _sizes(step, distances).max() < LINEAR:
             break
-        is_near = size < ROUGHLY
-    return R, t
+    return R, t, residuals - _moves(J, step), J
 
 
-def poses_at(
+def _step(
+    residuals: FloatArray, J: FloatArray, distances: FloatArray, *, robust: bool
+) -> FloatArray:
+    """Return the steps (N, 6) that fit linear models; weights follow the residuals."""
+    weights = np.isfinite(residuals[..., 0]).astype(float)
+    step: FloatArray = np.zeros((len(J), 6))
+    left = residuals
+    for _ in range(MAX_STEPS):
+        if robust:
+            weights = cauchy_weights(left, image_sigmas(left))
+        H, g = normal_equations(J, left, weights)
+        H = H * DAMPING + RIDGE
+        change = np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
+        step = step + change
+        size = _sizes(change, distances)
+        if not robust or not SETTLED < size.max() < LINEAR:
+            break
+        left = residuals - _moves(J, step)
+    return step * (MAX_STEP / np.maximum(size, MAX_STEP))[:, None]
+
+
+def _sizes(step: FloatArray, distances: FloatArray) -> FloatArray:
+    """Return the sizes of steps (N, 6), rad."""
+    turns, moves = np.sqrt(np.einsum("nij,nij->in", *2 * (step.reshape(-1, 2, 3),)))
+    return np.asarray(np.maximum(turns, moves / distances))
+
+
+def _moves(J: FloatArray, step: FloatArray) -> FloatArray:
+    """Return the moves of modelled centres by steps (N, 6), (N, L, 2), px."""
+    return np.asarray((J @ step[:, None, :, None])[..., 0])
+
+
+def _poses_at(
     R: FloatArray, t: FloatArray, residuals: FloatArray, J: FloatArray, *, robust: bool
 ) -> Poses:
     """Return fitted poses with covariances, by residuals (N, L, 2) and derivatives."""
-    seen = np.isfinite(residuals[..., 0])
     sigma = robust_sigma(residuals, 6)
-    weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
+    weights = cauchy_weights(residuals, sigma if robust else np.inf)
     H, _ = normal_equations(J, residuals, weights)
-    variances = np.maximum(sigma, _own_sigma(residuals, weights, sigma)) ** 2
+    squares = np.where(weights > 0, np.einsum("nli,nli->nl", *2 * (residuals,)), 0.0)
+    surplus = np.maximum(2 * weights.sum(axis=1) - 6, 1)
+    own = np.einsum("nl,nl->n", weights, squares) / surplus
+    # An image that is clearly worse than the others has its own noise.
+    variances = np.where(own > (WORSE * sigma) ** 2, own, sigma**2)
     covariances: FloatArray = variances[:, None, None] * _inverse(H)
     return Poses(R, t, covariances, residuals, weights, sigma)
 
@@ -345,11 +374,9 @@ def _inverse(H: FloatArray) -> FloatArray:
     A small ridge keeps an image with wrong labels, which may not determine a pose, from
     stopping the others.
     """
-    scale = np.sqrt(np.maximum(H[:, DIAGONAL, DIAGONAL], RIDGE))
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", H), TINY))
     scales = scale[:, :, None] * scale[:, None, :]
-    scaled = H / scales
-    scaled[:, DIAGONAL, DIAGONAL] += RIDGE
-    return np.asarray(np.linalg.inv(scaled) / scales)
+    return np.asarray(np.linalg.inv(H / scales + RIDGE) / scales)
 
 
 def _linear_poses(

@@ -15,8 +15,6 @@ from lightpen.model.rigid import with_turns
 
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
 MEDIAN_LENGTH = math.sqrt(2 * math.log(2))  # of a standard normal vector in 2-D
-MAX_LESSENED = 0.9  # of a weight, by its fall; keeps the normal matrix regular
-TINY = 1e-300
 NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
 
 
@@ -60,9 +58,14 @@ def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
     where an LED was not seen.
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    return _sigma_of(lengths, n_unknowns_per_image)
+
+
+def _sigma_of(lengths: FloatArray, n_unknowns_per_image: float) -> float:
+    n_images = len(lengths)
     lengths = np.sort(lengths[np.isfinite(lengths)])
     n = len(lengths)
-    n_free = max(2 * n - n_unknowns_per_image * len(residuals), 1)
+    n_free = max(2 * n - n_unknowns_per_image * n_images, 1)
     # np.median takes eight times as long on the ten LEDs of one image.
     median = float(lengths[(n - 1) // 2] + lengths[n // 2]) / 2 / MEDIAN_LENGTH
     return max(median * math.sqrt(2 * n / n_free), NOISE_FLOOR)
@@ -85,27 +88,12 @@ def image_sigmas(residuals: FloatArray) -> FloatArray:
     This admits an image whose start is spoilt by one wrong LED.
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    common = _sigma_of(lengths, 6)
+    if len(lengths) == 1:
+        return np.array([common])
     n_seen = np.isfinite(lengths).sum(axis=1)
     middle = np.sort(lengths, axis=1)[np.arange(len(lengths)), n_seen // 2]
-    own: FloatArray = middle / MEDIAN_LENGTH
-    return np.maximum(own, robust_sigma(residuals, 6))
-
-
-def loss_curvature(
-    J: FloatArray, residuals: FloatArray, weights: FloatArray, sigmas: FloatArray
-) -> FloatArray:
-    """Return the reduction of J^T W J by falling weights, (N, 6, 6).
-
-    With it the steps on the Cauchy loss are Newton's, which converge at once where
-    those on the weights alone take a sixth of the way left each.
-    """
-    errors = np.where(np.isnan(residuals), 0.0, residuals)
-    squares = np.einsum("nli,nli->nl", errors, errors)
-    share = squares * weights / (CAUCHY_WIDTH * sigmas[:, None]) ** 2
-    share = np.minimum(2 * share, MAX_LESSENED)
-    pulls = np.einsum("nlik,nli->nlk", J, errors)
-    lessened = pulls * (weights * share / np.maximum(squares, TINY))[..., None]
-    return np.asarray(np.swapaxes(lessened, 1, 2) @ pulls)
+    return np.asarray(np.maximum(middle / MEDIAN_LENGTH, common))
 
 
 def normal_equations(

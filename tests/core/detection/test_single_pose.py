@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from lightpen.detection.pose import fit_poses
-from lightpen.detection.single_pose import fit_pose
+from lightpen.detection.pose import fit_pose, fit_poses
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import (
     paper_camera,
