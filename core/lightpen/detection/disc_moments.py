@@ -9,7 +9,7 @@ is then as precise as a fit of the rim, at the cost of one pass over a small win
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import pi, sqrt
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import cv2
 import numpy as np
@@ -113,16 +113,20 @@ def with_start(
     return disc._replace(rim=_rim_start(soft, frame), filled=filled)
 
 
-def with_rims(
-    image: Image, discs: Sequence[Disc], before: Sequence[EdgeStart] = ()
-) -> list[Disc]:
+Starts: TypeAlias = Callable[[], Sequence[EdgeStart]]  # at discs of the image before
+
+
+def with_rims(image: Image, discs: Sequence[Disc], before: Starts = list) -> list[Disc]:
     """Return discs with those measured by their rims that need it and have one.
 
     Fits begin at the discs of the image ``before``.
     """
     found = list(discs)
     unclear = [i for i, disc in enumerate(discs) if disc.rim or disc.filled]
-    rims = iter(fit_edges(image, _starts(discs, before)))
+    if not unclear:
+        return found
+    starts = [disc.rim for disc in discs if disc.rim is not None]
+    rims = iter(fit_edges(image, _nearest(starts, before())))
     for i in unclear:
         disc = discs[i]
         rim = next(rims) if disc.rim else None
@@ -138,9 +142,8 @@ def with_rims(
     return found
 
 
-def _starts(discs: Sequence[Disc], before: Sequence[EdgeStart]) -> list[EdgeStart]:
+def _nearest(starts: list[EdgeStart], before: Sequence[EdgeStart]) -> list[EdgeStart]:
     """Return the starts of edge fits: as the nearest previous discs, if any."""
-    starts = [disc.rim for disc in discs if disc.rim is not None]
     if not starts or not before:
         return starts
     here, there = (

@@ -7,7 +7,7 @@ What never becomes a disc is dropped, or kept if it resembles one.
 """
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -16,9 +16,8 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.disc_moments import Disc, with_rims
+from lightpen.detection.disc_moments import Disc, Starts, with_rims
 from lightpen.detection.disc_stack import measure_discs
-from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pixel_box import PixelBox, bounding_box
 from lightpen.model.quantiles import normal_quantile
 
@@ -128,7 +127,7 @@ def _thinned(image: Image, stride: int) -> MatLike:
 
 
 def find_discs(
-    scene: Survey, budget: Iterator[int], before: Sequence[EdgeStart] = ()
+    scene: Survey, budget: Iterator[int], before: Starts = list
 ) -> list[Disc]:
     """Return whatever may be an LED, each once."""
     rise = scene.peak - scene.background
@@ -138,10 +137,8 @@ def find_discs(
     if len(boxes) > MAX_BOXES:
         boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
 
-    large = [box for box in boxes if _is_too_large(scene, box)]
-    small = [box for box in boxes if not _is_too_large(scene, box)]
-    measured, bare = _measured(scene, small, level, 0.0, budget)
-    unclear: list[tuple[PixelBox, Disc | None]] = [(box, None) for box in large + bare]
+    measured, hidden = _measured(scene, boxes, level, 0.0, budget)
+    unclear: list[tuple[PixelBox, Disc | None]] = [(box, None) for box in hidden]
     measured = with_rims(scene.image, measured, before)
     discs = [disc for disc in measured if disc.is_whole]
     unclear += [(disc.box, disc) for disc in measured if not disc.is_whole]
@@ -165,10 +162,8 @@ def _parted(
         if len(parts) != 1 or not parts[0].is_close_to(box):
             break
     blocks: list[Disc] = []
-    large = [part for part in parts if _is_too_large(scene, part)]
-    small = [part for part in parts if not _is_too_large(scene, part)]
-    found, bare = _measured(scene, small, level, level, budget)
-    for part in large + bare:
+    found, hidden = _measured(scene, parts, level, level, budget)
+    for part in hidden:
         blocks += _parted(scene, part, level, None, budget)
     for block in with_rims(scene.image, found):
         if block.is_whole:
@@ -228,11 +223,6 @@ def _is_textured(bright: MatLike) -> bool:
     return bool(changes > TEXTURED * bright.size)
 
 
-def _is_too_large(scene: Survey, box: PixelBox) -> bool:
-    shorter_side: int = min(scene.image.shape)
-    return box.size > max(MAX_DIAMETER * shorter_side, FINE_SIZE)
-
-
 def _measured(
     scene: Survey,
     boxes: list[PixelBox],
@@ -240,11 +230,14 @@ def _measured(
     floor: float,
     budget: Iterator[int],
 ) -> tuple[list[Disc], list[PixelBox]]:
-    """Return the discs in boxes, and the boxes that hide what may be some.
+    """Return the discs in boxes, and the boxes that are too large or hide some.
 
     Further regions that coarse sampling merged are measured too.
     """
-    found, bare, seen = [], [], set(boxes)
+    largest = max(MAX_DIAMETER * min(scene.image.shape), FINE_SIZE)
+    hidden = [box for box in boxes if box.size > largest]
+    boxes = [box for box in boxes if box.size <= largest]
+    found, seen = [], set(boxes)
     while boxes := [box for box, _ in zip(boxes, budget, strict=False)]:
         discs = measure_discs(scene.image, boxes, level, scene.noise, floor)
         more = []
@@ -255,11 +248,11 @@ def _measured(
             if disc is not None and _stands_out(scene, disc):
                 found.append(disc)
             elif scene.hides_light(box, level):
-                bare.append(box)
+                hidden.append(box)
         # Two regions that each lead to the other would loop for ever.
         boxes = [box for box in dict.fromkeys(more) if box not in seen]
         seen |= set(boxes)
-    return found, bare
+    return found, hidden
 
 
 def _stands_out(scene: Survey, disc: Disc) -> bool:

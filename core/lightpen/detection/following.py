@@ -42,6 +42,7 @@ def follow_spots(
     pen: Pen,
     rotation: FloatArray,
     translation: FloatArray,
+    there: FloatArray,
     areas: FloatArray,
 ) -> Followed | None:
     """Return labels and pose of an image, given those of the image before.
@@ -52,12 +53,13 @@ def follow_spots(
     ----------
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen of the image before, mm.
+    there : (L, 2) array
+        LEDs of that pose, px.
     areas : (L,) array
         Of the spots there, px^2; NaN where an LED was not seen.
     """
     if not len(spots) or np.isfinite(spots.tiny_width):
         return None
-    there = camera.project(pen.leds @ rotation.T + translation)
     x, y = there.T
     apart = np.hypot(x[:, None] - x, y[:, None] - y)
     np.fill_diagonal(apart, np.inf)

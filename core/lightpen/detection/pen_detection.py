@@ -157,14 +157,17 @@ def detect_pen(
         return unseen(pen, Reason.WRONG_SIZE)
     try:
         if is_followed and before is not None and before.has_pose:
-            window = _window(camera, pen, before)
+            leds = pen.leds @ before.rotation.T + before.translation
+            there = camera.project(leds)
+            radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
+            window = _window(camera, there, radius)
             spots = detect_spots(
                 *(image, mask),
                 full_scale=full_scale,
                 window=window,
                 before=before.spots,
             )
-            followed = _followed(spots, camera, pen, before)
+            followed = _followed(spots, camera, pen, before, there)
             if followed is not None:
                 return followed
             labels = track_spots(
@@ -247,7 +250,7 @@ def unseen(pen: Pen, reason: Reason) -> PenDetection:
 
 
 def _followed(
-    spots: Spots, camera: Camera, pen: Pen, before: PenDetection
+    spots: Spots, camera: Camera, pen: Pen, before: PenDetection, there: FloatArray
 ) -> PenDetection | None:
     """Return the detection where LEDs moved little since the image before."""
     if before.spots is None or before.labels is None:
@@ -255,7 +258,8 @@ def _followed(
     labelled = before.labels.spot >= 0
     areas = np.full(pen.n_leds, np.nan)
     areas[labelled] = before.spots.areas[before.labels.spot[labelled]]
-    found = follow_spots(spots, camera, pen, before.rotation, before.translation, areas)
+    pose = before.rotation, before.translation
+    found = follow_spots(spots, camera, pen, *pose, there, areas)
     if found is None:
         return None
     pixels = np.where(found.labels.whole[:, None], found.seen, np.nan)
@@ -265,14 +269,11 @@ def _followed(
     return _posed(detection, found.poses)
 
 
-def _window(camera: Camera, pen: Pen, before: PenDetection) -> PixelBox:
-    """Return the region of the image with the LEDs that hardly moved, with a margin."""
-    leds = pen.leds @ before.rotation.T + before.translation
-    radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
-    room = ceil(MAX_SHIFT + ROOM * radius)
-    pixels = camera.project(leds)
-    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+def _window(camera: Camera, there: FloatArray, radius: float) -> PixelBox:
+    """Return the region of LEDs of a radius that hardly moved, with a margin, px."""
+    (left, top), (right, bottom) = there.min(axis=0), there.max(axis=0)
     around = PixelBox(floor(left), floor(top), ceil(right), ceil(bottom))
+    room = ceil(MAX_SHIFT + ROOM * radius)
     return around.grown(room, (camera.height, camera.width))
 
 

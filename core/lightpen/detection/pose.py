@@ -37,8 +37,8 @@ from lightpen.model.rigid import nearest_rotation, rotation_from_vector
 MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 # Of an angle in rad and of a translation over its length:
-LINEAR = 1e-4  # leaves its square: the weights of LEDs are all that changes
-SETTLED = 1e-6  # leaves a sixteenth
+LINEAR = 3e-5  # leaves its square: the weights of LEDs are all that changes
+SETTLED = 1e-7  # leaves a sixteenth
 MAX_STEP = 0.2  # keeps an image of wrong LEDs from flying away
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
 TINY = 1e-12

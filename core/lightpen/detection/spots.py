@@ -1,8 +1,8 @@
 """The bright spots of an image: centres, shapes and flaws."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntFlag
+from functools import partial
 from statistics import median
 from typing import Self, TypeVar
 
@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
-from lightpen.detection.disc_moments import FLAT, MIN_SIZE, Disc
+from lightpen.detection.disc_moments import FLAT, MIN_SIZE, Disc, Starts
 from lightpen.detection.disc_search import (
     LEVEL_OF_PEAK,
     LEVEL_SIGMAS,
@@ -24,7 +24,13 @@ from lightpen.detection.disc_search import (
 from lightpen.detection.edge_fit import EdgeStart
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS
-from lightpen.detection.region_moments import GAUSSIAN_RISE, HIGH, LOW, ellipse_misfit
+from lightpen.detection.region_moments import (
+    GAUSSIAN_RISE,
+    HIGH,
+    LOW,
+    DiscMoments,
+    ellipse_misfit,
+)
 from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, widths_of_tiny
 from lightpen.formats.decoding import full_scale_of
 
@@ -202,17 +208,13 @@ def detect_spots(
         image = image[window.top : window.bottom, window.left : window.right]
         if mask is not None:
             mask = np.asarray(mask) - np.append(corner, 0)
-    starts = [] if before is None else before.rims(corner)
+    starts: Starts = list if before is None else partial(before.rims, corner)
     spots = _spots_of(image, mask, stride, full_scale, starts)
     return replace(spots, centers=spots.centers + corner)
 
 
 def _spots_of(
-    image: Image,
-    mask: FloatArray | None,
-    stride: int,
-    full_scale: int,
-    before: Sequence[EdgeStart],
+    image: Image, mask: FloatArray | None, stride: int, full_scale: int, before: Starts
 ) -> Spots:
     budget = iter(range(MAX_REGIONS))
     scene = survey(image, mask, stride)
@@ -230,12 +232,13 @@ def _spots_of(
         has_smears = not discs and _has_smears(flat)
     discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
     discs = discs[:MAX_SPOTS]
-    spots = _as_spots(discs, full_scale, scene.noise)
-    if len(spots) < MIN_POSE_LEDS or np.median(spots.areas) < HARDLY_AREA:
+    spots = _as_spots(discs, full_scale, scene.noise, has_smears)
+    usual_area = median(spots.areas.tolist()) if len(spots) else 0.0
+    if len(spots) < MIN_POSE_LEDS or usual_area < HARDLY_AREA:
         spots = replace(spots, tiny_width=_tiny_width(scene, spots, full_scale))
-    if len(spots) and np.median(spots.areas) < np.pi * LARGEST_RADIUS**2:
+    if len(spots) and usual_area < np.pi * LARGEST_RADIUS**2:
         spots = _with_small(spots, discs, image, scene.noise, full_scale)
-    return replace(spots, has_smears=has_smears)
+    return spots
 
 
 def _tiny_width(scene: Survey, spots: Spots, full_scale: int) -> float:
@@ -261,28 +264,41 @@ def _has_smears(scene: Survey) -> bool:
     return low < lit / scene.thinned.size < high
 
 
-def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
-    whole = [disc.moments.area for disc in discs if disc.is_whole]
-    usual_area = median(whole) if whole else None
-    moments = [disc.moments for disc in discs]
-    centers = np.array([(m.x, m.y) for m in moments]).reshape(-1, 2)
-    regions = [
-        center if disc.rim is None else disc.rim.center
-        for disc, center in zip(discs, centers, strict=True)
-    ]
+def _as_spots(
+    discs: list[Disc], full_scale: float, noise: float, has_smears: bool
+) -> Spots:
+    moments = DiscMoments(*np.array([disc.moments for disc in discs]).reshape(-1, 9).T)
+    levels = np.array([disc.levels for disc in discs]).reshape(-1, 3)
+    heights = np.array([disc.cut_height for disc in discs])
+    contrasts = levels[:, 1] - levels[:, 0]
+    are_whole = np.array([disc.is_whole for disc in discs], dtype=bool)
+    leave = np.array([disc.leaves_image for disc in discs], dtype=bool)
+    # Merged is told from cut by size, if there is a whole disc to compare with.
+    whole = moments.area[are_whole].tolist()
+    larger = moments.area > (median(whole) if whole else 0.0)
+    smaller = moments.area <= (median(whole) if whole else np.inf)
+    unwhole = ~are_whole & ~leave
+    flaws = SpotFlaw.MERGED * ((heights > MERGED_LEVEL) | (unwhole & larger))
+    flaws |= SpotFlaw.CUT * (leave | (unwhole & smaller))
+    flaws |= SpotFlaw.SATURATED * (levels[:, 2] >= SATURATED_LEVEL * full_scale)
+    flaws |= SpotFlaw.BLURRED * (moments.edge_width > BLURRED_EDGE)
+    flaws |= SpotFlaw.DIM * (contrasts < DIM_SIGMAS * noise)
+    centers = np.stack([moments.x, moments.y], axis=1)
+    regions = centers.copy()
+    for i, disc in enumerate(discs):
+        if disc.rim is not None:
+            regions[i] = disc.rim.center
+    shapes = (moments.var_x, moments.cov_xy, moments.cov_xy, moments.var_y)
     return Spots(
-        centers,
-        np.array([(m.var_x, m.cov_xy, m.cov_xy, m.var_y) for m in moments]).reshape(
-            -1, 2, 2
-        ),
-        np.array([m.area for m in moments]),
-        np.array([disc.levels.contrast / full_scale for disc in discs]),
-        np.array([m.edge_width for m in moments]),
-        np.array(
-            [_flaws(disc, usual_area, full_scale, noise) for disc in discs], np.int64
-        ),
-        np.full(len(discs), EXACT_SIGMA),
-        np.array(regions).reshape(-1, 2) - centers,
+        centers=centers,
+        shapes=np.stack(shapes, axis=1).reshape(-1, 2, 2),
+        areas=moments.area,
+        contrasts=contrasts / full_scale,
+        edge_widths=moments.edge_width,
+        flaws=flaws,
+        sigmas=np.full(len(discs), EXACT_SIGMA),
+        offsets=regions - centers,
+        has_smears=has_smears,
     )
 
 
@@ -340,29 +356,3 @@ def _with_small(
         flaws=replaced(spots.flaws, np.asarray(flaws, dtype=np.int64)),
         sigmas=replaced(spots.sigmas, np.maximum(found.sigmas, EXACT_SIGMA)),
     )
-
-
-def _flaws(
-    disc: Disc, usual_area: float | None, full_scale: float, noise: float
-) -> SpotFlaw:
-    flaws = SpotFlaw.NONE
-    if disc.cut_height > MERGED_LEVEL:
-        flaws |= SpotFlaw.MERGED
-    if disc.leaves_image:
-        flaws |= SpotFlaw.CUT
-    elif not disc.is_whole:
-        flaws |= _flaw_of_size(disc.moments.area, usual_area)
-    if disc.levels.top >= SATURATED_LEVEL * full_scale:
-        flaws |= SpotFlaw.SATURATED
-    if disc.moments.edge_width > BLURRED_EDGE:
-        flaws |= SpotFlaw.BLURRED
-    if disc.levels.contrast < DIM_SIGMAS * noise:
-        flaws |= SpotFlaw.DIM
-    return flaws
-
-
-def _flaw_of_size(area: float, usual_area: float | None) -> SpotFlaw:
-    """Tell merged from cut by size, if there is a whole disc to compare with."""
-    if usual_area is None:
-        return SpotFlaw.MERGED | SpotFlaw.CUT
-    return SpotFlaw.MERGED if area > usual_area else SpotFlaw.CUT

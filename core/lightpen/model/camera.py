@@ -40,7 +40,8 @@ NOWHERE = np.zeros(3)
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
 # less than 1e-8 px at any sensible focal length.
-UNDISTORT_TOLERANCE = 1e-7
+UNDISTORT_TOLERANCE = 1e-6
+UNDISTORTED = (cv2.TERM_CRITERIA_COUNT, UNDISTORT_STEPS, 0.0)
 FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
 
 
@@ -287,7 +288,9 @@ class Camera:
         if self.lens is LensModel.KANNALA_BRANDT:
             return self._unprojected_fisheye(normalised)
         if self._is_for_opencv(pixels):
-            near = cv2.undistortPoints(pixels.reshape(-1, 1, 2), *self._opencv)
+            near = cv2.undistortPointsIter(
+                pixels.reshape(-1, 1, 2), *self._opencv, None, None, UNDISTORTED
+            )
             normalised = np.asarray(near, dtype=np.float64).reshape(pixels.shape)
         missing = np.isnan(pixels)
         with np.errstate(all="ignore"):  # of what diverges, there is none
@@ -297,7 +300,7 @@ class Camera:
                 step = np.einsum("...ij,...j->...i", inverse, pixels - there.points)
                 normalised = normalised + step
                 close = np.abs(step) < UNDISTORT_TOLERANCE
-                if np.all(close | missing):
+                if (close | missing).all():
                     break
             found = close.all(axis=-1) & ~_is_folded(there.jacobian)
         return PointMap(normalised, inverse), found

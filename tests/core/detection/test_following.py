@@ -28,9 +28,9 @@ def followed(spots: Spots | None) -> Followed | None:
     assert BEFORE.spots is not None
     assert BEFORE.labels is not None
     areas = BEFORE.spots.areas[BEFORE.labels.spot]
-    return follow_spots(
-        spots, SCENE.camera, SCENE.pen, BEFORE.rotation, BEFORE.translation, areas
-    )
+    R, t = BEFORE.rotation, BEFORE.translation
+    there = SCENE.camera.project(SCENE.pen.leds @ R.T + t)
+    return follow_spots(spots, SCENE.camera, SCENE.pen, R, t, there, areas)
 
 
 def test_labels_and_pose_are_those_of_a_search() -> None:
