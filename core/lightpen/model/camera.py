@@ -36,11 +36,11 @@ from lightpen.model.lens_field import LensField
 from lightpen.model.self_calibration import FoundCamera, are_shared
 
 FEW = 200  # coordinates, up to which OpenCV is faster than numpy
-NOWHERE = np.zeros(3)
+NOWHERE, IDENTITY = np.zeros(3), np.eye(3)
 UNDISTORT_STEPS = 20
 # Of a step of Newton's method, in normalised units: what is left is about its square,
 # less than 1e-8 px at any sensible focal length.
-UNDISTORT_TOLERANCE = 1e-6
+UNDISTORT_TOLERANCE = 1e-7
 UNDISTORTED = (cv2.TERM_CRITERIA_COUNT, UNDISTORT_STEPS, 0.0)
 FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
 
@@ -289,7 +289,7 @@ class Camera:
             return self._unprojected_fisheye(normalised)
         if self._is_for_opencv(pixels):
             near = cv2.undistortPointsIter(
-                pixels.reshape(-1, 1, 2), *self._opencv, None, None, UNDISTORTED
+                pixels.reshape(-1, 1, 2), *self._opencv, IDENTITY, IDENTITY, UNDISTORTED
             )
             normalised = np.asarray(near, dtype=np.float64).reshape(pixels.shape)
         missing = np.isnan(pixels)

@@ -5,7 +5,7 @@ There are hundreds of triples of LEDs; the size of a spot shows its distance, an
 it the sides of the triangle, so the likeliest can be tried first.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 
@@ -36,6 +36,7 @@ TINY = 1e-12  # px^2, keeps the shape of a point from dividing by zero
 TRIPLE_TOLERANCE = 8.0  # px, of a pose from three spots
 
 LOOKALIKE_REACH = 25.0  # px, of the pairing
+LOOKALIKE_STEPS = 3
 MAX_LOOKALIKE_RMS = 3.0  # px, beyond which a pose is no lookalike
 
 MAX_SHIFT = 45.0  # px, of an LED from its prediction
@@ -88,13 +89,17 @@ def lookalike_poses(
     view = middle_cam / np.linalg.norm(middle_cam, axis=1, keepdims=True)
     R = reflection(view) @ best.R @ reflection(flat)
     t = middle_cam - np.einsum("cij,cj->ci", R, middle)
-    alike = [replace(best, R=R, t=t)]
-    for motion, shift in zip(pen.self_rotations, pen.self_translations, strict=True):
-        R, t = best.R @ motion, best.R @ shift + best.t
-        turned = match(sight, pen, best.image, R, t, LOOKALIKE_REACH)
-        # One that explains fewer spots is no rival.
-        alike.append(turned.of(turned.n_explained >= best.n_explained - 1))
-    fitted = fit(sight, pen, join(alike), n_steps=4)
+    flipped = best.moved(R, t)
+    n_motions = len(pen.self_rotations)
+    one = np.repeat(np.arange(len(best)), n_motions)
+    R = (best.R[:, None] @ pen.self_rotations).reshape(-1, 3, 3)
+    t = (pen.self_translations @ np.swapaxes(best.R, 1, 2) + best.t[:, None]).reshape(
+        -1, 3
+    )
+    turned = match(sight, pen, best.image[one], R, t, LOOKALIKE_REACH)
+    # One that explains fewer spots is no rival.
+    turned = turned.of(turned.n_explained >= best.n_explained[one] - 1)
+    fitted = fit(sight, pen, join([flipped, turned]), n_steps=LOOKALIKE_STEPS)
     return fitted.of(fitted.rms < MAX_LOOKALIKE_RMS)
 
 

@@ -22,6 +22,7 @@ from lightpen.arrays import FloatArray, IntArray
 
 NEWTON_STEPS = 2
 DOUBLE_ROOT = 1e-9  # discriminant taken for zero, relative
+NEXT, LAST = [1, 2, 0], [2, 0, 1]  # of each axis
 # Of the entries of a symmetric matrix that is stored as 00 01 02 11 12 22.
 PLACES = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
@@ -105,12 +106,17 @@ def _middle(points: FloatArray) -> FloatArray:
 def _triangle_frame(points: FloatArray) -> FloatArray:
     """Return orthonormal axes, in columns, fixed to each triangle."""
     along = points[:, 1] - points[:, 0]
-    across = np.cross(along, points[:, 2] - points[:, 0])
+    across = _cross(along, points[:, 2] - points[:, 0])
     frame = np.empty((len(points), 3, 3))
     frame[:, :, 0] = along / np.sqrt(_squared(along))[:, None]
     frame[:, :, 2] = across / np.sqrt(_squared(across))[:, None]
-    frame[:, :, 1] = np.cross(frame[:, :, 2], frame[:, :, 0])
+    frame[:, :, 1] = _cross(frame[:, :, 2], frame[:, :, 0])
     return frame
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return vector products; np.cross takes three times as long."""
+    return np.asarray(a[:, NEXT] * b[:, LAST] - a[:, LAST] * b[:, NEXT])
 
 
 def _simple_root(
