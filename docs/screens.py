@@ -99,12 +99,12 @@ N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 N_RECEIVED = 1240  # images, by the camera
-CHOICES = VerificationChoices(FIXED_POINT.kind, (FixedPointOptions(6, n_frames=5),))
+CHOICES = VerificationChoices(FIXED_POINT.kind, (FixedPointOptions(n_frames=10),))
 PART_CHOICES = VerificationChoices(
     options=(PartOptions(plate_plan().limited_to({"top", "hole 1", "dome"})),)
 )
 N_TOUCHED = 4  # points of a verification that is under way
-N_HELD = 10  # images through which the pen is held still
+N_HELD = 16  # images through which the pen is held still
 N_EARLIER = 24  # calibrations in the history
 REFRESH_MS = 200  # of the plots
 COMPARING_MS = 1500  # after which the LEDs of the file were compared with the images
@@ -515,12 +515,9 @@ def _touched(
     setup: SessionSetup, scene: Scene, n_touches: int = N_TOUCHED
 ) -> SessionState:
     """Return a verification after some points in the cone."""
-    n = setup.choices.options_of(FIXED_POINT).n_touches
-    goals = [
-        HandGoal(np.zeros(3), 0.2 + 0.2 * (i % 2), 2 * np.pi * i / n)
-        for i in range(n_touches)
-    ]
-    return _probed(setup, scene, goals)
+    options = setup.choices.options_of(FIXED_POINT)
+    goals = [FIXED_POINT.hand(options, 0, i) for i in range(n_touches)]
+    return _probed(setup, scene, [replace(goal, point=np.zeros(3)) for goal in goals])
 
 
 def _verified(setup: SessionSetup, scene: Scene) -> SessionState:

@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
+from tests.verifying import found_by
 
 from lightpen.model.limits import SwingLimits
+from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.scenes import Scene
+from lightpen.verification.tasks.part import PART
+from lightpen_app import demo as demo_module
 from lightpen_app.demo import NAMES, Demo
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
@@ -121,6 +125,25 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
 
     assert walker.workbench.run.status.result is None
     assert "Demo ended: no tip to accept." in walker.window.words()
+
+
+@pytest.mark.slow
+def test_a_demo_that_is_watched_measures_the_plate_without_a_hand(
+    open_wizard: "OpenWizard", qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(demo_module, "WATCHED_S", 0.1)
+    walker = open_wizard()
+    demo = Demo(walker.window, walker.workbench)
+
+    with qtbot.waitSignal(demo.ended, timeout=1000 * LONGEST_S):
+        demo.start()
+
+    assert demo.is_accepted
+    assert walker.title() == "Measure"
+    walker.until_says("Part measured")
+    found = found_by(walker.workbench.measuring.status.state, PART)
+    assert found.missing == ()
+    assert len(found.part.results) == len(plate_plan().characteristics)
 
 
 @pytest.mark.slow

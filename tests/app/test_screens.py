@@ -160,13 +160,13 @@ def test_no_words_of_a_step_are_clipped(seen: Seen, key: Key) -> None:
 
 
 @pytest.mark.parametrize("language", languages())
-def test_nothing_is_scrolled_amid_a_tip_check_nor_at_its_result(
+def test_nothing_is_scrolled_amid_probing_nor_at_its_result(
     seen: Seen, language: str
 ) -> None:
-    (probing,) = seen.rooms["verify", language, 1280]
-    (verified,) = seen.rooms["verify" + OTHERWISE, language, 1280]
-
-    assert probing.downwards == verified.downwards == ()
+    for step in PROBING:
+        for each in (step, step + OTHERWISE):
+            figure, *_ = seen.rooms[each, language, 1280]
+            assert figure.downwards == ()
 
 
 @pytest.mark.parametrize("language", languages())

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from msgspec import structs
+from PySide6.QtWidgets import QListWidget
 from tests.accepted_tip import accept_tip
 
 from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
@@ -76,6 +77,31 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     walker.until(lambda: walker.window.findChild(PrintReportWindow) is not None)
 
 
+@pytest.mark.slow
+def test_the_simulated_plate_is_ticked_off_feature_by_feature(known: "Walker") -> None:
+    walker = known
+    walker.click_step("Measure")
+    walker.click("Other plan")
+    walker.until_says("Choose a plan")
+    walker.click("Try the simulated plate")
+    features = walker.window.page().findChild(QListWidget, "task_list")
+    assert isinstance(features, QListWidget)
+    walker.until(lambda: features.count() == len(plate_plan().features))
+    assert features.currentItem().text() == "top: now"
+    walker.click("Let the simulated operator probe")
+    walker.until(lambda: "flatness top" in features.item(0).text())
+    assert features.item(0).text().endswith("OK")
+    walker.until(lambda: features.currentItem().text() == "hole 1: now")
+    assert features.item(1).text() == "front"  # done; its place needs the frame
+    walker.click("Finish early")
+    walker.until_says("Not proven")
+
+    rows = [features.item(i).text() for i in range(features.count())]
+    assert rows == [features.item(0).text(), "front"]
+    walker.click("Other plan")
+    walker.until_says("Choose a plan")
+
+
 def test_without_a_plan_the_step_says_what_to_do(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
@@ -89,5 +115,8 @@ def test_without_a_plan_the_step_says_what_to_do(
 
     walker.until_tells("No measuring plan is chosen.")
     assert walker.says("Choose a plan")
-    walker.click("Without a plan")
+    assert walker.main_button().text() == "Open a plan..."
+    walker.click("Teach a plan")
     walker.until_tells("Probe F1: 0 of 8 points.")
+    walker.click("Other plan")
+    walker.until_says("Choose a plan")

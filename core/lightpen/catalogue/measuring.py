@@ -68,8 +68,6 @@ MESSAGES = {
     "part.instruction-named": "Probe {name}: {n_points} of {needed} points.",
     "part.slide-named": "Slide along {name}: {n_points} of {needed} points.",
     "part.slide": "Slide along the {kind} {name}: {n_points} of {needed} points.",
-    "part.unknown-kind": "not recognised yet",
-    "part.touches": "Points of {name} ({kind}), camera frame / mm",
     "part.deviation": "Deviation",
     "part.features-in-part": "Features in the part frame / mm, angles / degrees, k = 2",
     "part.features-in-camera": "Features in the camera frame / mm, angles / degrees, k = 2",

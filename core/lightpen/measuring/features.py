@@ -75,6 +75,12 @@ class Feature:
             return 2 * float(np.linalg.norm(self.distances, axis=1).max())
         return float(np.ptp(self.distances[:, 0]))
 
+    def distance_of(self, point: FloatArray) -> float:
+        """Return the signed distance of a point (3,) from a surface, or its length."""
+        q = (point - self.origin) @ self.axes
+        off = SURFACES[self.kind].distances(q[None], self.sizes).values[0]
+        return float(off[0] if len(off) == 1 else np.linalg.norm(off))
+
     def size(self, name: str) -> float:
         """Return a size by its name."""
         return float(self.sizes[SURFACES[self.kind].sizes.index(name)])

@@ -441,6 +441,21 @@
     </message>
 </context>
 <context>
+    <name>ChecksPresenter</name>
+    <message>
+        <source>Pen</source>
+        <translation type="unfinished">光笔</translation>
+    </message>
+    <message>
+        <source>The scale by a certified value: {0:.4f} mm.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measure</source>
+        <translation type="unfinished">测量</translation>
+    </message>
+</context>
+<context>
     <name>DataFolderPanel</name>
     <message>
         <source>Data folder</source>
@@ -2805,8 +2820,24 @@
 <context>
     <name>MeasurePresenter</name>
     <message>
-        <source>Open plan...</source>
-        <translation>打开方案...</translation>
+        <source>now</source>
+        <translation type="unfinished">进行中</translation>
+    </message>
+    <message>
+        <source>Deviation {0} mm</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Point {0} of {1}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a plan...</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Measure the next part</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>NO PLAN YET</source>
@@ -3258,32 +3289,40 @@
 <context>
     <name>PlanPanel</name>
     <message>
-        <source>Open plan...</source>
-        <translation>打开测量计划...</translation>
-    </message>
-    <message>
         <source>Measure by a plan in a YAML file.</source>
         <translation>按 YAML 文件中的测量计划测量。</translation>
-    </message>
-    <message>
-        <source>Without a plan</source>
-        <translation>不使用计划</translation>
-    </message>
-    <message>
-        <source>Features are recognised while they are probed; end with the main button.</source>
-        <translation>触测时自动识别要素；用主按钮结束。</translation>
-    </message>
-    <message>
-        <source>Use simulated plate</source>
-        <translation>使用模拟平板</translation>
     </message>
     <message>
         <source>Artefact of the library</source>
         <translation>库中的标准件</translation>
     </message>
     <message>
-        <source>Feature</source>
-        <translation>要素</translation>
+        <source>Only with the simulated camera.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Open a plan...</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Teach a plan</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Try the simulated plate</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Features are recognised while they are probed; save them as a plan at the end.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Ten features of a plate that the simulated operator probes.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Other plan</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Kind of the feature that is probed</source>
@@ -3332,6 +3371,18 @@
     <message>
         <source>Part</source>
         <translation>工件</translation>
+    </message>
+    <message>
+        <source>Leave the plan? The points of this part are discarded.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Leave the plan</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Continue</source>
+        <translation type="unfinished">继续</translation>
     </message>
     <message>
         <source>Artefact...</source>
@@ -3466,8 +3517,20 @@ needed</source>
         <translation>尚无图像</translation>
     </message>
     <message>
-        <source>Tasks</source>
-        <translation>任务</translation>
+        <source>Figure</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Details</source>
+        <translation type="unfinished">详细信息</translation>
+    </message>
+    <message>
+        <source>List</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Checks and features</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Live image</source>
@@ -5072,13 +5135,6 @@ needed</source>
     </message>
 </context>
 <context>
-    <name>TaskPanel</name>
-    <message>
-        <source>Do now: {0}</source>
-        <translation>现在进行：{0}</translation>
-    </message>
-</context>
-<context>
     <name>TipPicture</name>
     <message>
         <source>Picture of the tip</source>
@@ -5230,10 +5286,6 @@ needed</source>
         <source>Verify</source>
         <translation>验证</translation>
     </message>
-    <message>
-        <source>Pen</source>
-        <translation>光笔</translation>
-    </message>
 </context>
 <context>
     <name>VerifyPresenter</name>
@@ -5274,10 +5326,6 @@ needed</source>
         <translation>由 {0} 接受</translation>
     </message>
     <message>
-        <source>Back to Start</source>
-        <translation>回到开始</translation>
-    </message>
-    <message>
         <source>No point is recorded yet.</source>
         <translation>尚未记录任何测点。</translation>
     </message>
@@ -5288,14 +5336,6 @@ needed</source>
     <message>
         <source>now</source>
         <translation>进行中</translation>
-    </message>
-    <message>
-        <source>to do</source>
-        <translation>待完成</translation>
-    </message>
-    <message>
-        <source>{0}: {1}</source>
-        <translation>{0}：{1}</translation>
     </message>
     <message>
         <source>REPEAT</source>
@@ -5354,8 +5394,20 @@ needed</source>
         <translation>无图像</translation>
     </message>
     <message>
+        <source>Do now</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Measure a part</source>
         <translation>测量工件</translation>
+    </message>
+    <message>
+        <source>Calibrate again</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Check again</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>Paused</source>
@@ -5545,10 +5597,6 @@ needed</source>
     <message>
         <source>1 number</source>
         <translation>1 个数</translation>
-    </message>
-    <message>
-        <source>A fixed cone is the drift reference: its moves from visit to visit count in U of what is probed in between.</source>
-        <translation>以固定不动的锥孔作为漂移参考点：它在相邻两次触测之间的位移计入其间所测结果的 U。</translation>
     </message>
     <message>
         <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
@@ -6011,10 +6059,6 @@ needed</source>
         <translation>{n_touches} 个测点中有 {n_left_out} 个位于别处而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
     <message>
-        <source>Points of {name} ({kind}), camera frame / mm</source>
-        <translation>{name}（{kind}）的点，相机坐标系 / mm</translation>
-    </message>
-    <message>
         <source>Port {port} is in use already, by another window or another program. Choose another port, or close that one.</source>
         <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
     </message>
@@ -6437,14 +6481,6 @@ needed</source>
     <message>
         <source>U {axis}</source>
         <translation>{axis} 的 U</translation>
-    </message>
-    <message>
-        <source>Verifies scale and form, not the tip: all points were probed in alike postures, which show no tip error. Tilt the pen to all sides.</source>
-        <translation>只验证了尺度和形状，未验证测头：各点的姿态相近，显示不出测头误差。请向各个方向倾斜光笔。</translation>
-    </message>
-    <message>
-        <source>Verifies scale and form, not the tip: these points show only a tip error above {detectable:.4f} mm (probability 95 %), the limit is {limit:.4f} mm. Tilt the pen more, to all sides.</source>
-        <translation>只验证了尺度和形状，未验证测头：这些点只能显示大于 {detectable:.4f} mm 的测头误差（概率 95 %），限值为 {limit:.4f} mm。请向各个方向更大幅度地倾斜光笔。</translation>
     </message>
     <message>
         <source>Verifies the tip: had it an error of {detectable:.4f} mm or more, this verification would show it (probability 95 %).</source>
@@ -8243,6 +8279,18 @@ needed</source>
         <translation>弯曲：{bending:.3f} ± {uncertainty:.3f} mm（{day} 的压力试验）。</translation>
     </message>
     <message>
+        <source>Does not verify the tip: all points were probed in alike postures, which show no tip error. Tilt the pen to all sides.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Does not verify the tip: these points show only a tip error above {detectable:.4f} mm (probability 95 %), the limit is {limit:.4f} mm. Tilt the pen more, to all sides.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Error of the tip</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>It is a whole project: save the calibration of the one camera by Tools, Camera Calibration, Save, as XML.</source>
         <translation>它是整个项目：请通过 Tools、Camera Calibration、Save 将这一台相机的标定保存为 XML。</translation>
     </message>
@@ -8259,12 +8307,20 @@ needed</source>
         <translation>在锥孔中向各方向倾斜光笔</translation>
     </message>
     <message>
+        <source>Move {axis}</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm.</source>
         <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm。</translation>
     </message>
     <message>
         <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm: the stylus, its thread or the seat gives way. U of what the tip measures includes this.</source>
         <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm：测杆、其螺纹或锥座发生变形。用该测头测量的 U 已包含此项。</translation>
+    </message>
+    <message>
+        <source>Standard deviation {axis}</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.</source>
@@ -9125,10 +9181,6 @@ needed</source>
     <message>
         <source>no matching entry</source>
         <translation>无对应条目</translation>
-    </message>
-    <message>
-        <source>not recognised yet</source>
-        <translation>尚未识别</translation>
     </message>
     <message>
         <source>not simultaneous</source>

@@ -1,35 +1,69 @@
-"""The step Verify: verification of the current tip without a key."""
+"""The step Verify: checks of the current tip, of artefacts and of the pen."""
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 from typing_extensions import override
 
+from lightpen.measuring.artefacts import Artefact, artefact_plan
+from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sounds
+from lightpen_app.look.theme import Tone
+from lightpen_app.steps.verify.check_list import CheckRow
+from lightpen_app.steps.verify.figure import FigureValue
+from lightpen_app.steps.verify.pen_panel import PenPanel
+from lightpen_app.steps.verify.plan_panel import choose_plan, listed_artefacts
 from lightpen_app.steps.verify.presenter import VerifyPresenter
 from lightpen_app.steps.verify.probing_page import ProbingPage
-from lightpen_app.widgets.lazy import LazyWidget
-from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.work.workbench import Workbench
 
-if TYPE_CHECKING:
-    from lightpen_app.steps.verify.pen_panel import PenPanel
+
+class ChecksPresenter(VerifyPresenter):
+    """Lists the artefacts of the library, and the pen, after the checks of the tip."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__(workbench, workbench.verification)
+        self._library = workbench.library
+
+    @property
+    def artefacts(self) -> dict[str, Artefact]:
+        """The artefacts of the library by their names."""
+        return listed_artefacts(self._library.statuses.library)
+
+    @override
+    def rows(self) -> tuple[CheckRow, ...]:
+        others = *self.artefacts, self.tr("Pen")
+        quiet = (CheckRow(name, "", Sign.RING, Tone.QUIET) for name in others)
+        return (*super().rows(), *quiet)
+
+    @override
+    def figure(self, row: int) -> FigureValue:
+        names = list(self.artefacts)
+        if row < len(self.tasks):
+            return super().figure(row)
+        name = names[row - len(self.tasks)]
+        purpose = self.tr("The scale by a certified value: {0:.4f} mm.")
+        certified = self.artefacts[name].certified
+        action = self.tr("Measure")
+        return FigureValue(name, purpose.format(certified), action=action)
 
 
 class VerifyPage(ProbingPage):
-    """Shows a verification and leads it; nothing on it must be pressed meanwhile."""
+    """Shows the checks and leads through the one that is probed."""
 
     key = "verify"
 
     def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
-        run = workbench.verification
-        presenter = VerifyPresenter(workbench, run)
-        super().__init__(workbench, sounds, run, presenter)
+        self._lists = ChecksPresenter(workbench)
+        self._row: int | None = None  # that the user selected
+        super().__init__(workbench, sounds, workbench.verification, self._lists)
 
         # Widgets
-        self._pen: LazyWidget[PenPanel] = LazyWidget(self._make_pen_panel)
-        self._pen_page = PageScroll()
-        self._pen_page.setWidget(ShrinkingScrollContent(self._pen))
-        self._pages.add(self._pen_page)
+        self._pen = PenPanel(workbench)
+        self._stack.addWidget(self._pen)
+
+        # Connections
+        self._checks.chosen.connect(self._on_row_chosen)
+        self._figure.asked.connect(self._on_asked)
 
         self._on_workbench_changed()
         self._retranslate()
@@ -37,17 +71,31 @@ class VerifyPage(ProbingPage):
     @override
     def shut_down(self) -> None:
         super().shut_down()
-        pen = self._pen.content_so_far()
-        if pen is not None:
-            pen.shut_down()
+        self._pen.shut_down()
 
     @override
-    def _retranslate(self) -> None:
-        super()._retranslate()
-        self._pages.set_title(self._pen_page, self.tr("Pen"))
+    def _shown_row(self) -> int:
+        row = super()._shown_row() if self._row is None else self._row
+        return min(row, len(self._view.rows) - 1)
 
-    def _make_pen_panel(self) -> "PenPanel":
-        # What draws its plot takes long to be imported.
-        from lightpen_app.steps.verify.pen_panel import PenPanel
+    @override
+    def _show_row(self, row: int) -> None:
+        is_pen = row == len(self._view.rows) - 1
+        self._stack.setCurrentIndex(1 if is_pen else 0)
+        if not is_pen:
+            super()._show_row(row)
 
-        return PenPanel(self._workbench)
+    def _on_row_chosen(self, row: int) -> None:
+        self._row = None if row == self._view.current else row
+        self._show()
+
+    def _on_asked(self) -> None:
+        row, choices = self._shown_row(), self._selection.choices
+        self._row = None
+        tasks = self._lists.tasks
+        if row < len(tasks):
+            self._selection.set_choices(replace(choices, kind=tasks[row].kind))
+            return
+        name, artefact = list(self._lists.artefacts.items())[row - len(tasks)]
+        choose_plan(self._workbench, artefact_plan(name, [artefact]))
+        self.step_requested.emit("measure")

@@ -1,6 +1,6 @@
 """A part as it is probed, in space: points, features, deviations and the next point."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from PySide6.QtCore import QPointF, QSize, Qt
@@ -14,7 +14,6 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import course, feature_so_far, fit_of
-from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.theme import GRID, colors_of
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
@@ -33,6 +32,8 @@ class PartValue:
     points: FloatArray  # (N, 3), ball centres
     deviations: FloatArray  # (N, 3), from the feature to each point
     outlines: tuple[FloatArray, ...] = ()  # lines of the features
+    # (M, 3), what is drawn as large as fits; empty for all of it
+    focus: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     tip: FloatArray | None = None  # (3,), at present
     goal: FloatArray | None = None  # (3,), most informative next point
 
@@ -41,9 +42,9 @@ EMPTY = np.zeros((0, 3))
 NOTHING = PartValue(EMPTY, EMPTY)
 
 
-def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartValue:
+def part_value(setup: SessionSetup, state: SessionState) -> PartValue:
     """Return the probed points of a part, and its features once measured."""
-    progress, found = state.progress(setup, task), state.found_by(PART)
+    progress, found = state.progress(setup, PART), state.found_by(PART)
     touching = state.touching
     is_seen = bool(touching.held) and not touching.n_lost
     tip = touching.held[-1].tip_cam if is_seen else None
@@ -57,7 +58,7 @@ def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartV
             points[moved] = points[moved] @ motion.rotation.T + motion.translation
             off[moved] = off[moved] @ motion.rotation.T
         outlines = [line for one in part.features.values() for line in outline_of(one)]
-        return PartValue(points, off, tuple(outlines), tip)
+        return PartValue(points, off, tuple(outlines), tip=tip)
     options = setup.choices.options_of(PART)
     begin = options.moves[-1].run if options.moves else 0  # where the part is now
     runs = (*progress.runs, progress.points)[begin:]
@@ -70,12 +71,17 @@ def part_value(setup: SessionSetup, state: SessionState, task: AnyTask) -> PartV
         lines += [] if fit is None else outline_of(of_centres(fit, shown[-1]))
     feature = feature_so_far(options, progress, setup.conditions)
     next_touch = None if feature is None else feature.next_touch
+    goal = None if next_touch is None else next_touch.point
+    focus = [*shown[-1], *([] if goal is None else [goal])]
+    if feature is not None and feature.fit is not None:
+        focus += np.concatenate(outline_of(of_centres(feature.fit, shown[-1]))).tolist()
     return PartValue(
         np.concatenate(shown),
         np.concatenate(offsets),
         tuple(lines),
+        np.array(focus).reshape(-1, 3) if len(shown[-1]) > 1 else EMPTY,
         tip,
-        None if next_touch is None else next_touch.point,
+        goal,
     )
 
 
@@ -137,7 +143,7 @@ class PartView(Translated, QWidget):
             place = Qt.AlignmentFlag.AlignCenter
             painter.drawText(self.rect(), place, self.tr("No points yet"))
             return
-        flat = all_ @ self._turn.T
+        flat = (value.focus if len(value.focus) else all_) @ self._turn.T
         low, high = flat[:, :2].min(axis=0), flat[:, :2].max(axis=0)
         room = np.array([self.width(), self.height()]) * (1 - 2 * MARGIN)
         scale = float((room / np.maximum(high - low, 1.0)).min())

@@ -5,39 +5,62 @@ from functools import partial
 from pathlib import Path
 
 from msgspec import structs
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.file_format import FileFormat
-from lightpen.measuring.artefacts import artefact_plan
+from lightpen.measuring.artefacts import Artefact, artefact_plan
 from lightpen.measuring.exports import EXPORTS
 from lightpen.measuring.part import MeasuredPart, taught_plan
 from lightpen.measuring.plan import Plan, PlannedFeature, free_plan
 from lightpen.measuring.plan_checks import read_plan, write_plan
 from lightpen.measuring.surfaces import NAMES, FeatureKind
 from lightpen.record.exports.exports import save_new
+from lightpen.record.library.tip_library import Library
 from lightpen.simulator.plate import plate_plan
 from lightpen.verification.session.status import VerificationStatus
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions, base_name, planned_at
-from lightpen_app.look.layouts import horizontal_layout, set_stacked
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
+from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
 
 SUFFIXES = "*.yaml *.yml"
+BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least
 
 
-class PlanPanel(ResponsiveLayout, Translated, QWidget):
-    """Chooses a plan, changes the kind of the current feature, and saves results."""
+def listed_artefacts(library: Library) -> dict[str, Artefact]:
+    """Return the artefacts in use by their names."""
+    return {
+        name: item.artefact
+        for name, item in library.references.items()
+        if item.artefact is not None and not item.is_retired
+    }
 
-    narrow_below = 119 * GRID  # px; then all is in two rows
+
+def choose_plan(workbench: Workbench, plan: Plan | None) -> None:
+    """Measure by a plan from its first feature, or leave the plan."""
+    run, selection = workbench.measuring, workbench.selection
+    options = structs.replace(selection.choices.options_of(PART), plan=plan)
+    state = run.status.state
+    if state is not None and state.is_begun:
+        run.runner.ask(lambda workflow: workflow.start_over())
+    selection.set_choices(selection.choices.with_options(options))
+
+
+class PlanPanel(Translated, QWidget):
+    """Chooses a plan, changes the kind of the current feature, and saves results.
+
+    Without a plan it shows the choices of one, else a row of controls.
+    """
 
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
@@ -45,34 +68,40 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         self._selection, self._live = workbench.selection, workbench.live
         self._notices = workbench.notifications
         self._status = VerificationStatus()
-        self._room = NO_ROOM
 
         # Widgets
-        self._name = text_label(TextSize.BODY, Tone.QUIET)
-        self._open, self._free, self._plate = (PushButton() for _ in range(3))
+        self._question = QuestionBar()
+        self._question.set_words(self._leaving)
+        self._start, self.of_part, self.of_feature = (QWidget() for _ in range(3))
+        self._open, self._teach, self._plate = (PushButton() for _ in range(3))
+        self._texts = tuple(text_label(TextSize.LEAD) for _ in range(3))
         self._artefact = ChoiceField()
-        self._kind_label = text_label(TextSize.SMALL, Tone.QUIET)
         self._kind = ChoiceField()
-        self._kind_label.setBuddy(self._kind)
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
         self._scan = QCheckBox()
         self._moved, self._save_plan, self._export = (PushButton() for _ in range(3))
+        self._other = PushButton()
 
         # Layout
-        buttons = self._open, self._artefact, self._free, self._plate
-        cells = (*buttons, (self._name, 1))
-        of_feature = self._kind_label, self._kind, self._scan
-        of_part = self._moved, self._save_plan, self._export
-        self._rows = horizontal_layout(self)
-        horizontal_layout(self._rows, *cells, stretch=1)
-        horizontal_layout(self._rows, *of_feature, *of_part)
-        self._use_room()
+        vertical_layout(self, self._question, (self._start, 1))
+        rows = vertical_layout(self._start, 1, spacing=3 * GRID, margins=4 * GRID)
+        buttons = self._open, self._teach, self._plate
+        for button, words in zip(buttons, self._texts, strict=True):
+            button.setProperty("inviting", button is self._open)
+            button.setMinimumSize(BUTTON_WIDTH, BUTTON_HEIGHT)
+            horizontal_layout(rows, button, (words, 1), spacing=3 * GRID)
+        fill(rows, (self._artefact, 0, Qt.AlignmentFlag.AlignLeft), 2)
+        horizontal_layout(self.of_feature, self._kind, self._scan)
+        of_part = self._moved, self._save_plan, self._export, self._other
+        horizontal_layout(self.of_part, *of_part)
 
         # Connections
         self._open.clicked.connect(self.pick_plan)
-        self._free.clicked.connect(self._on_free_clicked)
+        self._teach.clicked.connect(self._on_teach_clicked)
         self._plate.clicked.connect(self._on_plate_clicked)
+        self._other.clicked.connect(self._on_other_clicked)
+        self._question.agreed.connect(self._leave_plan)
         self._artefact.activated.connect(self._on_artefact_chosen)
         workbench.library.changed.connect(self._list_artefacts)
         self._kind.activated.connect(self._on_kind_chosen)
@@ -83,30 +112,31 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
 
         self._retranslate()
 
-    def set_status(self, status: VerificationStatus) -> None:
+    def set_status(self, status: VerificationStatus, *, lacks_plan: bool) -> None:
         """Show a measurement."""
         self._status = status
-        plan = self._plan()
-        self._name.setText("" if plan is None else worded(plan.words))
+        self._start.setVisible(lacks_plan)
         planned = self._planned()
-        for each in (self._kind_label, self._kind, self._scan, self._moved):
-            each.setVisible(planned is not None)
-        self._moved.setEnabled(status.state is not None and bool(status.state.runs))
+        is_taught = planned is not None and planned.nominal is None
+        self.of_feature.setVisible(is_taught)
+        has_runs = status.state is not None and bool(status.state.runs)
+        self._moved.setVisible(planned is not None and has_runs)
         kind = None if planned is None else planned.kind
         self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
         self._scan.setChecked(planned is not None and planned.scan)
-        self._plate.setVisible(self._live.operator is not None)
+        is_simulated = self._live.operator is not None
+        why_not = "" if is_simulated else self.tr("Only with the simulated camera.")
+        self._plate.set_why_not(why_not)
         for button in (self._save_plan, self._export):
             button.setVisible(self._part() is not None)
 
+    def first_control(self) -> QWidget:
+        """Return the first choice of a plan."""
+        return self._open
+
     def choose(self, plan: Plan) -> None:
         """Measure by a plan, from its first feature."""
-        choices = self._selection.choices
-        options = structs.replace(choices.options_of(PART), plan=plan)
-        state = self._status.state
-        if state is not None and state.is_begun:
-            self._run.runner.ask(lambda workflow: workflow.start_over())
-        self._selection.set_choices(choices.with_options(options))
+        choose_plan(self._workbench, plan)
 
     def _plan(self) -> Plan | None:
         return self._selection.choices.options_of(PART).plan
@@ -129,25 +159,23 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
         return None if found is None else found.part
 
     @override
-    def _use_room(self) -> None:
-        set_stacked(self._rows, self._room.is_narrow)
-
-    @override
     def _retranslate(self) -> None:
-        self._open.setText(self.tr("Open plan..."))
-        set_tooltip(self._open, self.tr("Measure by a plan in a YAML file."))
-        self._free.setText(self.tr("Without a plan"))
-        set_tooltip(
-            self._free,
+        self._open.setText(self.tr("Open a plan..."))
+        self._teach.setText(self.tr("Teach a plan"))
+        self._plate.setText(self.tr("Try the simulated plate"))
+        texts = (
+            self.tr("Measure by a plan in a YAML file."),
             self.tr(
-                "Features are recognised while they are probed; end with the main "
-                "button."
+                "Features are recognised while they are probed; save them as a plan "
+                "at the end."
             ),
+            self.tr("Ten features of a plate that the simulated operator probes."),
         )
-        self._plate.setText(self.tr("Use simulated plate"))
+        for label, text in zip(self._texts, texts, strict=True):
+            label.setText(text)
+        self._other.setText(self.tr("Other plan"))
         self._artefact.setAccessibleName(self.tr("Artefact of the library"))
         self._list_artefacts()
-        self._kind_label.setText(self.tr("Feature"))
         self._kind.setAccessibleName(self.tr("Kind of the feature that is probed"))
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
@@ -193,17 +221,33 @@ class PlanPanel(ResponsiveLayout, Translated, QWidget):
     def _folder(self) -> str:
         return str(self._workbench.save_place.folder())
 
-    def _on_free_clicked(self) -> None:
+    def _on_teach_clicked(self) -> None:
         self.choose(free_plan(self.tr("Part")))
+
+    def _leaving(self) -> Question:
+        return Question(
+            self.tr("Leave the plan? The points of this part are discarded."),
+            self.tr("Leave the plan"),
+            self.tr("Continue"),
+        )
+
+    def _on_other_clicked(self) -> None:
+        state = self._status.state
+        if state is not None and state.is_begun and not self._status.is_done:
+            self._question.ask()
+        else:
+            self._leave_plan()
+
+    def _leave_plan(self) -> None:
+        choose_plan(self._workbench, None)
 
     def _list_artefacts(self) -> None:
         """Offer the references of the library that have a plan."""
         self._artefact.clear()
         self._artefact.addItem(self.tr("Artefact..."))
-        listed = self._workbench.library.statuses.library.references
-        for name, item in listed.items():
-            if item.artefact is not None and not item.is_retired:
-                self._artefact.addItem(name, item.artefact)
+        library = self._workbench.library.statuses.library
+        for name, artefact in listed_artefacts(library).items():
+            self._artefact.addItem(name, artefact)
         self._artefact.setVisible(self._artefact.count() > 1)
 
     def _on_artefact_chosen(self) -> None:

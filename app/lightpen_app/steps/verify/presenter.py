@@ -1,9 +1,12 @@
 """View state of the step Verify, computed from the status of the verification."""
 
+from dataclasses import dataclass
+
 from PySide6.QtCore import QObject
 
 from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import TipStatus
 from lightpen.verification.probing.probing import ProbingPhase
@@ -11,13 +14,18 @@ from lightpen.verification.session.session import BROKEN_OFF, rules_of
 from lightpen.verification.session.session_state import (
     SessionSetup,
     SessionState,
+    bands_so_far,
     fraction_done,
     instruction,
     is_at_rest,
 )
 from lightpen.verification.session.status import ReadingState, VerificationStatus
-from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.assessment import (
+    CALIBRATE_AGAIN,
+    VerificationAssessment,
+)
 from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.task import Band
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import Instruction, grade_text
 from lightpen_app.look.sentences import worded
@@ -25,7 +33,9 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.steps.page import MainAction
-from lightpen_app.steps.verify.findings import posture_value
+from lightpen_app.steps.verify.band_chart import value_text
+from lightpen_app.steps.verify.check_list import CheckRow
+from lightpen_app.steps.verify.figure import FigureValue, posture_value
 from lightpen_app.steps.verify.view_state import (
     Headline,
     VerifyView,
@@ -33,11 +43,18 @@ from lightpen_app.steps.verify.view_state import (
     lamps_message,
 )
 from lightpen_app.widgets.operator_view import OperatorValue
-from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State
 from lightpen_app.widgets.status_mark import status_text
 from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
+
+
+@dataclass(frozen=True, eq=False)
+class CheckResult:
+    """What a check found."""
+
+    bands: tuple[Band, ...]
+    grade: Grade
 
 
 class VerifyPresenter(QObject):
@@ -49,6 +66,8 @@ class VerifyPresenter(QObject):
         super().__init__()
         self._selection, self._tips = workbench.selection, workbench.library
         self._verification, self._live = run, workbench.live
+        self._results: dict[str, CheckResult] = {}  # of the present tip, by task
+        self._tip_file: InputFile | None = None
 
     def view(self) -> VerifyView:
         """Return the view."""
@@ -58,7 +77,8 @@ class VerifyPresenter(QObject):
             headline=headline,
             operator=self.operator_value(),
             lamps=lamps_message(status),
-            titles=tuple(self._title(task) for task in self.tasks),
+            rows=self.rows(),
+            current=self.current_row(),
             task=None if status.refusal is not None else status.task,
             pause=(
                 self.tr("Continue (Space)")
@@ -86,9 +106,36 @@ class VerifyPresenter(QObject):
         )
 
     def next_step(self) -> str:
-        """Return the key of the step after this one."""
+        """Return the key of the step after this one; empty for another check."""
         found = self._status.assessment
-        return "measure" if found is not None and found.is_accepted else "start"
+        if found is not None and found.is_accepted:
+            return "measure"
+        again = found is not None and found.next_step.code == CALIBRATE_AGAIN.code
+        return "swing" if again else ""
+
+    def rows(self) -> tuple[CheckRow, ...]:
+        """Return the checks, each with its value and verdict once it is done."""
+        self._keep_result()
+        return tuple(map(self._row, self.tasks))
+
+    def current_row(self) -> int:
+        """Return the row of what is probed now, or was last."""
+        setup = self._status.setup
+        chosen = None if setup is None else setup.choices.task
+        return self.tasks.index(chosen) if chosen in self.tasks else 0
+
+    def figure(self, row: int) -> FigureValue:
+        """Return the figure of a row."""
+        setup, state, task = self._status.setup, self._status.state, self.tasks[row]
+        title, purpose = worded(task.title), worded(task.purpose)
+        if setup is None or state is None or task is not setup.choices.task:
+            result = self._results.get(task.kind)
+            bands = () if result is None else result.bands
+            return FigureValue(title, purpose, bands=bands, action=self.tr("Do now"))
+        bands = bands_so_far(setup, state)
+        if state.done is not None:
+            return FigureValue(title, bands=bands)
+        return FigureValue(title, purpose, posture_value(setup, state), bands[:1])
 
     def operator_value(self) -> OperatorValue:
         """Return the content of page and operator view."""
@@ -109,7 +156,7 @@ class VerifyPresenter(QObject):
                 if status.is_paused
                 else self.tr("Space: pause")
             ),
-            dial=posture_value(setup, state, task) if shown else None,
+            dial=posture_value(setup, state) if shown else None,
         )
 
     @property
@@ -163,27 +210,35 @@ class VerifyPresenter(QObject):
     def _action(self) -> MainAction:
         status = self._status
         if status.is_done:
-            is_fine = self.next_step() == "measure"
-            goes_on = self.tr("Measure a part") if is_fine else self.tr("Back to Start")
-            return MainAction(goes_on)
-        has_points = status.state is not None and bool(status.state.touches)
+            words = {
+                "measure": self.tr("Measure a part"),
+                "swing": self.tr("Calibrate again"),
+                "": self.tr("Check again"),
+            }
+            return MainAction(words[self.next_step()])
+        has_points = status.state is not None and status.state.is_begun
         why_not = "" if has_points else self.tr("No point is recorded yet.")
         return MainAction(self.tr("Finish early"), why_not, is_early=True)
 
-    def _title(self, task: AnyTask) -> StatusMessage:
-        """Return the name of a task, with its progress if selected."""
+    def _keep_result(self) -> None:
+        """Remember what the checks of the present tip found."""
+        status, tip = self._status, self._status.tip
+        if tip is not None and tip.tip_file != self._tip_file:
+            self._results, self._tip_file = {}, tip.tip_file
+        setup, state, found = status.setup, status.state, status.assessment
+        if setup is not None and state is not None and found is not None:
+            bands = bands_so_far(setup, state)
+            self._results[setup.choices.kind] = CheckResult(bands, found.grade)
+
+    def _row(self, task: AnyTask) -> CheckRow:
         status, name = self._status, worded(task.title)
-        found = None if status.state is None else status.state.found_by(task)
-        if found is not None:
-            grade = found.assessment.grade
-            far, mark = self._grade_text(grade), GRADE_MARKS[grade]
-        elif status.setup is not None and task is not status.setup.choices.task:
-            return StatusMessage(name)
-        elif task is status.task:
-            far, mark = self.tr("now"), (Sign.PLAY, Tone.ACTIVE)
-        else:
-            far, mark = self.tr("to do"), (Sign.RING, Tone.QUIET)
-        return StatusMessage(self.tr("{0}: {1}").format(name, far), *mark)
+        if task is status.task:
+            return CheckRow(name, self.tr("now"), Sign.PLAY, Tone.ACTIVE)
+        result = self._results.get(task.kind)
+        if result is None:
+            return CheckRow(name, "", Sign.RING, Tone.QUIET)
+        value = f"{self._grade_text(result.grade)} {value_text(result.bands[0])}"
+        return CheckRow(name, value, *GRADE_MARKS[result.grade])
 
     def _grade_text(self, grade: Grade) -> str:
         """Return a grade; REPEAT refers to the verification, not to a swing."""

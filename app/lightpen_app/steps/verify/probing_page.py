@@ -1,26 +1,23 @@
 """Base of the steps Verify and Measure: probing from the tip to a verdict."""
 
-from functools import partial
-
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QStackedWidget, QTabWidget, QWidget
 from typing_extensions import override
 
 from lightpen.verification.session.status import SessionEventKind
-from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.verify.listed_pages import ListedPages
+from lightpen_app.steps.verify.check_list import CheckList
+from lightpen_app.steps.verify.details import DetailsView
+from lightpen_app.steps.verify.figure import FigurePanel
 from lightpen_app.steps.verify.presenter import VerifyPresenter
 from lightpen_app.steps.verify.progress_panel import ProgressPanel
 from lightpen_app.steps.verify.simulator_controls import ProbingSimulatorControls
-from lightpen_app.steps.verify.task_panel import TaskPanel
 from lightpen_app.steps.verify.view_state import VerifyView
 from lightpen_app.widgets.image_view import ImageView
-from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
@@ -29,7 +26,6 @@ from lightpen_app.work.verification_run import VerificationRun
 from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped
-IMAGE_WIDTH = 56 * GRID  # px, at least
 
 SOUNDS: dict[SessionEventKind, Sound] = {
     SessionEventKind.RECORDED: Sound.KEPT,
@@ -41,10 +37,14 @@ SOUNDS: dict[SessionEventKind, Sound] = {
 
 
 class ProbingPage(ResponsiveLayout, Page):
-    """Shows a session and leads it; nothing on it must be pressed meanwhile."""
+    """Shows a session and leads it; nothing on it must be pressed meanwhile.
+
+    At the left is the list of what is to be done, beside it one large figure of what is
+    probed now; tables and the live image are behind tabs.
+    """
 
     shows_images = True
-    narrow_below = 150 * GRID  # px; then the live image is a page of the list
+    narrow_below = 112 * GRID  # px; then the list is behind a tab, too
 
     def __init__(
         self,
@@ -65,25 +65,25 @@ class ProbingPage(ResponsiveLayout, Page):
 
         # Widgets
         self._progress = ProgressPanel(workbench, run)
-        self._panels = {  # made when first shown: halves the start of the page
-            task: LazyWidget(partial(self._make_panel, task))
-            for task in presenter.tasks
-        }
-        self._pages = ListedPages()
-        for panel in self._panels.values():
-            self._pages.add(panel)
+        self._work, self._checks = QWidget(), CheckList()
+        self._figure, self._details = FigurePanel(), DetailsView()
         self._image = ImageView()
+        self._tabs = QTabWidget()
+        for tab in (self._figure, self._details, self._image):
+            self._tabs.addTab(tab, "")
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self._tabs)
         self._simulator = ProbingSimulatorControls(self._live)
         self._showing = QTimer(self, singleShot=True, interval=SHOWING_MS)
 
         # Layout
-        layout = vertical_layout(self, self._progress)
-        scroll = PageScroll()
-        scrolled = ShrinkingScrollContent()
-        self._scrolled = vertical_layout(scrolled, (self._pages, 1))
-        scroll.setWidget(scrolled)
-        self._body = horizontal_layout(layout, (scroll, 3), spacing=2 * GRID, stretch=1)
-        fill(layout, self._simulator)
+        layout, scroll = vertical_layout(self, self._progress), PageScroll()
+        content = ShrinkingScrollContent()
+        self._rows = vertical_layout(content)  # more of them may be added
+        self._body = horizontal_layout(self._work, (self._stack, 1), spacing=2 * GRID)
+        self._rows.addWidget(self._work, 1)
+        scroll.setWidget(content)
+        fill(layout, (scroll, 1), self._simulator)
         self._use_room()
 
         # Connections
@@ -92,6 +92,7 @@ class ProbingPage(ResponsiveLayout, Page):
         self._run.happened.connect(self._on_happened)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._show_soon)
+        self._tabs.currentChanged.connect(self._show)
         workbench.selection.changed.connect(self._on_workbench_changed)
         workbench.library.changed.connect(self.changed)
         self._showing.timeout.connect(self._show)
@@ -124,7 +125,11 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def run_main_action(self) -> None:
         if self._run.status.is_done:
-            self.step_requested.emit(self._presenter.next_step())
+            step = self._presenter.next_step()
+            if step:
+                self.step_requested.emit(step)
+            else:
+                self._runner.ask(lambda workflow: workflow.start_over())
         else:
             self._runner.ask(lambda workflow: workflow.end_task())
 
@@ -138,7 +143,7 @@ class ProbingPage(ResponsiveLayout, Page):
 
     @override
     def first_control(self) -> QWidget:
-        return self._pages
+        return self._checks
 
     @override
     def entered(self) -> None:
@@ -170,23 +175,28 @@ class ProbingPage(ResponsiveLayout, Page):
     @override
     def _retranslate(self) -> None:
         self._image.set_message(self.tr("No image yet"))
-        self._pages.set_list_name(self.tr("Tasks"))
-        if self._room.is_narrow:
-            self._pages.set_title(self._image, self.tr("Live image"))
+        names = {
+            self._figure: self.tr("Figure"),
+            self._details: self.tr("Details"),
+            self._image: self.tr("Live image"),
+            self._checks: self.tr("List"),
+        }
+        for tab, name in names.items():
+            self._tabs.setTabText(self._tabs.indexOf(tab), name)
+        self._checks.setAccessibleName(self.tr("Checks and features"))
         self._show()
 
     @override
     def _use_room(self) -> None:
-        """Place the live image beside or among the tasks."""
-        if self._room.is_narrow:
-            self._image.setMinimumWidth(0)
-            self._pages.add(self._image)
-            self._pages.set_title(self._image, self.tr("Live image"))
+        """Place the list beside or behind the figure."""
+        is_narrow = self._room.is_narrow
+        self._checks.set_wide(is_narrow)
+        if is_narrow:
+            self._tabs.addTab(self._checks, self.tr("List"))
         else:
-            self._pages.remove(self._image)
-            self._image.setMinimumWidth(IMAGE_WIDTH)
-            self._body.addWidget(self._image, 2)
-            self._image.show()  # a page that is not the current one is hidden
+            self._tabs.removeTab(self._tabs.indexOf(self._checks))
+            self._body.insertWidget(0, self._checks)
+            self._checks.show()
 
     def _show_soon(self) -> None:
         if not self._showing.isActive():
@@ -196,30 +206,26 @@ class ProbingPage(ResponsiveLayout, Page):
         before, self._view = self._view, self._presenter.view()
         view, status = self._view, self._run.status
         self._progress.set_value(view)
-        for (task, place), title in zip(self._panels.items(), view.titles, strict=True):
-            panel = place.content_so_far()
-            if panel is not None:
-                panel.set_status(status)
-            self._pages.set_title(place, title.text, title.sign, title.tone)
-            if task is view.task and view.task is not before.task:
-                self._pages.show_page(place)
+        self._checks.set_rows(view.rows)
+        self._checks.show_row(self._shown_row())
+        self._show_row(self._shown_row())
+        if self._details.isVisible():
+            self._details.set_value(status.setup, status.state)
         if self.isVisible():
             self.operator_value_changed.emit(view.operator)
         if view.headline != before.headline:
             self.changed.emit()
 
-    def _make_panel(self, task: AnyTask) -> TaskPanel:
-        panel = TaskPanel(task, self._runner)
-        panel.set_choices(self._selection.choices)
-        panel.set_status(self._run.status)
-        panel.value_changed.connect(self._selection.set_choices)
-        return panel
+    def _shown_row(self) -> int:
+        """Return the row whose figure is shown; by default what is probed now."""
+        return self._view.current
+
+    def _show_row(self, row: int) -> None:
+        """Show the figure of a row."""
+        if self._figure.isVisible():
+            self._figure.set_value(self._presenter.figure(row))
 
     def _on_workbench_changed(self) -> None:
-        for place in self._panels.values():
-            panel = place.content_so_far()
-            if panel is not None:
-                panel.set_choices(self._selection.choices)
         self._show_soon()
         self.changed.emit()
 

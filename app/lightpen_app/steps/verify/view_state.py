@@ -10,6 +10,7 @@ from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.page import MainAction
+from lightpen_app.steps.verify.check_list import CheckRow
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.sign_label import StatusMessage
 
@@ -33,7 +34,8 @@ class VerifyView:
     operator: OperatorValue = field(default_factory=OperatorValue)
     # The drift of fixed lamps, unless it is the verdict.
     lamps: StatusMessage = field(default_factory=StatusMessage)
-    titles: tuple[StatusMessage, ...] = ()  # titles of the tasks with their progress
+    rows: tuple[CheckRow, ...] = ()  # checks, or features of a part
+    current: int = 0  # row of what is probed now
     task: AnyTask | None = None  # the current one
     pause: str = ""
     can_be_accepted: bool = False

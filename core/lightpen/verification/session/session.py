@@ -24,13 +24,14 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import (
     SessionSetup,
     SessionState,
+    numbered,
     without_touches,
 )
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import with_move
 from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
 from lightpen.verification.tasks.registry import AnyTask
-from lightpen.verification.tasks.task import Points, Runs, Screening, without_last
+from lightpen.verification.tasks.task import Points, Screening, without_last
 
 BROKEN_OFF = message("session.broken-off")
 
@@ -212,7 +213,7 @@ def _with_run(setup: SessionSetup, state: SessionState, task: AnyTask) -> Sessio
     options = setup.choices.options_of(task)
     if len(runs) >= task.n_runs(options):
         return _done(setup, state, task, runs)
-    (task.check or task.measure)(_numbered(runs), setup.conditions, options)
+    (task.check or task.measure)(numbered(runs), setup.conditions, options)
     return replace(without_touches(state), runs=runs)
 
 
@@ -221,9 +222,5 @@ def _done(
 ) -> SessionState:
     """Measure a task."""
     options = setup.choices.options_of(task)
-    found = task.measure(_numbered(runs), setup.conditions, options)
+    found = task.measure(numbered(runs), setup.conditions, options)
     return replace(without_touches(state), runs=(), done=task, found=found)
-
-
-def _numbered(runs: Sequence[Points]) -> Runs:
-    return [(f"#{i}", points) for i, points in enumerate(runs, start=1)]

@@ -1,23 +1,30 @@
 """State of a verification: setup, probed points and results."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
+from lightpen.model.limits import VerificationLimits
 from lightpen.verification.probing.drift_reference import LampDrift
 from lightpen.verification.probing.probing import ProbingPhase, ProbingState, at_rest
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.probed_point import NO_DRIFT
 from lightpen.verification.tasks.registry import AnyTask
 from lightpen.verification.tasks.task import (
+    Band,
     Conditions,
     Found,
     FoundT,
     OptionsT,
     Points,
+    Runs,
+    TaskOptions,
     TaskProgress,
     VerificationTask,
 )
@@ -118,6 +125,42 @@ def instruction(setup: SessionSetup, state: SessionState) -> Message:
         return state.fault
     options = setup.choices.options_of(task)
     return task.instruction(options, state.progress(setup, task))
+
+
+def bands_so_far(setup: SessionSetup, state: SessionState) -> tuple[Band, ...]:
+    """Return the values of the session, or of its points so far, with their limits."""
+    task = setup.choices.task
+    if state.found is not None:
+        return tuple(task.bands(state.found, setup.conditions))
+    runs = state.runs
+    if task.judges_points and state.touches:
+        runs = (*runs, state.touches)
+    options = setup.choices.options_of(task)
+    given = setup.instrument, setup.choices.limits, setup.ball_diameter
+    return _bands_of(task, options, *given, runs) if runs else ()
+
+
+@lru_cache(maxsize=8)
+def _bands_of(
+    task: AnyTask,
+    options: TaskOptions,
+    instrument: Instrument,
+    limits: VerificationLimits,
+    ball_diameter: float | None,
+    runs: tuple[Points, ...],
+) -> tuple[Band, ...]:
+    """Return the values of some runs; none as long as they do not determine any."""
+    conditions = Conditions(instrument, limits, ball_diameter)
+    try:
+        found = task.measure(numbered(runs), conditions, options)
+    except CalibrationError:
+        return ()
+    return tuple(task.bands(found, conditions))
+
+
+def numbered(runs: Sequence[Points]) -> Runs:
+    """Return runs with their names."""
+    return [(f"#{i}", points) for i, points in enumerate(runs, start=1)]
 
 
 def fraction_done(setup: SessionSetup, state: SessionState) -> float:

@@ -41,6 +41,7 @@ from lightpen.verification.tasks.fixed_point import (
 )
 from lightpen.verification.tasks.probed_point import mean_point
 from lightpen.verification.tasks.task import (
+    Band,
     Conditions,
     Found,
     HandGoal,
@@ -57,7 +58,8 @@ MIN_VISITS = 2
 VISIT_POINTS = 3
 SAME_POSTURE = float(np.radians(12.0))  # within which a pen is held alike
 BY_CHANCE = 0.005  # probability that a fixed reference seems to move
-ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
+# The limit along the view is three times as large, as of a fixed point.
+SCALES = np.array([1.0, 1.0, 1.0 / 3.0])
 TOUCH_LONGER = message("drift.touch-longer")
 USE_TOUCHES = message("drift.use-touches")
 
@@ -113,9 +115,8 @@ def _assessment(
     limits: VerificationLimits,
 ) -> VerificationAssessment:
     """Judge the farthest move; along the view three times the limit is allowed."""
-    scales = np.array([1.0, 1.0, 1.0 / ALONG])
-    scaled = moves * scales
-    spreads = covariances * np.outer(scales, scales)
+    scaled = moves * SCALES
+    spreads = covariances * np.outer(SCALES, SCALES)
     lengths = np.linalg.norm(scaled, axis=1)
     worst = int(np.argmax(lengths))
     distance, spread = float(lengths[worst]), spreads[worst]
@@ -189,13 +190,22 @@ def _tables(found: Drift, conditions: Conditions) -> tuple[ResultTable, ...]:
     return (ResultTable(message("drift.table"), columns, tuple(rows), (note,)),)
 
 
-def _figures_so_far(
-    options: DriftOptions, progress: TaskProgress, conditions: Conditions
-) -> tuple[ResultTable, ...]:
-    if len(progress.runs) < MIN_VISITS:
-        return (ResultTable(message("drift.table"), notes=(message("drift.note"),)),)
-    visits = [(str(i), points) for i, points in enumerate(progress.runs, start=1)]
-    return _tables(measure_drift(visits, conditions), conditions)
+def _bands(found: Drift, conditions: Conditions) -> tuple[Band, ...]:
+    """Return the farthest move, along each axis."""
+    worst = int(np.argmax(np.linalg.norm(found.moves * SCALES, axis=1)))
+    limits, bands = conditions.limits, []
+    for axis, move, u, scale in zip(
+        "uvw",
+        found.moves[worst].tolist(),
+        found.uncertainties[worst].tolist(),
+        SCALES.tolist(),
+        strict=True,
+    ):
+        limit = limits.drift / scale
+        name = message("drift.move-along", axis=axis)
+        decision = limits.decision(move, u, limit)
+        bands.append(Band(name, move, u, -limit, limit, decision=decision))
+    return tuple(sorted(bands, key=lambda each: -abs(each.value) / each.upper))
 
 
 def _instruction(options: DriftOptions, progress: TaskProgress) -> Message:
@@ -222,7 +232,7 @@ DRIFT = VerificationTask(
     measure=measure_drift,
     entries=_entries,
     tables=_tables,
-    figures_so_far=_figures_so_far,
+    bands=_bands,
     hand=lambda options, run, step: HandGoal(),
     n_points=lambda options: VISIT_POINTS,
     n_runs=lambda options: MIN_VISITS,

@@ -19,6 +19,7 @@ from lightpen.estimation.pivot.pivot import in_deviations
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.coverage import posture_spread
+from lightpen.model.decision_rules import Decision
 from lightpen.model.expanded_uncertainty import COVERAGE, COVERAGE_FACTOR
 from lightpen.model.information import symmetric_root
 from lightpen.model.limits import VerificationLimits
@@ -39,6 +40,7 @@ from lightpen.verification.tasks.probed_point import (
 )
 from lightpen.verification.tasks.task import (
     ANY,
+    Band,
     Conditions,
     Found,
     HandGoal,
@@ -222,11 +224,7 @@ def _assessment(
     against = judged_tip(found.tip, limits)
     if against is not None:
         return against
-    deviation = found.calibrated.deviation
-    n_free = len(found.touches) - 1
-    by_chance = np.sqrt(chi_square_quantile(n_free, UNUSUAL) / n_free)
-    limit = np.array([limits.across, limits.across, limits.along])
-    limit = np.maximum(limit, by_chance * found.expected_deviation)
+    deviation, limit = found.calibrated.deviation, _limit(found, limits)
     axis = int(np.argmax(deviation / limit))
     if deviation[axis] > limit[axis]:
         return refused(
@@ -264,6 +262,14 @@ def _assessment(
     power = message("tip.verified", detectable=found.tip.detectable)
     reason = _steady(found.calibrated)
     return accepted(message("tip.with-power", reason=reason, power=power))
+
+
+def _limit(found: FixedPoint, limits: VerificationLimits) -> FloatArray:
+    """Return the limit of the standard deviation, (3,), mm, or what noise may show."""
+    n_free = len(found.touches) - 1
+    by_chance = np.sqrt(chi_square_quantile(n_free, UNUSUAL) / n_free)
+    limit = np.array([limits.across, limits.across, limits.along])
+    return np.asarray(np.maximum(limit, by_chance * found.expected_deviation))
 
 
 def without_others(
@@ -340,16 +346,25 @@ def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...
     return *tables, nominal
 
 
-def _figures_so_far(
-    options: FixedPointOptions, progress: TaskProgress, conditions: Conditions
-) -> tuple[ResultTable, ...]:
-    points = progress.points
-    own = scatter_of(points)
-    table = _points(message("fixed-point.table"), own.points)
-    if len(points) < 2:
-        return (table,)
-    nominal = nominal_scatter(points, conditions.instrument, conditions.nominal_tip)
-    return table, _comparison(own, nominal)
+def _bands(found: FixedPoint, conditions: Conditions) -> tuple[Band, ...]:
+    """Return the error of the tip, and the standard deviation along each axis."""
+    limits, tip = conditions.limits, found.tip
+    error, known = float(np.linalg.norm(tip.known_change)), tip.known_uncertainty
+    decision = limits.decision(error, known, limits.tip)
+    name = message("fixed-point.tip-error")
+    bands = [Band(name, error, known, upper=limits.tip, decision=decision)]
+    share = COVERAGE_FACTOR / np.sqrt(2 * (len(found.touches) - 1))
+    for axis, value, u, limit in zip(
+        "uvw",
+        found.calibrated.deviation.tolist(),
+        (share * found.expected_deviation).tolist(),
+        _limit(found, limits).tolist(),
+        strict=True,
+    ):
+        name = message("fixed-point.deviation-along", axis=axis)
+        kept = Decision.ACCEPTED if value <= limit else Decision.REJECTED
+        bands.append(Band(name, value, u, upper=limit, decision=kept))
+    return tuple(bands)
 
 
 def _points(title: Message, places: FloatArray) -> ResultTable:
@@ -398,7 +413,7 @@ FIXED_POINT = VerificationTask(
     measure=measure_fixed_point,
     entries=_entries,
     tables=_tables,
-    figures_so_far=_figures_so_far,
+    bands=_bands,
     hand=lambda options, run, step: HandGoal(
         tilt=TILT, direction=2 * pi * step / options.n_touches
     ),

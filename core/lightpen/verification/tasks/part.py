@@ -7,7 +7,6 @@ features.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import sqrt
 from typing import Any
 
@@ -20,7 +19,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.artefacts import QUANTITIES
 from lightpen.measuring.part import CharacteristicResult, MeasuredPart, measure_part
-from lightpen.measuring.plan import Plan, Side
+from lightpen.measuring.plan import IS_ANGLE, Plan, Side
 from lightpen.measuring.plan_checks import missing_normal
 from lightpen.measuring.report import (
     PartRow,
@@ -46,7 +45,6 @@ from lightpen.verification.tasks.part_course import (
     PartOptions,
     base_name,
     course,
-    feature_so_far,
     hand_goal,
     planned_at,
     touches_of_part,
@@ -55,9 +53,9 @@ from lightpen.verification.tasks.pen_scale import scale_of
 from lightpen.verification.tasks.probed_point import ProbedPoint, point_entries
 from lightpen.verification.tasks.task import (
     ANY,
+    Band,
     Conditions,
     Found,
-    Points,
     ResultRow,
     ResultTable,
     Runs,
@@ -341,54 +339,21 @@ def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
     return tuple(ResultRow(each.name, each.values, 4, each.remark) for each in rows)
 
 
-@lru_cache(maxsize=4)
-def _finished(
-    options: PartOptions,
-    runs: tuple[Points, ...],
-    instrument: Instrument,
-    limits: VerificationLimits,
-    ball_diameter: float | None,
-) -> tuple[ResultTable, ...]:
-    """Return value, U and verdict of the features that are done."""
-    conditions = Conditions(instrument, limits, ball_diameter)
-    numbered = [(f"#{i}", points) for i, points in enumerate(runs, start=1)]
-    try:
-        part = measure_by_plan(numbered, conditions, options).part
-    except CalibrationError:  # a normal or datum is still to be probed
-        return ()
-    columns = (
-        message("part.actual"),
-        message("table.uncertainty"),
-        message("part.decision"),
-    )
-    rows = tuple(
-        ResultRow(each.name, (each.values[2], each.values[4]), 4, each.remark)
-        for each in characteristic_rows(part)
-    )
-    return (ResultTable(message("part.characteristics"), columns, rows),)
-
-
-def _figures_so_far(
-    options: PartOptions, progress: TaskProgress, conditions: Conditions
-) -> tuple[ResultTable, ...]:
-    now = feature_so_far(options, progress, conditions)
-    if now is None:
-        return ()
-    by = conditions.instrument, conditions.limits, conditions.ball_diameter
-    done = _finished(options, progress.runs, *by) if progress.runs else ()
-    kind = message("part.unknown-kind") if now.kind is None else NAMES[now.kind]
-    title = message("part.touches", name=now.planned.name, kind=kind)
-    rows = tuple(
-        ResultRow(
-            message("table.point", number=i),
-            [*point.point_cam.tolist(), off if np.isfinite(off) else None],
+def _bands(found: Part, conditions: Conditions) -> tuple[Band, ...]:
+    return tuple(
+        Band(
+            each.planned.words,
+            each.value.value,
+            each.value.uncertainty,
+            each.lower,
+            each.upper,
+            each.planned.nominal or 0.0,
+            each.decision,
+            each.planned.features,
+            each.planned.quantity in IS_ANGLE,
         )
-        for i, (point, off) in enumerate(
-            zip(progress.points, now.deviations.tolist(), strict=True), start=1
-        )
+        for each in found.part.results
     )
-    columns = (*"uvw", message("part.deviation")) if rows else ()
-    return (*done, ResultTable(title, columns, rows))
 
 
 def _fraction(options: PartOptions, progress: TaskProgress) -> float:
@@ -461,7 +426,8 @@ PART = VerificationTask(
     check=check_feature,
     entries=_entries,
     tables=_tables,
-    figures_so_far=_figures_so_far,
+    bands=_bands,
+    judges_points=False,
     hand=hand_goal,
     n_points=lambda options: 1,
     n_runs=lambda options: max(len(course(options)), 1),

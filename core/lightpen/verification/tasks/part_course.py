@@ -142,7 +142,7 @@ class FeatureSoFar:
 
     planned: PlannedFeature
     kind: FeatureKind | None  # as planned, or as recognised so far
-    deviations: FloatArray  # (N,), mm; NaN before it is determined
+    fit: Feature | None = None  # to the ball centres, once they determine it
     next_touch: Place | None = None  # the most informative one, frame of the camera
 
 
@@ -156,13 +156,10 @@ def feature_so_far(
     points = progress.points
     kind, fit = fit_of(planned, points, conditions.instrument)
     if fit is None:
-        return FeatureSoFar(planned, kind, np.full(len(points), np.nan))
+        return FeatureSoFar(planned, kind)
     places = np.array([point.point_cam for point in points])
     place = best_places(area_of(fit, places), 1, places)[0]
-    off = np.linalg.norm(fit.distances, axis=1)
-    if fit.distances.shape[1] == 1:
-        off = fit.distances[:, 0]
-    return FeatureSoFar(planned, kind, off, place)
+    return FeatureSoFar(planned, kind, fit, place)
 
 
 @lru_cache(maxsize=N_KEPT)

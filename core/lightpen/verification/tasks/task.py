@@ -8,6 +8,7 @@ the window to itself. Nothing else switches on the kind of a task.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from msgspec import Struct
@@ -15,6 +16,7 @@ from msgspec import Struct
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, Number, message
+from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.verification.tasks.assessment import VerificationAssessment
 from lightpen.verification.tasks.probed_point import NO_DRIFT, ProbedPoint
@@ -85,6 +87,21 @@ class ResultTable:
 
 
 @dataclass(frozen=True, eq=False)
+class Band:
+    """A value with its U (k = 2) between its limits, mm or degrees."""
+
+    name: Message | str
+    value: float
+    uncertainty: float
+    lower: float = -inf
+    upper: float = inf
+    nominal: float = 0.0
+    decision: Decision | None = None  # None without limits
+    of: tuple[str, ...] = ()  # features of a part that it needs
+    is_angle: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class TaskProgress:
     """Points of the current run of a task, and completed runs."""
 
@@ -147,6 +164,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     measure: Callable[[Runs, Conditions, OptionsT], FoundT]
     entries: Callable[[FoundT, Instrument], dict[str, Any]]  # of the record
     tables: Callable[[FoundT, Conditions], tuple[ResultTable, ...]]
+    bands: Callable[[FoundT, Conditions], tuple[Band, ...]]  # the leading one first
     hand: Callable[[OptionsT, int, int], HandGoal]  # by run and point from 0
     instruction: Callable[[OptionsT, TaskProgress], Message]
     # Turn, rad, or distance, mm, that makes a point new; both 0 once lifted
@@ -157,9 +175,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     options: type[OptionsT]
     other_run: Message | None = None  # what to do for the first point of another
     n_runs: Callable[[OptionsT], int] = lambda _: 1
-    figures_so_far: Callable[
-        [OptionsT, TaskProgress, Conditions], tuple[ResultTable, ...]
-    ] = lambda options, progress, conditions: (points_table(progress.points),)
     fraction: Callable[[OptionsT, TaskProgress], float] | None = None
     count: Callable[[OptionsT, TaskProgress], Message] | None = None
     screen: Callable[[OptionsT, Conditions, TaskProgress], Screening] = (
@@ -175,6 +190,7 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     scans: Callable[[OptionsT, int], bool] = lambda options, run: False
     # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, OptionsT], object] | None = None
+    judges_points: bool = True  # whether values are shown amid a run
     is_pooled: bool = False  # all images of the command are one run
     counts_drift: bool = True  # whether U counts how far the camera moved
     compares_nominal_tip: bool = False

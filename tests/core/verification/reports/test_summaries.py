@@ -63,7 +63,7 @@ def test_a_table_of_more_than_ten_columns_is_parted_and_its_names_are_cut() -> N
         ),
         ResultRow("short", [float(i) for i in range(12)], 0, "remark"),
     )
-    note = message("drift.note")
+    note = message("fixed-point.no-nominal-tip")
     table = ResultTable(message("drift.table"), columns, rows, (note,))
 
     text = found_text([table, ResultTable(note)], DOUBT, slipped(6), RULE)

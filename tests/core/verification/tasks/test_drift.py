@@ -8,13 +8,13 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.decision_rules import Decision, DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.tasks.assessment import VerificationAssessment
-from lightpen.verification.tasks.drift import DRIFT, DriftOptions, measure_drift
+from lightpen.verification.tasks.drift import DRIFT, measure_drift
 from lightpen.verification.tasks.probed_point import ProbedPoint
-from lightpen.verification.tasks.task import Conditions, TaskProgress
+from lightpen.verification.tasks.task import Conditions
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]
 LIMITS = VerificationLimits()
@@ -147,12 +147,13 @@ def test_a_move_that_is_more_than_chance_and_within_its_limit_is_good(
         for off in (0, 0.02)
     ]
     found = measure_drift(visits, Conditions(instrument, VerificationLimits(drift=0.1)))
-    begun = DRIFT.figures_so_far(
-        DriftOptions(),
-        TaskProgress(runs=tuple(points for _, points in visits)),
-        Conditions(instrument),
+    first, *_ = bands = DRIFT.bands(
+        found, Conditions(instrument, VerificationLimits(drift=0.1))
     )
 
     assert found.moves[1, 0] == pytest.approx(0.02, abs=0.005)
     assert found.assessment.reason.code == "drift.good"
-    assert [row.name for row in begun[0].rows] == ["1", "2"]
+    assert len(bands) == 3
+    assert first.value == found.moves[1, 0]
+    assert (first.lower, first.upper) == (-0.1, 0.1)
+    assert first.decision is Decision.ACCEPTED

@@ -8,6 +8,7 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.tasks.fixed_point import (
@@ -19,7 +20,7 @@ from lightpen.verification.tasks.fixed_point import (
     measure_fixed_point,
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
-from lightpen.verification.tasks.task import Conditions, TaskProgress
+from lightpen.verification.tasks.task import Conditions
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]
 NOMINAL_TIP = np.array([0.0, -90.0, -25.0])
@@ -254,17 +255,21 @@ def test_a_point_is_left_out_that_lies_far_from_most_whatever_its_noise(
     assert refused.value.message.values["needed"] == 3
 
 
-def test_points_come_before_their_comparison(
-    instrument: Instrument, touching: Touching
+@pytest.mark.parametrize(
+    ("off", "decision"), [(0.0, Decision.ACCEPTED), (0.2, Decision.REJECTED)]
+)
+def test_the_error_of_the_tip_leads_the_values_with_its_limit(
+    instrument: Instrument, touching: Touching, off: float, decision: Decision
 ) -> None:
-    touches = touching(np.tile(PAPER_CONE, (2, 1)))
-    one, two = (
-        FIXED_POINT.figures_so_far(
-            FixedPointOptions(), TaskProgress(touches[:n]), Conditions(instrument)
-        )
-        for n in (1, 2)
+    conditions = Conditions(instrument)
+    wrong = PAPER_TIP + np.array([off, 0.0, 0.0])
+    touches = touching(
+        np.tile(PAPER_CONE, (6, 1)), tilt=0.6, n_frames=15, tip_pen=wrong
     )
-    titles = [[table.title.code for table in tables] for tables in (one, two)]
 
-    assert titles[1] == ["fixed-point.table", "fixed-point.comparison"]
-    assert titles[0] == titles[1][:1]
+    found = measure_fixed_point([("", touches)], conditions)
+    tip, *deviations = FIXED_POINT.bands(found, conditions)
+
+    assert tip.value == pytest.approx(off, abs=tip.uncertainty)
+    assert (tip.upper, tip.decision) == (conditions.limits.tip, decision)
+    assert [each.value for each in deviations] == found.calibrated.deviation.tolist()

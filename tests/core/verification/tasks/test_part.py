@@ -35,7 +35,11 @@ from lightpen.verification.session.session import (
     with_moved_part,
     without_last_touch,
 )
-from lightpen.verification.session.session_state import SessionSetup, SessionState
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    bands_so_far,
+)
 from lightpen.verification.tasks.part import PART, Part
 from lightpen.verification.tasks.part_course import (
     SIMULATED_AXES,
@@ -235,15 +239,18 @@ def test_a_feature_that_is_done_shows_its_results_at_once(
     at_it = station(instrument, plan)
     own = plan.features[0].name
     at_it.probe(plan.features[0].n_touches)
-    progress = at_it.state.progress(at_it.setup, PART)
 
-    done, now = PART.figures_so_far(at_it.options, progress, at_it.setup.conditions)
+    bands = bands_so_far(at_it.setup, at_it.state)
 
-    names = [each.words for each in plan.characteristics if each.of == (own,)]
-    assert names
-    assert [row.name for row in done.rows] == names
-    assert all(row.remark for row in done.rows)  # the decision
-    assert now.title.code == "part.touches"
+    planned = [each for each in plan.characteristics if each.of == (own,)]
+    assert planned
+    assert [each.name for each in bands] == [each.words for each in planned]
+    assert [(each.lower, each.upper) for each in bands] == [
+        each.limits for each in planned
+    ]
+    assert all(each.decision for each in bands)
+    at_it.probe(1)  # of the next feature
+    assert bands_so_far(at_it.setup, at_it.state) == bands
 
 
 def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> None:

@@ -184,11 +184,13 @@ def test_deviations_of_the_feature_that_is_probed(
 
     assert now is not None
     assert begun is not None
-    found = now.deviations * np.sign(now.deviations[0])
+    assert now.fit is not None
+    off = np.array([now.fit.distance_of(point.point_cam) for point in points])
+    found = off * np.sign(off[0])
     assert np.sign(found).tolist() == signs
     if kind is FeatureKind.PLANE:
         np.testing.assert_allclose(found, 0.1 * np.array(signs), atol=1e-9)
-    assert begun.deviations.shape == (0,)
+    assert begun.fit is None
     assert feature_so_far(options, TaskProgress((), (points,)), conditions) is None
 
 

@@ -1,7 +1,7 @@
 """Tests of what the step Verify shows of touches."""
 
 from lightpen.model.posture import Posture
-from lightpen_app.steps.verify.findings import dial_of
+from lightpen_app.steps.verify.figure import dial_of
 
 
 def test_a_field_of_the_dial_is_full_that_was_touched_in() -> None:
