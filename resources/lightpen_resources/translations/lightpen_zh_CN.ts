@@ -444,15 +444,15 @@
     <name>ChecksPresenter</name>
     <message>
         <source>Pen</source>
-        <translation type="unfinished">光笔</translation>
+        <translation>光笔</translation>
     </message>
     <message>
         <source>The scale by a certified value: {0:.4f} mm.</source>
-        <translation type="unfinished"></translation>
+        <translation>用证书值检查尺度：{0:.4f} mm。</translation>
     </message>
     <message>
         <source>Measure</source>
-        <translation type="unfinished">测量</translation>
+        <translation>测量</translation>
     </message>
 </context>
 <context>
@@ -2821,23 +2821,23 @@
     <name>MeasurePresenter</name>
     <message>
         <source>now</source>
-        <translation type="unfinished">进行中</translation>
+        <translation>进行中</translation>
     </message>
     <message>
         <source>Deviation {0} mm</source>
-        <translation type="unfinished"></translation>
+        <translation>偏差 {0} mm</translation>
     </message>
     <message>
         <source>Point {0} of {1}</source>
-        <translation type="unfinished"></translation>
+        <translation>第 {0} 点，共 {1} 点</translation>
     </message>
     <message>
         <source>Open a plan...</source>
-        <translation type="unfinished"></translation>
+        <translation>打开计划…</translation>
     </message>
     <message>
         <source>Measure the next part</source>
-        <translation type="unfinished"></translation>
+        <translation>测量下一个工件</translation>
     </message>
     <message>
         <source>NO PLAN YET</source>
@@ -3298,31 +3298,31 @@
     </message>
     <message>
         <source>Only with the simulated camera.</source>
-        <translation type="unfinished"></translation>
+        <translation>仅适用于模拟相机。</translation>
     </message>
     <message>
         <source>Open a plan...</source>
-        <translation type="unfinished"></translation>
+        <translation>打开计划…</translation>
     </message>
     <message>
         <source>Teach a plan</source>
-        <translation type="unfinished"></translation>
+        <translation>示教计划</translation>
     </message>
     <message>
         <source>Try the simulated plate</source>
-        <translation type="unfinished"></translation>
+        <translation>试测模拟平板</translation>
     </message>
     <message>
         <source>Features are recognised while they are probed; save them as a plan at the end.</source>
-        <translation type="unfinished"></translation>
+        <translation>测量时自动识别要素；结束时可保存为计划。</translation>
     </message>
     <message>
         <source>Ten features of a plate that the simulated operator probes.</source>
-        <translation type="unfinished"></translation>
+        <translation>由模拟操作者测量的平板，含十个要素。</translation>
     </message>
     <message>
         <source>Other plan</source>
-        <translation type="unfinished"></translation>
+        <translation>其他计划</translation>
     </message>
     <message>
         <source>Kind of the feature that is probed</source>
@@ -3374,15 +3374,15 @@
     </message>
     <message>
         <source>Leave the plan? The points of this part are discarded.</source>
-        <translation type="unfinished"></translation>
+        <translation>离开此计划？该工件的测点将被丢弃。</translation>
     </message>
     <message>
         <source>Leave the plan</source>
-        <translation type="unfinished"></translation>
+        <translation>离开计划</translation>
     </message>
     <message>
         <source>Continue</source>
-        <translation type="unfinished">继续</translation>
+        <translation>继续</translation>
     </message>
     <message>
         <source>Artefact...</source>
@@ -3518,19 +3518,19 @@ needed</source>
     </message>
     <message>
         <source>Figure</source>
-        <translation type="unfinished"></translation>
+        <translation>图示</translation>
     </message>
     <message>
         <source>Details</source>
-        <translation type="unfinished">详细信息</translation>
+        <translation>详情</translation>
     </message>
     <message>
         <source>List</source>
-        <translation type="unfinished"></translation>
+        <translation>列表</translation>
     </message>
     <message>
         <source>Checks and features</source>
-        <translation type="unfinished"></translation>
+        <translation>检查项与要素</translation>
     </message>
     <message>
         <source>Live image</source>
@@ -5395,7 +5395,7 @@ needed</source>
     </message>
     <message>
         <source>Do now</source>
-        <translation type="unfinished"></translation>
+        <translation>现在执行</translation>
     </message>
     <message>
         <source>Measure a part</source>
@@ -5403,11 +5403,11 @@ needed</source>
     </message>
     <message>
         <source>Calibrate again</source>
-        <translation type="unfinished"></translation>
+        <translation>重新标定</translation>
     </message>
     <message>
         <source>Check again</source>
-        <translation type="unfinished"></translation>
+        <translation>再次检查</translation>
     </message>
     <message>
         <source>Paused</source>
@@ -8280,15 +8280,15 @@ needed</source>
     </message>
     <message>
         <source>Does not verify the tip: all points were probed in alike postures, which show no tip error. Tilt the pen to all sides.</source>
-        <translation type="unfinished"></translation>
+        <translation>未验证测头：所有点都以相近的姿态测得，无法显示测头误差。请将光笔向各个方向倾斜。</translation>
     </message>
     <message>
         <source>Does not verify the tip: these points show only a tip error above {detectable:.4f} mm (probability 95 %), the limit is {limit:.4f} mm. Tilt the pen more, to all sides.</source>
-        <translation type="unfinished"></translation>
+        <translation>未验证测头：这些点只能显示大于 {detectable:.4f} mm 的测头误差（概率 95 %），限值为 {limit:.4f} mm。请将光笔向各个方向更多倾斜。</translation>
     </message>
     <message>
         <source>Error of the tip</source>
-        <translation type="unfinished"></translation>
+        <translation>测头误差</translation>
     </message>
     <message>
         <source>It is a whole project: save the calibration of the one camera by Tools, Camera Calibration, Save, as XML.</source>
@@ -8308,7 +8308,7 @@ needed</source>
     </message>
     <message>
         <source>Move {axis}</source>
-        <translation type="unfinished"></translation>
+        <translation>位移 {axis}</translation>
     </message>
     <message>
         <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm.</source>
@@ -8320,7 +8320,7 @@ needed</source>
     </message>
     <message>
         <source>Standard deviation {axis}</source>
-        <translation type="unfinished"></translation>
+        <translation>标准偏差 {axis}</translation>
     </message>
     <message>
         <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm at the pen (U {uncertainty:.4f} mm, limit {limit:.4f} mm). The U of the probed points includes this shift.</source>
