@@ -44,8 +44,12 @@ from lightpen.intrinsics.start import BoardPoses, start_camera
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
-from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.boards.simulated_boards import (
+    expose_board,
+    render_board,
+    simulate_board_poses,
+)
 
 STREAM = 27  # of the seeds
 BOARD = "chessboard:9x6:20"

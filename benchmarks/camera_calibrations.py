@@ -26,13 +26,17 @@ from lightpen.intrinsics.observing import observe_board
 from lightpen.intrinsics.views import Views
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
-from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
     swing_poses,
+)
+from lightpen_extensions.boards.simulated_boards import (
+    expose_board,
+    render_board,
+    simulate_board_poses,
 )
 
 SET_BOARD = "chessboard:11x8:20"

@@ -21,12 +21,6 @@ from tests.simulated_stations import (
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.discovery.discover import discover
-from lightpen.discovery.found import Discovery
-from lightpen.discovery.numbering import number_by_sketch
-from lightpen.discovery.request import Request
-from lightpen.discovery.scale import MeasuredLength
-from lightpen.discovery.sightings import find_spots
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
@@ -36,6 +30,12 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.image_plans import plan_scene
 from lightpen.simulator.scenes import CLEAN, HARD, LEDS, Scene
+from lightpen_extensions.discover.discover import discover
+from lightpen_extensions.discover.found import Discovery
+from lightpen_extensions.discover.numbering import number_by_sketch
+from lightpen_extensions.discover.request import Request
+from lightpen_extensions.discover.scale import MeasuredLength
+from lightpen_extensions.discover.sightings import find_spots
 
 N_STATIONS = 600  # so that true 95 % are within the limits in 97 of 100 cases
 N_AGAIN = 300  # of them, whose files calibrate the tip again

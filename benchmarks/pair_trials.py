@@ -28,7 +28,7 @@ from lightpen.intrinsics.start import BoardPoses
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
-from lightpen.simulator.boards import simulate_board_poses
+from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
 OTHER = Camera(
     *(400, 300, 575.0, 574.2, 197.3, 152.1),

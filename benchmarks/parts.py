@@ -27,12 +27,12 @@ from lightpen.measuring.plan import Plan as MeasuringPlan
 from lightpen.measuring.starts import frame_about
 from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen.verification.tasks.probed_point import measure_touches
 from lightpen.verification.tasks.task import Conditions
+from lightpen_extensions.measure.plate import plate_plan
 
 CAMERAS = 1, 2
 N_PARTS, N_CHUNKS = 1000, 50

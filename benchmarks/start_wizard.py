@@ -21,8 +21,8 @@ def main() -> int:
     from typing_extensions import override
 
     from lightpen_app.application import Wizard, make_application
-    from lightpen_app.wizard_pages import make_pages
     from lightpen_app.work.settings import Settings
+    from lightpen_app_program import FACES
 
     class Paint(QObject):
         """Answers a key once the first page is painted."""
@@ -45,7 +45,7 @@ def main() -> int:
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
-        wizard = Wizard(application, make_pages, settings, Path(folder))
+        wizard = Wizard(application, FACES, settings, Path(folder))
         paint = Paint()
         wizard.window.page().installEventFilter(paint)
         wizard.show()

@@ -15,13 +15,13 @@ from lightpen.measuring.artefacts import Artefact, ArtefactKind, artefact_plan
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
-from lightpen.simulator.toucher import ProbingOperator
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import advance_session
 from lightpen.verification.session.session_state import SessionSetup, SessionState
 from lightpen.verification.tasks.fixed_point import FIXED_POINT
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.probing_operator import ProbingOperator
 
 N_IMAGES = 60  # of the swing that the tip is by
 SIGMA = 0.03  # px

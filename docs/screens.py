@@ -58,7 +58,6 @@ from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.motion import lean_vectors, postures_of
-from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
 from lightpen.swing.capture.rules import advance_swing
@@ -78,10 +77,12 @@ from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.steps.history.history_table import HistoryTable
-from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app.work.verification_run import VerificationRun
+from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_program import FACES
+from lightpen_extensions.measure.plate import plate_plan
 from lightpen_resources import languages
 
 Seen = TypeVar("Seen")
@@ -209,9 +210,12 @@ class Stage:
         settings.set_preferences(Preferences())
         FolderArchive(DATA).store(_earlier_result())
         around = SourceEnvironment(self._scene, SkippingClock(), lambda: NOW, tuple)
-        self.wizard = Wizard(application, make_pages, settings, DATA, around)
+        self.wizard = Wizard(application, FACES, settings, DATA, around)
         self.wizard.window.pages()  # they follow what is chosen below
         workbench = self._workbench = self.wizard.workbench
+        (self._measure,) = (
+            each for each in self.wizard.services if isinstance(each, MeasureService)
+        )
         files = sample_files(around, DATA / SIMULATED)
         workbench.selection.set_preparation(
             replace(
@@ -333,10 +337,10 @@ class Stage:
         run = self._workbench.run
         run.runner.ask(lambda workflow: workflow.accept("The station is being set up."))
         self._wait_until(lambda: run.status.result is not None)
-        self._fill_probing(self._workbench.verification, CHOICES, _touched)
+        self._fill_probing(self._measure.verification, CHOICES, _touched)
 
     def _fill_measure(self) -> None:
-        self._fill_probing(self._workbench.measuring, PART_CHOICES, _measured)
+        self._fill_probing(self._measure.measuring, PART_CHOICES, _measured)
 
     def _fill_probing(
         self,
@@ -344,7 +348,7 @@ class Stage:
         choices: VerificationChoices,
         probed: Callable[[SessionSetup, Scene], SessionState],
     ) -> None:
-        self._workbench.selection.set_choices(choices)
+        self._measure.set_choices(choices)
         probing.runner.ask(lambda workflow: workflow.start_over())
         self._wait_until(lambda: probing.status.is_touching)
         before = probing.status
@@ -364,9 +368,7 @@ class Stage:
     def show_otherwise(self, step: str) -> None:
         """Show another moment of a probing step: all results, or the first points."""
         is_verified = step == "verify"
-        probing = (
-            self._workbench.verification if is_verified else self._workbench.measuring
-        )
+        probing = self._measure.verification if is_verified else self._measure.measuring
         status = probing.status
         assert status.setup is not None
         probed = _verified if is_verified else _measuring

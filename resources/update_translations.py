@@ -16,7 +16,7 @@ from lightpen.messages import TRANSLATED
 from lightpen_resources import SOURCE_LANGUAGE, TRANSLATIONS
 
 ROOT = Path(__file__).resolve().parents[1]
-APPLICATION = ROOT / "app" / "lightpen_app"
+APPLICATIONS = ROOT / "app"
 CORE_CONTEXT = "core"
 
 
@@ -24,7 +24,7 @@ def main() -> None:
     """Update and compile every translation."""
     for file in sorted(TRANSLATIONS.glob("lightpen_*.ts")):
         options = ["-pluralonly"] if file.stem.endswith(SOURCE_LANGUAGE) else []
-        collect(file, APPLICATION, translated_templates(), options)
+        collect(file, APPLICATIONS, translated_templates(), options)
         compile_ts(file, TRANSLATIONS)
 
 

@@ -14,8 +14,12 @@ from lightpen.intrinsics.boards import parse_board
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.boards import expose_board, render_board, simulate_board_poses
 from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.boards.simulated_boards import (
+    expose_board,
+    render_board,
+    simulate_board_poses,
+)
 from lightpen_program import main
 
 BOARD = "chessboard:7x5:20"

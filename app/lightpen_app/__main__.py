@@ -1,9 +1,14 @@
 """Start of the program: window, demo, self-test or command."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lightpen.interpreter import run_program
+
+if TYPE_CHECKING:
+    from lightpen_app.face import Face
 
 SELF_TEST = "--self-test"
 
@@ -18,25 +23,23 @@ class Launchers:
         """Open the window, at a recorded swing if a path leads to one."""
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run
-        from lightpen_app.wizard_pages import make_pages
 
         keep_freed_memory()
-        return run(make_pages, swing)
+        return run(_faces(), swing)
 
     def play_demo(self) -> int:
         """Play a calibration with a simulated operator."""
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run_demo
-        from lightpen_app.wizard_pages import make_pages
 
         keep_freed_memory()
-        return run_demo(make_pages)
+        return run_demo(_faces())
 
     def test_itself(self, report: Path) -> int:
         """Test the installation and write a report."""
         from lightpen_app.self_test.run import test_program
 
-        return test_program(report)
+        return test_program(report, _faces)
 
     def install_entry(self) -> int:
         """Put the program into the menu of the desktop."""
@@ -67,6 +70,12 @@ class Launchers:
         from lightpen_app.reporting import write_report
 
         return write_report(result, out, language)
+
+
+def _faces() -> Sequence["Face"]:
+    from lightpen_app_program import FACES
+
+    return FACES
 
 
 def main() -> int:

@@ -4,12 +4,10 @@ import gc
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import (
     QMessageLogContext,
@@ -30,24 +28,20 @@ from lightpen.logs import end_log, write_log_to
 from lightpen.messages import printable
 from lightpen.record.library.signing.keys import KEYS
 from lightpen.simulator.camera import SERIAL
-from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import CrashHook, versions
 from lightpen_app.end_signals import EndSignals
+from lightpen_app.face import Face
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sounds import MutedSounds, Sounds, find_sounds
+from lightpen_app.look.sounds import MutedSounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.shell.sidebar import subject_of
-from lightpen_app.shell.stream_dialog import StreamState
-from lightpen_app.steps.page import Page
+from lightpen_app.wizard_pages import make_pages, page_titles
 from lightpen_app.work.garbage import GarbageCollector
 from lightpen_app.work.job import Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
-
-if TYPE_CHECKING:
-    from lightpen_app.discovery.discovery_window import DiscoveryWindow
 
 # s after which a thread that computes lets the window continue. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
@@ -56,8 +50,6 @@ SWITCH_INTERVAL = 0.0005
 SETTLED_MS = 5000  # from the start until all is made and loaded
 
 UNSEEN_FRAME_RATE = 8.0  # 1/s; of an unwatched demo, enough for a swing
-
-MakePages: TypeAlias = Callable[[Workbench, Sounds], Iterable[Page]]
 
 _logger = logging.getLogger(__name__)
 
@@ -70,7 +62,7 @@ class Wizard(QObject):
     def __init__(
         self,
         application: QApplication,
-        make_pages: MakePages,
+        faces: Sequence[Face],
         settings: Settings,
         folder: Path,
         around: SourceEnvironment | None = None,
@@ -86,26 +78,27 @@ class Wizard(QObject):
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
         self.workbench = Workbench(settings, folder, around, self)
-        pages = iter(make_pages(self.workbench, self._sounds))
+        self.services = tuple(make(self.workbench) for make in faces)
+        pages = iter(make_pages(self.workbench, self._sounds, self.services))
         self.window = MainWindow(
             (next(pages),),
             settings,
             self._preferences,
             self.workbench.notifications,
             pages,
+            partial(page_titles, self.services),
         )
+        for service in self.services:
+            self.window.add_service(service)
         self.window.setMinimumSize(LEAST_SIZE)
         # Last: under a style sheet Qt styles all of a widget whenever it gets a parent,
         # which takes four times as long as to make the window.
         self._apply_appearance()
         self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
-        self._discovery: DiscoveryWindow | None = None  # created on demand
 
         # Connections
-        self.window.closing.connect(self._close_discovery)
         self.window.closing.connect(self.workbench.shut_down)
-        self.window.discovery_requested.connect(self._show_discovery)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.folder_watch.counted.connect(self._on_others_counted)
         self.workbench.folder_watch.fault_changed.connect(self._on_folder_fault_changed)
@@ -115,12 +108,9 @@ class Wizard(QObject):
             self.workbench.selection,
         ):
             model.changed.connect(self._show_subject)
-        self.workbench.streaming.changed.connect(self._on_streaming_changed)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
-
-        self._stream()
 
     def show(self) -> None:
         """Show the window; once it is painted, start the workbench."""
@@ -130,21 +120,6 @@ class Wizard(QObject):
     def _start(self) -> None:
         self.workbench.start()
         self.started.emit()
-
-    def _show_discovery(self) -> None:
-        """Show the window in which pen and camera are found without files."""
-        if self._discovery is None:
-            from lightpen_app.discovery.discovery_window import DiscoveryWindow
-
-            self._discovery = DiscoveryWindow(self.workbench, self.window)
-            self._discovery.continued.connect(lambda: self.window.show_step("swing"))
-        self._discovery.set_camera_known(self.window.page().key == "leds")
-        self._discovery.show()
-        self._discovery.raise_()
-
-    def _close_discovery(self) -> None:
-        if self._discovery is not None:
-            self._discovery.close()
 
     def _show_subject(self) -> None:
         now, chosen = self.workbench.run.status, self.workbench.selection.preparation
@@ -178,24 +153,6 @@ class Wizard(QObject):
         if preferences.appearance is not before.appearance:
             self._apply_appearance()
 
-        self._stream()
-
-    def _stream(self) -> None:
-        """Start the stream of pen poses if it is enabled."""
-        now = self._preferences
-        place = StreamPlace(now.stream_address, now.stream_port)
-        self.workbench.streaming.want(place if now.streams else None)
-
-    def _on_streaming_changed(self) -> None:
-        streaming, notices = self.workbench.streaming, self.workbench.notifications
-        if not streaming.fault:
-            notices.withdraw(streaming)
-        elif streaming.fault != notices.text(streaming):
-            notices.notify(streaming, streaming.fault)
-        self.window.set_stream(
-            StreamState(streaming.status, streaming.has_tip, streaming.fault)
-        )
-
     def _apply_appearance(self) -> None:
         scheme = QGuiApplication.styleHints().colorScheme()
         colors = colors_for(self._preferences.appearance, scheme)
@@ -214,7 +171,7 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     return application
 
 
-def run(make_pages: MakePages, swing: Path | None = None) -> int:
+def run(faces: Sequence[Face], swing: Path | None = None) -> int:
     """Show the wizard until its window closes, and return the exit status.
 
     The swing is shown, see `lightpen.record.results.opening`. Raises `UsageError` if
@@ -228,7 +185,7 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
         folder = data_folder(settings.preferences())
         write_log_to(folder)
         _logger.info("window with the data folder %s", folder)
-        wizard = Wizard(application, make_pages, settings, folder)
+        wizard = Wizard(application, faces, settings, folder)
         log_versions = Job(lambda _: _logger.info("versions: %s", versions()), wizard)
         QTimer.singleShot(SETTLED_MS, log_versions.start)
         if swing is not None:
@@ -238,8 +195,8 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
     return ended(wizard, status)
 
 
-def run_demo(make_pages: MakePages) -> int:
-    """Play the demo, and return the exit status.
+def run_demo(faces: Sequence[Face]) -> int:
+    """Play the demo with these extensions, and return the exit status.
 
     Without a display it is played unseen, in its own time that waits for a machine
     too slow for it; what happens is printed, and at the end the tip. Settings and
@@ -259,14 +216,15 @@ def run_demo(make_pages: MakePages) -> int:
     ):
         os.environ[KEYS] = str(Path(folder) / "keys")
         settings = Settings(Path(folder) / "lightpen.json")
-        users = Settings(settings_file()).preferences()
-        settings.set_preferences(replace(users, streams=False))
+        settings.set_preferences(Settings(settings_file()).preferences())
         if not is_seen:
             settings.set_camera(SERIAL, CameraSettings(frame_rate=UNSEEN_FRAME_RATE))
-        wizard = Wizard(application, make_pages, settings, Path(folder), around)
+        wizard = Wizard(application, faces, settings, Path(folder), around)
         from lightpen_app.demo import Demo
 
-        demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
+        demo = Demo(
+            wizard.window, wizard.workbench, wizard.services, is_watched=is_seen
+        )
         if not is_seen:
             demo.message_sent.connect(partial(print, flush=True))
             demo.ended.connect(partial(_print_tip, wizard.workbench.run))

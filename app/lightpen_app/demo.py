@@ -1,15 +1,16 @@
 """The demo: a simulated operator uses the whole wizard."""
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.swings.names import Names
-from lightpen.simulator.plate import plate_plan
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.verification.tasks.part_course import PartOptions
+from lightpen_app.face import DemoStep, Service
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.work.workbench import Workbench
@@ -24,7 +25,7 @@ LONGEST_S = 200.0  # on a page, s; a slow machine takes a minute for the swing
 
 
 class Demo(QObject):
-    """Leaves each page when its step is complete, swings the pen, measures a part.
+    """Leaves each page when its step is complete, swings the pen, shows extensions.
 
     A demo that is watched leaves time to read.
     """
@@ -33,7 +34,12 @@ class Demo(QObject):
     ended = Signal()  # the tip is accepted, or the swing failed
 
     def __init__(
-        self, window: MainWindow, workbench: Workbench, *, is_watched: bool = True
+        self,
+        window: MainWindow,
+        workbench: Workbench,
+        services: Sequence[Service] = (),
+        *,
+        is_watched: bool = True,
     ) -> None:
         super().__init__(window)
         self._window = window
@@ -44,7 +50,10 @@ class Demo(QObject):
         self._key = ""
         self._n_ticks = 0
         self._is_accepted = False
-        self._is_measuring = False
+        # Of extensions, still to be shown and shown now; for those who watch.
+        steps = [step for each in services for step in each.demo_steps()]
+        self._steps = deque(steps if is_watched else ())
+        self._step: DemoStep | None = None
 
         # Widgets
         self._timer = QTimer(self, interval=TICK_MS)
@@ -87,15 +96,13 @@ class Demo(QObject):
             self._window.press_main()
 
     def _go_on_accepted(self, key: str) -> None:
-        """Measure the simulated plate if watched; else end."""
-        if self._is_watched and not self._is_measuring:
-            self._is_measuring = True
-            self._window.show_step("measure")
+        """Show what extensions do with the tip, one after the other; then end."""
+        step = self._step
+        if step is not None and step.key == key and not step.is_done():
             return
-        is_at_it = key == "measure" and not self._workbench.measuring.status.is_done
-        if self._is_watched and is_at_it:
-            if self._workbench.measuring.probing_operator is None:  # once it is here
-                self._workbench.live.set_touching(True)
+        if self._steps and (step is None or step.key == key):
+            self._step = self._steps.popleft()
+            self._window.show_step(self._step.key)
         else:
             self._end(self._farewell())
 
@@ -117,10 +124,11 @@ class Demo(QObject):
                 "No key is needed up to the verdict."
             ),
             "review": self.tr("Demo: review the tip and its uncertainty."),
-            "measure": self.tr(
-                "Demo: the simulated operator measures a plate of ten features."
-            ),
         }
+        step = self._step
+        if step is not None and key == step.key:
+            words[key] = step.text
+            step.begin()
         if key in words:  # else the user looks around
             self.message_sent.emit(words[key])
         operator = self._workbench.live.operator
@@ -128,10 +136,6 @@ class Demo(QObject):
             operator.seat()
         if key == "swing":
             self._workbench.live.set_following(True)
-        elif key == "measure":
-            selection = self._workbench.selection
-            plate = PartOptions(plate_plan())
-            selection.set_choices(selection.choices.with_options(plate))
 
     def _show(self, words: str) -> None:
         self._workbench.notifications.notify(self, words, Tone.ACTIVE)

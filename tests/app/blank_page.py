@@ -2,7 +2,7 @@
 
 from typing_extensions import override
 
-from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.page import MainAction, Page
 
 
 class BlankPage(Page):

@@ -61,11 +61,11 @@ from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
-from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.garbage import collect_if_due
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_program import FACES
 
 
 class PatientBot(QtBot):
@@ -261,7 +261,7 @@ class Walker:
     def __init__(self, qtbot: QtBot, wizard: Wizard) -> None:
         self._qtbot = qtbot
         self.wizard = wizard
-        self.workbench = wizard.workbench
+        self.workbench, self.services = wizard.workbench, wizard.services
         self.window = wizard.window
         self.n_inputs = 0
         self.window.resize(1280, 800)
@@ -571,7 +571,7 @@ def open_wizard(
     def start(source: SourceEnvironment = around) -> Walker:
         folder = tmp_path / "data"
         dressed.setStyleSheet("")  # which the wizard gives it
-        wizard = Wizard(dressed, make_pages, settings, folder, source)
+        wizard = Wizard(dressed, FACES, settings, folder, source)
         opened.append(Walker(qtbot, wizard))
         return opened[-1]
 

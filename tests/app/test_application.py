@@ -13,10 +13,11 @@ from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
 
 from lightpen_app.application import Wizard
+from lightpen_app.face import Service
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import LIGHT, Appearance, colors_of
 from lightpen_app.shell.main_window import LEAST_SIZE
-from lightpen_app.steps.page import Page
+from lightpen_app.widgets.page import Page
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -25,7 +26,7 @@ import sys
 from PySide6.QtCore import QPoint, QTimer
 from PySide6.QtWidgets import QApplication, QPushButton
 from lightpen_app.application import run
-from lightpen_app.wizard_pages import make_pages
+from lightpen_app.face import Service
 
 def tell():
     (window,) = [w for w in QApplication.topLevelWidgets() if w.objectName() == "main"]
@@ -34,45 +35,53 @@ def tell():
     print(window.width(), window.height(), corner.x(), corner.y())
     QApplication.quit()
 
-def pages(workbench, sounds):
+def face(workbench):
     QTimer.singleShot(500, tell)
-    return make_pages(workbench, sounds)
+    return Service(workbench)
 
-sys.exit(run(pages))
+sys.exit(run([face]))
 """
 
 
 BEFORE_THE_PAINT = """
 import sys
 from PySide6.QtWidgets import QApplication
-from lightpen_app.application import run
-from lightpen_app.wizard_pages import make_pages
+from lightpen_app import application
+from lightpen_app_program import FACES
 
-def pages(workbench, sounds):
-    made = make_pages(workbench, sounds)
+make_pages = application.make_pages
+
+def pages(*given):
+    made = make_pages(*given)
     yield next(made)  # the others are wanted once the window is painted
     print(*sorted(sys.modules))
     print(any(w.isVisible() for w in QApplication.topLevelWidgets()))
     QApplication.quit()
 
-sys.exit(run(pages))
+application.make_pages = pages
+sys.exit(application.run(FACES))
 """
 LATER = {
     *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters", "pypylon"),
-    *("lightpen_app.demo", "lightpen_app.discovery.discovery_window"),
+    *("lightpen_app.demo", "lightpen_app_extensions.discover.discovery_window"),
     *(f"lightpen_app.steps.{step}.page" for step in ("camera", "leds", "swing")),
-    *(f"lightpen_app.steps.{step}.page" for step in ("review", "verify", "history")),
+    *(f"lightpen_app.steps.{step}.page" for step in ("review", "history")),
+    *("lightpen_app_extensions.measure.verify_page",),
 }
 
 
-def only_page(workbench: Workbench, sounds: Sounds) -> Sequence[Page]:
+def only_page(
+    workbench: Workbench, sounds: Sounds, services: Sequence[Service]
+) -> Sequence[Page]:
     return [BlankPage("start")]
 
 
 def open_wizard(qtbot: QtBot, settings: Settings) -> Wizard:
     application = QApplication.instance()
     assert isinstance(application, QApplication)
-    wizard = Wizard(application, only_page, settings, settings.file.parent)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("lightpen_app.application.make_pages", only_page)
+        wizard = Wizard(application, (), settings, settings.file.parent)
     qtbot.addWidget(wizard.window)
     wizard.window.show()
     return wizard

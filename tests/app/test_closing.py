@@ -46,7 +46,7 @@ from PySide6.QtWidgets import QApplication
 from lightpen_app.application import run
 from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
-from lightpen_app.wizard_pages import make_pages
+from lightpen_app.face import Service
 
 Workbench.shut_down.__defaults__ = (float(sys.argv.pop()),)
 
@@ -55,11 +55,11 @@ def close():
     print("closing", flush=True)
     QApplication.closeAllWindows()
 
-def pages(workbench, sounds):
+def face(workbench):
     QTimer.singleShot(500, close)
-    return make_pages(workbench, sounds)
+    return Service(workbench)
 
-sys.exit(run(pages))
+sys.exit(run([face]))
 """
 
 # A signal that whoever started the tests ignores would be ignored by the program, too.
@@ -74,7 +74,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QMessageBox
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.application import run
-from lightpen_app.wizard_pages import make_pages
+from lightpen_app.face import Service
 
 def tell(folder, asks):
     if asks and not isinstance(QApplication.activeModalWidget(), QMessageBox):
@@ -96,11 +96,11 @@ def await_swing(workbench, folder):
     if sys.argv[2]:
         QApplication.closeAllWindows()
 
-def pages(workbench, sounds):
+def face(workbench):
     QTimer.singleShot(500, lambda: swing(workbench))
-    return make_pages(workbench, sounds)
+    return Service(workbench)
 
-sys.exit(run(pages))
+sys.exit(run([face]))
 """
 
 

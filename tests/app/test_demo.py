@@ -15,13 +15,14 @@ from pytestqt.qtbot import QtBot
 from tests.verifying import found_by
 
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.verification.tasks.part import PART
 from lightpen_app import demo as demo_module
 from lightpen_app.demo import NAMES, Demo
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
+from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.measure.plate import plate_plan
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -133,7 +134,8 @@ def test_a_demo_that_is_watched_measures_the_plate_without_a_hand(
 ) -> None:
     monkeypatch.setattr(demo_module, "WATCHED_S", 0.1)
     walker = open_wizard()
-    demo = Demo(walker.window, walker.workbench)
+    demo = Demo(walker.window, walker.workbench, walker.services)
+    (measure,) = (s for s in walker.services if isinstance(s, MeasureService))
 
     with qtbot.waitSignal(demo.ended, timeout=1000 * LONGEST_S):
         demo.start()
@@ -141,7 +143,7 @@ def test_a_demo_that_is_watched_measures_the_plate_without_a_hand(
     assert demo.is_accepted
     assert walker.title() == "Measure"
     walker.until_says("Part measured")
-    found = found_by(walker.workbench.measuring.status.state, PART)
+    found = found_by(measure.measuring.status.state, PART)
     assert found.missing == ()
     assert len(found.part.results) == len(plate_plan().characteristics)
 

@@ -12,8 +12,6 @@ from lightpen.record.library.tip_library import ItemKind
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.shell.about import About
 from lightpen_app.shell.help_window import HelpWindow
-from lightpen_app.shell.stream_dialog import StreamDialog
-from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
 from lightpen_app.steps.start.assumptions_panel import AssumptionsDialog
@@ -23,6 +21,8 @@ from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FRAME, fitted_place
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.boards.board_window import BoardWindow
+from lightpen_app_extensions.stream.stream_dialog import StreamDialog
 
 SMALL = QSize(853, 533)  # 1280 x 800 at 150 %
 Made = Callable[[Workbench], QWidget]

@@ -12,12 +12,13 @@ from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 from tests.app.typed_numbers import type_number
 
-from lightpen.streaming.server import LOOPBACK, StreamPlace
-from lightpen_app.shell.stream_dialog import StreamDialog
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.stream.service import KEY, StreamChoice, StreamService
+from lightpen_app_extensions.stream.stream_dialog import StreamDialog
+from lightpen_extensions.stream.server import LOOPBACK, StreamPlace
 
 if TYPE_CHECKING:
     from tests.app.conftest import Walker
@@ -43,7 +44,7 @@ def test_who_listens_follows_the_pen_and_every_page_says_so(
     walker.click_on(walker.control("Stream pose and tip", dialog))
 
     walker.until_tells(f"Live stream at {LOOPBACK}:{chosen}, clients: 0")
-    assert settings.preferences().streams
+    assert settings.of_extension(KEY, StreamChoice()).is_on
     assert any("Active at" in text for text in walker.texts(dialog))
     dialog.close()
     walker.operator.seat()
@@ -57,7 +58,7 @@ def test_who_listens_follows_the_pen_and_every_page_says_so(
 def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(
     workbench: Workbench, qtbot: QtBot
 ) -> None:
-    streaming = workbench.streaming
+    streaming = StreamService(workbench).streaming
     streaming.want(ANY)
     qtbot.waitUntil(lambda: streaming.status.place is not None)
     assert not streaming.has_tip
@@ -71,7 +72,7 @@ def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(
 def test_a_taken_port_is_reported_until_another_place_is_chosen(
     workbench: Workbench, qtbot: QtBot
 ) -> None:
-    streaming = workbench.streaming
+    streaming = StreamService(workbench).streaming
     with socket.create_server((LOOPBACK, 0)) as other:
         port = other.getsockname()[1]
         streaming.want(StreamPlace(port=port))
@@ -87,7 +88,7 @@ def test_a_taken_port_is_reported_until_another_place_is_chosen(
 def test_a_stream_that_is_wanted_no_more_ends(
     workbench: Workbench, qtbot: QtBot
 ) -> None:
-    streaming = workbench.streaming
+    streaming = StreamService(workbench).streaming
     streaming.want(ANY)
     qtbot.waitUntil(lambda: streaming.status.place is not None)
 

@@ -37,7 +37,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.demo import Demo
-from lightpen_app.wizard_pages import make_pages
+from lightpen_app_program import FACES
 from lightpen_app.work.settings import Settings
 
 lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
@@ -46,7 +46,7 @@ application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")
 scene = Scene(camera=paper_camera(binning=2))
 around = SourceEnvironment(scene, SkippingClock(rests=True))
-wizard = Wizard(application, make_pages, settings, folder, around)
+wizard = Wizard(application, FACES, settings, folder, around)
 demo = Demo(wizard.window, wizard.workbench, is_watched=False)
 demo.ended.connect(wizard.window.close_unasked)
 wizard.show()

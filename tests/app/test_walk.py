@@ -35,7 +35,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.steps.page import step_titles
+from lightpen_app.widgets.page import step_titles
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.stations import Station, StoredCamera
 

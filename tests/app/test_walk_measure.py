@@ -12,14 +12,14 @@ from tests.accepted_tip import accept_tip
 from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
-from lightpen.simulator.plate import plate_plan
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.print_report.preview import PrintReportWindow
-from lightpen_app.work.settings import Settings
+from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_extensions.measure.plate import plate_plan
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -36,7 +36,11 @@ SMALL = structs.replace(
 PROBING = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     camera=StoredCamera(SourceChoice()),
-    verification=VerificationChoices(options=(PartOptions(SMALL),), n_frames=2),
+    extensions={
+        "measure": stored_group(
+            VerificationChoices(options=(PartOptions(SMALL),), n_frames=2)
+        )
+    },
 )
 
 
@@ -105,7 +109,7 @@ def test_the_simulated_plate_is_ticked_off_feature_by_feature(known: "Walker") -
 def test_without_a_plan_the_step_says_what_to_do(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    settings.set_station(STATION, replace(PROBING, verification=VerificationChoices()))
+    settings.set_station(STATION, replace(PROBING, extensions={}))
     settings.set_last_station(STATION)
     walker = open_wizard()
     walker.until(lambda: not walker.workbench.selection.preparation.missing_inputs())

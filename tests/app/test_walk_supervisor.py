@@ -11,7 +11,7 @@ from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.fixed_point import FixedPointOptions
-from lightpen_app.work.settings import Settings
+from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
@@ -22,9 +22,11 @@ STRICT = "0.0010"
 CHOSEN = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     camera=StoredCamera(SourceChoice()),
-    verification=VerificationChoices(
-        options=(FixedPointOptions(5, n_frames=3),), n_frames=2
-    ),
+    extensions={
+        "measure": stored_group(
+            VerificationChoices(options=(FixedPointOptions(5, n_frames=3),), n_frames=2)
+        )
+    },
 )
 
 
@@ -69,4 +71,4 @@ def test_a_wrong_password_lays_down_nothing_and_is_asked_for_again(
     assert read_supervision(folder).limits[STATION].verification.across == 0.001
     walker.type("correct horse")  # the password waits for it
     walker.press(Qt.Key.Key_Return)
-    walker.until(lambda: walker.workbench.selection.choices.limits.across == 1.0)
+    walker.until(lambda: walker.workbench.selection.limits.verification.across == 1.0)

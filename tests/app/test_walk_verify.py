@@ -22,7 +22,7 @@ from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.registry import TASKS
 from lightpen_app.widgets.fitted_window import FRAME
-from lightpen_app.work.settings import Settings
+from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ FIVE = (FixedPointOptions(5, n_frames=3),)  # fewer do not verify a tip
 TOUCHES = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     camera=StoredCamera(SourceChoice()),
-    verification=VerificationChoices(options=FIVE, n_frames=2),
+    extensions={"measure": stored_group(VerificationChoices(options=FIVE, n_frames=2))},
 )
 
 

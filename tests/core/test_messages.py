@@ -15,16 +15,23 @@ import pytest
 import lightpen
 import lightpen.cameras.protocol  # its errors are children of the core's
 import lightpen_app
+import lightpen_app_extensions
+import lightpen_extensions
 from lightpen.catalogue import command_line
 from lightpen.cli import ADVICE
 from lightpen.errors import FileError, LightpenError
 from lightpen.messages import CATALOGUE, TRANSLATED, Message, message
 from lightpen.swing_messages import Code
 
-CORE = Path(lightpen.__path__[0])
+CORE, CORE_EXTENSIONS = (
+    Path(each.__path__[0]) for each in (lightpen, lightpen_extensions)
+)
+APP, APP_EXTENSIONS = (
+    Path(each.__path__[0]) for each in (lightpen_app, lightpen_app_extensions)
+)
 SOURCES = {
     path: path.read_text("utf-8")
-    for folder in (CORE, Path(lightpen_app.__path__[0]))
+    for folder in (CORE, CORE_EXTENSIONS, APP, APP_EXTENSIONS)
     for path in sorted(folder.rglob("*.py"))
     if path.parent.name != "catalogue"
 }
@@ -215,7 +222,7 @@ def test_every_field_of_a_template_has_a_value() -> None:
 
 def test_no_words_reach_a_user_but_by_a_template() -> None:
     for path, source in SOURCES.items():
-        if path.is_relative_to(CORE):
+        if path.is_relative_to(CORE) or path.is_relative_to(CORE_EXTENSIONS):
             assert bare_words_in(source) == [], path.name
 
 

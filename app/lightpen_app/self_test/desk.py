@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -29,9 +29,9 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
+from lightpen_app.face import Face
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
 from lightpen_app.self_test.report import SelfTestError, Tip
-from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings
 
 TICK_MS = 50
@@ -160,7 +160,8 @@ class Desk:
     Records, results and settings are in a folder; nothing of the user's is touched.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, faces: Sequence[Face] = ()) -> None:
+        self._faces = tuple(faces)
         self._data = folder / "data"
         self._files = folder / "files"
         self._settings = folder / "lightpen.json"
@@ -208,7 +209,7 @@ class Desk:
         """Have the wizard find and accept the tip of the swing; draw it at its end."""
         around = SourceEnvironment(SCENE, SkippingClock(rests=True))
         settings = Settings(self._settings)
-        wizard = Wizard(self._application, make_pages, settings, self._data, around)
+        wizard = Wizard(self._application, self._faces, settings, self._data, around)
         self._walk = walk = Walk(wizard, self._record)
         faults: list[str] = []
 

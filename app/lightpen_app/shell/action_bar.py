@@ -9,7 +9,7 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_styled, text_label
-from lightpen_app.steps.page import MainAction
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import SizeClass
 from lightpen_app.widgets.translated import Translated

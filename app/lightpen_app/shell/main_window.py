@@ -24,8 +24,8 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import versions
+from lightpen_app.face import Service
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.shell.about import About
@@ -36,14 +36,14 @@ from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
 from lightpen_app.shell.sidebar import Sidebar, Subject
 from lightpen_app.shell.step_list import Status, Step, StepButton, list_steps
-from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
-from lightpen_app.steps.page import MainAction, Page, step_titles
 from lightpen_app.widgets.fitted_window import FRAME, fit_screen
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.operator_view import OperatorView
+from lightpen_app.widgets.page import MainAction, Page, step_titles
 from lightpen_app.widgets.prompt_bar import AskingBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
+from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
 from lightpen_resources import RESOURCES
@@ -64,13 +64,13 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     nothing here, so that it cannot end a capture.
 
     The pages are in the order of the steps; those in ``later`` are made one by one once
-    the window is painted. Notifications of a page, by its key, go with the page.
+    the window is painted; ``titles`` are those of all. Notifications of a page, by its
+    key, go with the page.
     """
 
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
     completed = Signal()  # the window was painted, and all pages are made
-    discovery_requested = Signal()  # as in `Page`
     preferences_changed = Signal(object)  # Preferences: the user chose otherwise
     # Whether anybody may be looking at live images now.
     attention_changed = Signal(bool)
@@ -84,6 +84,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         preferences: Preferences,
         notifications: Notifications,
         later: Iterator[Page] | None = None,
+        titles: Callable[[], Sequence[str]] = lambda: tuple(step_titles().values()),
     ) -> None:
         super().__init__()
         if not pages:
@@ -92,7 +93,8 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self.setWindowIcon(QIcon(str(RESOURCES / "icons" / "lightpen.svg")))
         self._pages: list[Page] = []
         self._questions: list[list[AskingBar]] = []
-        self._later = later
+        self._later, self._titles = later, titles
+        self._services: list[Service] = []
         self._wanted: int | None = None  # page that was chosen before it was made
         self._is_painted = False
         self._settings = settings
@@ -110,7 +112,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self.operator_view.set_distance_m(preferences.distance_m)
         self.help_window = HelpWindow()
         self._options = OptionsMenu(preferences, self)
-        self._stream_dialog = StreamDialog(self)
         self._make_actions()
 
         # Layout
@@ -126,9 +127,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._options.value_changed.connect(self._on_options_changed)
         self._options.mute_action.toggled.connect(self._on_mute_toggled)
         self._options.data_folder_chosen.connect(self._on_data_folder_asked)
-        self._options.stream_chosen.connect(self._on_stream_asked)
         self._options.about_chosen.connect(self._on_about_chosen)
-        self._stream_dialog.value_changed.connect(self._options.set_stream)
         self.operator_view.closed.connect(self._on_operator_view_closed)
         self.operator_view.advance_requested.connect(self._on_remote_advance)
         self.operator_view.pause_requested.connect(self._on_pause_pressed)
@@ -232,10 +231,15 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         """Show the item and the origin of its images on every page."""
         self._sidebar.set_subject(subject)
 
-    def set_stream(self, state: StreamState) -> None:
-        """Show the state of the live stream on every page."""
-        self._sidebar.set_stream(state.status)
-        self._stream_dialog.set_state(state)
+    def add_service(self, service: Service) -> None:
+        """Show what an extension remarks, and its entries among the options."""
+        self._services.append(service)
+        for entry in service.menu_entries():
+            self._options.add_entry(entry, self)
+        service.remark_changed.connect(self._show_remark)
+        service.step_requested.connect(self.show_step)
+        self.closing.connect(service.close)
+        self._show_remark()
 
     def steps(self) -> tuple[Step, ...]:
         """Return the list of steps."""
@@ -377,7 +381,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         page.step_requested.connect(self.show_step)
         page.operator_value_changed.connect(self.operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
-        page.discovery_requested.connect(self.discovery_requested)
+        page.discovery_requested.connect(self._on_discovery_asked)
 
     def _make_actions(self) -> None:
         self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
@@ -436,7 +440,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             for each in self._pages
         ]
         if self._later is not None:
-            titles = list(step_titles().values())[len(statuses) :]
+            titles = self._titles()[len(statuses) :]
             statuses += [
                 Status(title, complete=False, why_closed="") for title in titles
             ]
@@ -491,6 +495,17 @@ class MainWindow(ResponsiveLayout, QMainWindow):
             return
         if self.page().isAncestorOf(before):
             self._focus_page()
+
+    def _on_discovery_asked(self) -> None:
+        is_camera_known = self.page().key == "leds"
+        for each in self._services:
+            if each.discovers:
+                each.discover(self, is_camera_known=is_camera_known)
+
+    def _show_remark(self) -> None:
+        remarks = (each.remark() for each in self._services)
+        found = next((each for each in remarks if each.text), StatusMessage())
+        self._sidebar.set_remark(found)
 
     def _show_options(self) -> None:
         menu = self._options
@@ -580,12 +595,6 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         )
         self._notifications.notify(OPTIONS, words.format(folder), Tone.ACTIVE)
 
-    def _on_stream_asked(self) -> None:
-        now = self._options.value()
-        place = StreamPlace(now.stream_address, now.stream_port)
-        self._stream_dialog.set_value(is_on=now.streams, place=place)
-        self._stream_dialog.open()
-
     def _on_about_chosen(self) -> None:
         About(versions(), self).exec()
 
@@ -604,3 +613,4 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Pen tip calibration"))
         self._action_bar.set_status("")  # it is in the previous language
+        self._show_remark()

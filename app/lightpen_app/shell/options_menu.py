@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
-from lightpen.streaming.server import StreamPlace
+from lightpen_app.face import MenuEntry
 from lightpen_app.look.languages import own_name
 from lightpen_app.look.theme import Appearance
 from lightpen_app.widgets.operator_view import DISTANCES_M
@@ -21,14 +21,13 @@ class OptionsMenu(Translated, QMenu):
 
     value_changed = Signal(object)  # Preferences: the user chose otherwise
     data_folder_chosen = Signal()  # the user wants to keep swings and results elsewhere
-    # The user wants to set up the stream or see its clients.
-    stream_chosen = Signal()
     about_chosen = Signal()  # show the description of the program
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value = preferences
         self._choices: list[tuple[QAction, object]] = []
+        self._entries: list[tuple[QAction, MenuEntry]] = []
 
         # Widgets
         self._languages = self._choice_menu(
@@ -47,13 +46,11 @@ class OptionsMenu(Translated, QMenu):
         self.addAction(self.mute_action)
         self.addSeparator()
         self._data_folder = self.addAction("")
-        self._stream = self.addAction("")
         self._about = self.addAction("")
 
         # Connections
         self.mute_action.toggled.connect(lambda muted: self._choose(muted=muted))
         self._data_folder.triggered.connect(self.data_folder_chosen)
-        self._stream.triggered.connect(self.stream_chosen)
         self._about.triggered.connect(self.about_chosen)
 
         self._retranslate()
@@ -66,11 +63,13 @@ class OptionsMenu(Translated, QMenu):
         """Keep swings and results elsewhere, from the next start on."""
         self._choose(data_folder=folder)
 
-    def set_stream(self, is_on: bool, place: StreamPlace) -> None:
-        """Start or stop the stream of pen poses."""
-        self._choose(
-            streams=is_on, stream_address=place.address, stream_port=place.port
-        )
+    def add_entry(self, entry: MenuEntry, window: QWidget) -> None:
+        """Add the entry of an extension."""
+        action = QAction(self)
+        action.triggered.connect(lambda: entry.choose(window))
+        self.insertAction(self._about, action)
+        self._entries.append((action, entry))
+        self._retranslate()
 
     def _choice_menu(
         self, preference: str, choices: Sequence[object], chosen: object
@@ -112,7 +111,8 @@ class OptionsMenu(Translated, QMenu):
         self._distances.setTitle(self.tr("Viewing distance"))
         self.mute_action.setText(self.tr("Mute sounds"))
         self._data_folder.setText(self.tr("Data folder..."))
-        self._stream.setText(self.tr("Live stream..."))
         self._about.setText(self.tr("About Lightpen"))
+        for action, entry in self._entries:
+            action.setText(entry.text())
         for action, value in self._choices:
             action.setText(self._choice_name(value))

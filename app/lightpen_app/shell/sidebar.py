@@ -9,11 +9,9 @@ from PySide6.QtWidgets import QFrame, QWidget
 from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.swings.names import Names
-from lightpen.streaming.server import StreamStatus
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.layouts import fill, vertical_layout
-from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, shortened
@@ -71,8 +69,7 @@ class Sidebar(Translated, QFrame):
         self._subject = text_label(TextSize.SMALL, Tone.QUIET)
         self._origin = SignLabel()
         self._status = SignLabel()
-        self._stream = SignLabel()
-        self._streamed = StreamStatus()
+        self._remark = SignLabel()
         self._steps = StepList()
         self._operator_view = PushButton()
         self._help = PushButton()
@@ -83,7 +80,7 @@ class Sidebar(Translated, QFrame):
         self._layout = layout = vertical_layout(self)
         self._head = vertical_layout(layout, self._name, self._subject)
         self._head.setSpacing(GRID // 2)
-        fill(self._head, self._status, self._origin, self._stream)
+        fill(self._head, self._status, self._origin, self._remark)
         content = QWidget()
         vertical_layout(content, self._steps, 1)
         self._scroll = PageScroll()
@@ -126,20 +123,9 @@ class Sidebar(Translated, QFrame):
             self._value = subject
             self._show_subject()
 
-    def set_stream(self, status: StreamStatus) -> None:
-        """Show the address of the stream and its number of clients."""
-        self._streamed = status
-        remark = StatusMessage()
-        if status.place is not None:
-            text = self.tr("Live stream at {0}, clients: {1}").format(
-                status.place, status.n_clients
-            )
-            if status.n_slow:
-                text += " " + self.tr("({0} of them miss images)").format(status.n_slow)
-            is_fine = status.place.is_local and not status.n_slow
-            tone = Tone.ACTIVE if is_fine else Tone.WARN
-            remark = StatusMessage(text, Sign.RING, tone)
-        self._stream.set_value(remark)
+    def set_remark(self, remark: StatusMessage) -> None:
+        """Show what an extension remarks on every page."""
+        self._remark.set_value(remark)
 
     def _reveal_present(self) -> None:
         present = self._steps.present()
@@ -186,7 +172,6 @@ class Sidebar(Translated, QFrame):
 
     def _retranslate(self) -> None:
         self._show_subject()
-        self.set_stream(self._streamed)
         self._name.setText(self.tr("Pen tip calibration"))
         for button, text, key in (
             (self._operator_view, self.tr("Operator view"), "F11"),

@@ -28,17 +28,14 @@ from lightpen.cameras.worker_events import (
 )
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError
-from lightpen.live.pipeline import Live, Sink
+from lightpen.live.pipeline import ImageCapture, ImageListener, Live, Sink
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import GuidedOperator
 from lightpen.simulator.hand import Operator
-from lightpen.simulator.toucher import ProbingOperator
-from lightpen.streaming.server import PoseStream
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.live_images import QueuedListener
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app.work.verification_run import VerificationRun
 
 WITHOUT_IMAGES = "without-images"  # cause of a notification
 CLOSING_TIME = 10.0  # s for everything in progress; a dead camera may take 8
@@ -48,8 +45,8 @@ class LiveView(QObject):
     """Opens one or two cameras and signals their images.
 
     Of two, one is `chosen`: queries, signals and settings refer to it, except `failed`
-    and `configured`, which refer to both. Images go to the active verification, else to
-    the swing; the live stream gets the images of the first camera.
+    and `configured`, which refer to both. Images go to the capture with an operator,
+    else to the swing; listeners get those of the first camera.
     """
 
     # Shown: the newest image; the GUI skips those that it has no time for
@@ -64,17 +61,12 @@ class LiveView(QObject):
     _closing_failed = Signal(str)
 
     def __init__(
-        self,
-        run: SwingRun,
-        verifications: Sequence[VerificationRun],
-        stream: PoseStream,
-        notifications: Notifications,
-        parent: QObject | None = None,
+        self, run: SwingRun, notifications: Notifications, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
         self._run = run
-        self._verifications = tuple(verifications)
-        self._stream = stream
+        self._captures: list[ImageCapture] = []
+        self._listeners: list[ImageListener] = []
         self._live: Live | None = None
         self._chosen = 0
         self._states = [_CameraState()]
@@ -89,6 +81,14 @@ class LiveView(QObject):
 
         # Connections
         self._closing_failed.connect(self._on_closing_failed)
+
+    def add_capture(self, capture: ImageCapture) -> None:
+        """Offer the images of later cameras to a capture, too."""
+        self._captures.append(capture)
+
+    def add_listener(self, listener: ImageListener) -> None:
+        """Give the detections of later cameras to a listener, too."""
+        self._listeners.append(listener)
 
     def open(
         self,
@@ -117,8 +117,8 @@ class LiveView(QObject):
             self._run.runner,
             clock,
             known,
-            verifiers=[each.runner for each in self._verifications],
-            stream=self._stream,
+            captures=self._captures,
+            listeners=self._listeners,
         )
         live.set_region(self._region)
         live.set_sink(self._sink)
@@ -140,7 +140,6 @@ class LiveView(QObject):
         for c in range(self.n_cameras):
             self._withdraw(c)
         self.set_following(False)
-        self.set_touching(False)
         self._operator, self._simulated = None, []
         self._closing = [thread for thread in self._closing if thread.is_alive()]
         thread = Thread(
@@ -298,15 +297,6 @@ class LiveView(QObject):
         """Set whether the simulated operator follows the swing."""
         operator = self._operator
         self._run.follower = GuidedOperator(operator) if follows and operator else None
-
-    def set_touching(self, touches: bool) -> None:
-        """Set whether the simulated operator probes."""
-        operator = self._operator
-        for run in self._verifications:
-            is_led = touches and run.runner.status.is_here
-            run.probing_operator = (
-                ProbingOperator(operator) if is_led and operator else None
-            )
 
     def _stop(self, live: Live, listener: QueuedListener) -> None:
         try:

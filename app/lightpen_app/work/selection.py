@@ -3,6 +3,7 @@
 import getpass
 import platform
 from dataclasses import replace
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -12,8 +13,7 @@ from lightpen.record.library.supervision import Supervision
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import NO_SOURCE, SourceChoice
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen_app.work.settings import Settings
+from lightpen_app.work.settings import Group, Settings, read_group, stored_group
 from lightpen_app.work.stations import FilePaths, preparation_of, station_of
 
 # Nothing that is chosen for a trial is remembered.
@@ -51,7 +51,7 @@ def account_name() -> str:
 
 
 class Selection(QObject):
-    """The choices for a calibration and for verifications."""
+    """The choices for a calibration, and those for extensions."""
 
     # Preparation: something else is chosen; with what was chosen before
     changed = Signal(object)
@@ -64,7 +64,7 @@ class Selection(QObject):
         self._settings = settings
         limits = settings.machine_limits()
         self._preparation = Preparation(source=NO_SOURCE, limits=limits.swing)
-        self._choices = VerificationChoices(limits=limits.verification)
+        self._extensions: dict[str, dict[str, Any]] = {}
         self._supervision = Supervision()
         self._unread = FilePaths()
 
@@ -73,10 +73,9 @@ class Selection(QObject):
         """Choices for a calibration."""
         return self._preparation
 
-    @property
-    def choices(self) -> VerificationChoices:
-        """Choices for a verification."""
-        return self._choices
+    def of_extension(self, key: str, usual: Group) -> Group:
+        """Return the choices for an extension, where valid; else what is usual."""
+        return read_group(self._extensions.get(key), usual)
 
     @property
     def supervision(self) -> Supervision:
@@ -99,7 +98,7 @@ class Selection(QObject):
         chosen = preparation_of(name, station, before)
         limits = self._limits_for(chosen)
         self._preparation = replace(chosen, limits=limits.swing)
-        self._choices = replace(station.verification, limits=limits.verification)
+        self._extensions = dict(station.extensions)
         self._unread = station.files
         self._remember_last()
         self.station_changed.emit(station.files)
@@ -135,9 +134,9 @@ class Selection(QObject):
         """Note that no file of the station is still to be read."""
         self._unread = FilePaths()
 
-    def set_choices(self, choices: VerificationChoices) -> None:
-        """Take over other choices for verifications, and remember them."""
-        self._choices = choices
+    def set_of_extension(self, key: str, choices: object) -> None:
+        """Take over other choices for an extension, and remember them."""
+        self._extensions[key] = stored_group(choices)
         self._remember()
         self.changed.emit(self._preparation)
 
@@ -151,7 +150,6 @@ class Selection(QObject):
         self._supervision = supervision
         before, limits = self._preparation, self.limits
         self._preparation = replace(before, limits=limits.swing)
-        self._choices = replace(self._choices, limits=limits.verification)
         self._remember()
         self._follow(before)
 
@@ -176,5 +174,5 @@ class Selection(QObject):
     def _remember(self) -> None:
         name = self._preparation.names.station
         if name not in ("", TRIAL.station):
-            station = station_of(self._preparation, self._choices, self._unread)
+            station = station_of(self._preparation, self._extensions, self._unread)
             self._settings.set_station(name, station)

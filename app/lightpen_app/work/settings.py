@@ -22,8 +22,6 @@ from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.limits import DueRule, StationLimits
-from lightpen.streaming.server import StreamPlace
-from lightpen.verification.session.choices import VerificationChoices
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import (
@@ -49,13 +47,9 @@ class Preferences:
     muted: bool = False
     distance_m: float = 3.0  # from the operator's eyes to the screen, m
     data_folder: str = ""  # data folder from the next start on; empty for the default
-    # Whether other programs may follow the pen, and where; see `StreamPlace`.
-    streams: bool = False
-    stream_address: str = StreamPlace.address
-    stream_port: int = StreamPlace.port
 
 
-Group = TypeVar("Group", Preferences, Station, CameraSettings, DueRule, CameraFiles)
+Group = TypeVar("Group")  # a frozen dataclass
 
 
 class Settings(QObject):
@@ -88,13 +82,13 @@ class Settings(QObject):
         named = self._machine.language
         language = named if named in languages() else system_language()
         usual = Preferences(language=language)
-        read = _read(self._content.get("preferences", {}), usual)
+        read = read_group(self._content.get("preferences", {}), usual)
         known = read.language if read.language in languages() else usual.language
         return replace(read, language=known)
 
     def set_preferences(self, preferences: Preferences) -> None:
         """Store the preferences."""
-        self._save("preferences", _entries(preferences))
+        self._save("preferences", stored_group(preferences))
 
     def stations(self) -> tuple[str, ...]:
         """Return the names of the stations, in alphabetical order."""
@@ -103,37 +97,35 @@ class Settings(QObject):
     def station(self, name: str) -> Station:
         """Return the last selection at a station; defaults for a new one."""
         limits = self.machine_limits()
-        usual = Station(
-            limits=limits.swing,
-            verification=VerificationChoices(limits=limits.verification),
-        )
-        return _read(self._content.get("stations", {}).get(name), usual)
+        usual = Station(limits=limits.swing)
+        return read_group(self._content.get("stations", {}).get(name), usual)
 
     def set_station(self, name: str, station: Station) -> None:
         """Store the selection at a station."""
         if not name:
             raise ValueError("`name` of a station must not be empty.")
-        self._save("stations", {name: _entries(station)})
+        self._save("stations", {name: stored_group(station)})
 
     def cameras(self) -> dict[str, CameraSettings]:
         """Return the last camera settings, by serial number."""
         kept = self._content.get("cameras", {})
         return {
-            serial: _read(entries, CameraSettings()) for serial, entries in kept.items()
+            serial: read_group(entries, CameraSettings())
+            for serial, entries in kept.items()
         }
 
     def set_camera(self, serial: str, settings: CameraSettings) -> None:
         """Remember how a camera is set up."""
-        self._save("cameras", {serial: _entries(settings)})
+        self._save("cameras", {serial: stored_group(settings)})
 
     def camera_files(self, serials: str) -> CameraFiles:
         """Return the stored settings of a camera by serial number, or of a pair."""
         kept = self._content.get("camera_files", {}).get(serials)
-        return _read(kept, CameraFiles())
+        return read_group(kept, CameraFiles())
 
     def set_camera_files(self, serials: str, files: CameraFiles) -> None:
         """Remember the files of a camera, or of a pair."""
-        self._save("camera_files", {serials: _entries(files)})
+        self._save("camera_files", {serials: stored_group(files)})
 
     def camera_of_file(self, sha256: str) -> str:
         """Return the serial number of the camera that a file is stored for."""
@@ -142,6 +134,14 @@ class Settings(QObject):
             if sha256 and self.camera_files(serial).sha256 == sha256:
                 return serial
         return ""
+
+    def of_extension(self, key: str, usual: Group) -> Group:
+        """Return what an extension has stored, where valid; else what is usual."""
+        return read_group(self._content.get("extensions", {}).get(key), usual)
+
+    def set_of_extension(self, key: str, value: object) -> None:
+        """Store the settings of an extension."""
+        self._save("extensions", {key: stored_group(value)})
 
     def last_station(self) -> str:
         """Return the name of the station used last; empty at first."""
@@ -174,7 +174,7 @@ class Settings(QObject):
 
     def due_rule(self) -> DueRule:
         """Return the calibration interval."""
-        return _read(self._content.get("due"), self.machine_limits().due)
+        return read_group(self._content.get("due"), self.machine_limits().due)
 
     def update_file(self) -> str:
         """Return the file that names the newest version; empty for none."""
@@ -186,7 +186,7 @@ class Settings(QObject):
 
     def set_due_rule(self, rule: DueRule) -> None:
         """Store the calibration interval."""
-        self._save("due", _entries(rule))
+        self._save("due", stored_group(rule))
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Restore the geometry of a window; False if never stored."""
@@ -271,13 +271,13 @@ def data_folder(preferences: Preferences) -> Path:
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
-def _entries(value: Group) -> dict[str, Any]:
+def stored_group(value: object) -> dict[str, Any]:
     """Return the fields of a value for storing."""
     entries: dict[str, Any] = json.decode(json.encode(value))
     return entries
 
 
-def _read(saved: object, default: Group) -> Group:
+def read_group(saved: object, default: Group) -> Group:
     """Return a default updated with valid stored fields."""
     found: dict[str, Any] = {}
     for name, kind in get_type_hints(type(default)).items():
@@ -285,6 +285,6 @@ def _read(saved: object, default: Group) -> Group:
             with suppress(DamagedError):
                 found[name] = in_shape(saved[name], kind)
     try:
-        return replace(default, **found)
+        return replace(default, **found)  # type: ignore[type-var]
     except ValueError:
         return default

@@ -1,7 +1,7 @@
 """Stored settings of a station."""
 
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from lightpen.model.method import Method
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import NO_SOURCE, SecondCamera, SourceChoice
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.session.choices import VerificationChoices
 
 Triple: TypeAlias = tuple[float, float, float]
 
@@ -58,7 +57,8 @@ class Station:
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
     method: Method = "joint"  # of the reported tip
-    verification: VerificationChoices = field(default_factory=VerificationChoices)
+    # Choices for extensions by their keys, each as it stores them.
+    extensions: dict[str, dict[str, Any]] = field(default_factory=dict)
     heading: float | None = None  # the operator's right as the camera sees it, rad
     temperature_day: str = ""  # see `Preparation`
 
@@ -89,7 +89,7 @@ def preparation_of(name: str, station: Station, before: Preparation) -> Preparat
 
 
 def station_of(
-    preparation: Preparation, choices: VerificationChoices, unread: FilePaths
+    preparation: Preparation, extensions: dict[str, dict[str, Any]], unread: FilePaths
 ) -> Station:
     """Return the stored form of a station, with the paths of files still being read."""
     second, tip = preparation.second, preparation.nominal_tip
@@ -111,7 +111,7 @@ def station_of(
         limits=preparation.limits,
         assumptions=preparation.assumptions,
         method=preparation.method,
-        verification=choices,
+        extensions=extensions,
         heading=preparation.heading,
         temperature_day=preparation.temperature_day,
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
+from typing import Protocol
 
 from PySide6.QtCore import QObject, QThreadPool
 
@@ -13,8 +14,6 @@ from lightpen.messages import Message, message
 from lightpen.record.folder.data_folder import sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
-from lightpen.streaming.points import points_of
-from lightpen.verification.tasks.part import PART
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
 from lightpen_app.work.archive_writer import ArchiveWriter
@@ -30,12 +29,20 @@ from lightpen_app.work.pen_files import PenFiles
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.settings import Settings
-from lightpen_app.work.streaming import Streaming
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app.work.verification_run import VerificationRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
 SETTINGS, UPDATE = "settings", "update"  # causes of notifications
+
+
+class WorkbenchPart(Protocol):
+    """What an extension starts and ends with the workbench."""
+
+    def shut_down(self) -> None:
+        """Begin to end; its signals start nothing more."""
+
+    def await_end(self, timeout_s: float) -> bool:
+        """Wait for the end and return whether it came."""
 
 
 class Workbench(QObject):
@@ -55,15 +62,8 @@ class Workbench(QObject):
         self.notifications = notices = Notifications(self)
         self.selection = Selection(settings, self)
         self.run = SwingRun(folder, around.now, notices, self)
-        self.verification = VerificationRun(  # of the tip by reference artefacts
-            self.run.archive, folder, around.now, notices, self
-        )
-        self.measuring = VerificationRun(  # of parts by the tip
-            self.run.archive, folder, around.now, notices, self
-        )
-        self.streaming = Streaming(self.run.archive, around.clock, self)
-        probing = (self.verification, self.measuring)
-        self.live = LiveView(self.run, probing, self.streaming.stream, notices, self)
+        self.parts: list[WorkbenchPart] = []  # of extensions, which add them
+        self.live = LiveView(self.run, notices, self)
         rule = settings.due_rule()
         self.library = LibraryWatch(
             folder, self.run.logbook, rule, around.now, notices, self
@@ -79,16 +79,12 @@ class Workbench(QObject):
         self.save_place = SavePlace(settings, self.run, around.now)
 
         # Connections: models get a choice before views do
-        self.selection.changed.connect(self._update_runners)
+        self.selection.changed.connect(self._update_runner)
         self.camera = CameraSetup(self.selection, self.live, settings, around, self)
         samples = folder / SIMULATED
         self.files = ChosenFiles(self.selection, notices, samples, around, self)
         self.run.changed.connect(self._keep_heading)
         self.run.result_changed.connect(self.library.refresh)
-        self.run.result_changed.connect(self.streaming.read_tip)
-        self.measuring.changed.connect(self._stream_points)
-        for each in probing:
-            each.files_changed.connect(self.archive_writer.enter_owed)
         settings.failed.connect(self._on_settings_failed)
         settings.recovered.connect(self._on_settings_recovered)
 
@@ -114,15 +110,14 @@ class Workbench(QObject):
         acknowledged data is on the disk.
         """
         deadline = monotonic() + timeout_s
-        for view in (self.run, self.verification, self.measuring):
-            view.blockSignals(True)  # their signals start nothing more
+        self.run.blockSignals(True)  # its signals start nothing more
         self.folder_watch.stop()
         self.pens.shut_down()
         self.camera_files.shut_down()
         self.library.shut_down()
         self.run.runner.shut_down()
-        self.verification.runner.shut_down()
-        self.measuring.runner.shut_down()
+        for part in self.parts:
+            part.shut_down()
         self.live.close()
         pool = QThreadPool.globalInstance()
         jobs_ended = pool.waitForDone(round(1000 * timeout_s))
@@ -130,14 +125,9 @@ class Workbench(QObject):
         of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
         has_closed = self.live.await_closed(of_camera)
         has_ended = all(
-            runner.await_end(max(0.0, deadline - monotonic()))
-            for runner in (
-                self.run.runner,
-                self.verification.runner,
-                self.measuring.runner,
-            )
+            part.await_end(max(0.0, deadline - monotonic()))
+            for part in (self.run.runner, *self.parts)
         )
-        self.streaming.shut_down()
         self.folder_watch.leave()
         pool.waitForDone(round(1000 * max(0.0, deadline - monotonic())))
         is_saved = self.settings.await_saved(max(0.0, deadline - monotonic()))
@@ -152,13 +142,9 @@ class Workbench(QObject):
             now = replace(chosen, heading=status.state.heading)
             self.selection.set_preparation(now)
 
-    def _update_runners(self) -> None:
-        chosen, choices = self.selection.preparation, self.selection.choices
+    def _update_runner(self) -> None:
+        chosen = self.selection.preparation
         self.run.runner.ask(lambda workflow: workflow.choose(chosen))
-        part = replace(choices, kind=PART.kind)
-        self.verification.runner.ask(lambda workflow: workflow.choose(chosen, choices))
-        self.measuring.runner.ask(lambda workflow: workflow.choose(chosen, part))
-        self.streaming.choose(chosen)
         self.library.set_rule(self.selection.limits.due)
 
     def _read_supervision(self) -> None:
@@ -172,11 +158,6 @@ class Workbench(QObject):
 
     def _on_supervision_unread(self, why: str) -> None:
         self.notifications.notify("supervision", why)
-
-    def _stream_points(self) -> None:
-        status, stream = self.measuring.status, self.streaming.stream
-        if stream.is_heard and status.setup is not None and status.state is not None:
-            stream.set_points(points_of(status.setup, status.state))
 
     def _on_settings_failed(self, why: Message) -> None:
         self.notifications.notify(SETTINGS, worded(why))

@@ -1,9 +1,9 @@
 """The live pipeline: detects spots and pen in camera images and passes them on.
 
 One thread processes the images. While nothing is captured it takes the newest and skips
-those in between; during a swing or a verification it takes all of them in order,
+those in between; during a swing or another capture it takes all of them in order,
 simultaneous ones of two cameras together. If nothing moves it takes two a second,
-within a swing or a verification only after a while; without a viewer, none. A recording
+within a capture only after a while; without a viewer, none. A recording
 that has been replayed to its end counts as at rest.
 """
 
@@ -34,10 +34,8 @@ from lightpen.detection.reasons import UNFORESEEN
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.errors import LightpenError
-from lightpen.streaming.server import PoseStream
 from lightpen.swing.capture.state import Phase, SwingSetup
 from lightpen.swing.runner import SwingRunner
-from lightpen.verification.runner import VerificationRunner
 
 LONGEST_WAIT = 0.1  # s until the start of a swing is noticed
 UNHURRIED = 0.5  # s from image to image while nothing moves
@@ -74,17 +72,49 @@ class LiveListener(Protocol):
         """Handle an event, other than an image, of the camera with this index."""
 
 
+class ImageListener(Protocol):
+    """Listener to what is seen in the images of the first camera."""
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether it needs every image."""
+
+    def take(self, frame: Frame, detection: PenDetection | None) -> None:
+        """Handle a processed image; returns at once."""
+
+
+class ImageCapture(Protocol):
+    """What an operator may capture in place of a swing, such as a verification."""
+
+    @property
+    def is_here(self) -> bool:
+        """Whether its operator is present."""
+
+    @property
+    def region(self) -> RegionOfInterest | None:
+        """Target of its detection; None while it takes no images."""
+
+    @property
+    def stage(self) -> object:
+        """Where it stands; another stage counts as a motion."""
+
+    def take(
+        self, frame: Frame, detection: PenDetection | None, region: RegionOfInterest
+    ) -> None:
+        """Take an image that was searched for this region."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Capture:
-    """Consumer of the images: a swing, a verification, or none."""
+    """Consumer of the images: a swing, another capture, or none."""
 
     swing: SwingSetup | None = None
-    verification: RegionOfInterest | None = None
+    other: RegionOfInterest | None = None
 
     @property
     def wanted(self) -> SwingSetup | RegionOfInterest | None:
         """Target of its detection."""
-        return self.swing or self.verification
+        return self.swing or self.other
 
 
 class Live:
@@ -97,14 +127,13 @@ class Live:
     settings : CameraSettings
         Applied when they are opened.
     runner : SwingRunner
-        Takes every image, except during a verification.
+        Takes every image, except during another capture.
     known : mapping of str to CameraSettings
         Settings by serial number, in place of ``settings``.
-    verifiers : sequence of VerificationRunner
+    captures : sequence of ImageCapture
         Of these the one where an operator is present takes every image.
-    stream : PoseStream, optional
-        Sends detections of the first camera; while it has clients, every image is
-        processed.
+    listeners : sequence of ImageListener
+        Are given the detections of the first camera.
     """
 
     def __init__(
@@ -115,8 +144,8 @@ class Live:
         runner: SwingRunner,
         clock: Clock | None = None,
         known: Mapping[str, CameraSettings] | None = None,
-        verifiers: Sequence[VerificationRunner] = (),
-        stream: PoseStream | None = None,
+        captures: Sequence[ImageCapture] = (),
+        listeners: Sequence[ImageListener] = (),
     ) -> None:
         self._workers = tuple(
             CameraWorker(
@@ -128,8 +157,8 @@ class Live:
         self._has_refused = False
         self._listener = listener
         self._runner = runner
-        self._verifiers = tuple(verifiers)
-        self._stream = stream
+        self._captures = tuple(captures)
+        self._listeners = tuple(listeners)
         self._region = RegionOfInterest()
         self._sink: Sink | None = None
         self._wanted: RegionOfInterest | SwingSetup = self._region
@@ -228,9 +257,9 @@ class Live:
 
     def _captured(self) -> _Capture:
         """Return the capture in progress, for which the workers deliver all images."""
-        status, verified = self._runner.status, self._verified()
-        is_swing = verified is None and status.is_capturing
-        captured = _Capture(status.setup if is_swing else None, verified)
+        status, other = self._runner.status, self._other_region()
+        is_swing = other is None and status.is_capturing
+        captured = _Capture(status.setup if is_swing else None, other)
         measures = captured.wanted is not None or self._sink is not None
         if self._measures is not measures:
             self._measures = measures
@@ -240,20 +269,18 @@ class Live:
         return captured
 
     @property
-    def _verifier(self) -> VerificationRunner | None:
-        """The one where an operator is present."""
-        return next((each for each in self._verifiers if each.status.is_here), None)
+    def _other(self) -> ImageCapture | None:
+        """The capture where an operator is present."""
+        return next((each for each in self._captures if each.is_here), None)
 
-    def _verified(self) -> RegionOfInterest | None:
-        """Return the detection target of a verification; None without one."""
-        verifier = self._verifier
-        status = None if verifier is None else verifier.status
-        return status.region if status is not None and status.is_touching else None
+    def _other_region(self) -> RegionOfInterest | None:
+        """Return the detection target of another capture than a swing."""
+        other = self._other
+        return None if other is None else other.region
 
     def _rest(self) -> float | None:
         """Return the pause after each image, s; None to stop."""
-        is_heard = self._stream is not None and self._stream.is_heard
-        if is_heard or self._sink is not None:
+        if self._sink is not None or any(each.is_heard for each in self._listeners):
             return 0.0
         if self._moved_ns is None:  # the first image gives the size
             return 0.0
@@ -261,13 +288,14 @@ class Live:
         status = self._runner.status
         waits = status.state is None or status.state.phase is Phase.WAIT
         is_swung = status.is_capturing and not (waits or status.is_paused_by_user)
-        if self._verified() is None and is_swung:
+        is_other = self._other_region() is not None
+        if not is_other and is_swung:
             assert status.setup is not None
             assert status.state is not None
             is_begun = status.state.phase in MAY_REST
             if status.setup.is_recording or not is_begun:
                 return 0.0
-        if self._verified() is not None or is_swung:
+        if is_other or is_swung:
             return 0.0 if still_ns < PATIENT_NS else UNHURRIED
         if not self._is_watched:
             return None
@@ -275,12 +303,10 @@ class Live:
 
     def _notice_stage(self) -> None:
         """Treat a new phase or task as a motion."""
-        status = self._runner.status
-        verifier = self._verifier
-        verified = None if verifier is None else verifier.status
+        status, other = self._runner.status, self._other
         stage = (
             None if status.state is None else status.state.phase,
-            verified is not None and verified.is_touching and verified.task,
+            None if other is None else other.stage,
         )
         if stage != self._stage:
             self._stage = stage
@@ -304,9 +330,9 @@ class Live:
         return self._seen_seq - self._pass_seq >= caps.n_images
 
     def _notify_others(self, image: LiveImage) -> None:
-        """Send detections to the clients of the stream."""
-        if self._stream is not None:
-            self._stream.take(image.frame, image.detection)
+        """Give the detection to the listeners."""
+        for each in self._listeners:
+            each.take(image.frame, image.detection)
 
     def _take_newest(self) -> None:
         """Process the newest image of each camera."""
@@ -345,9 +371,9 @@ class Live:
         detection = None
         if len(detections) == len(images):
             detection = replace(detections[0], others=tuple(detections[1:]))
-        verifier = self._verifier
-        if verifier is not None and captured.verification is not None:
-            verifier.take(frame, detection, captured.verification)
+        other = self._other
+        if other is not None and captured.other is not None:
+            other.take(frame, detection, captured.other)
         else:
             self._hand_over(frame, detection, captured.swing)
         sink = self._sink

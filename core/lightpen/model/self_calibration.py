@@ -1,8 +1,8 @@
 """Recognition of the images that a pen or a camera was found from.
 
-A file found from a swing (`lightpen.discovery`) has used the information of its images.
-A calibration of the same images starts from what was known before them, so that this
-information counts once.
+A file found from a swing (`lightpen_extensions.discover`) has used the information of
+its images. A calibration of the same images starts from what was known before them, so
+that this information counts once.
 """
 
 from dataclasses import dataclass

@@ -101,7 +101,6 @@ class SimulatedCamera:
         self._next_seq = 0
         self._is_open = self._is_streaming = False
         self._next_end = 0.0  # of the exposure of the next image
-        self._board_held = 0, 0  # number of its pose, and images of it
 
     @property
     def serial(self) -> str:
@@ -260,16 +259,12 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or "Mono8"
         times = end - self._exposure * np.array([1.0, 0.5, 0.0])
         scene = _with_gain(self.scene, settings)
-        board = self.operator.board
-        if board is None:
+        shown = self.operator.in_view
+        if shown is None:
             image = render_plan(scene, self._image_plan(scene, seq, times))
         else:
-            # Only while a camera is calibrated: the start does not wait for it.
-            from lightpen.simulator.boards import expose_board, held_light
-
-            light = held_light(scene.camera, board, self._board_pose(times[1]))
             rng = np.random.default_rng([scene.seed, seq])
-            image = expose_board(light, scene.sensor, rng)
+            image = shown.image(scene.camera, scene.sensor, times[1], rng)
         return Frame(
             image=sealed(image),
             seq=seq,
@@ -280,16 +275,6 @@ class SimulatedCamera:
             pixel_format=pixel_format,
             full_scale=2 ** BITS[pixel_format] - 1,
         )
-
-    def _board_pose(self, now: float) -> int:
-        """Return the number of the board's pose; a slow reader sees it long enough."""
-        from lightpen.simulator.boards import HELD_IMAGES, HELD_S
-
-        due, (number, n_images) = int(now / HELD_S), self._board_held
-        if not n_images or (due != number and n_images >= HELD_IMAGES):
-            number, n_images = due, 0
-        self._board_held = number, n_images + 1
-        return number
 
     def _image_plan(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
         """Return the plan of the image exposed between the first and the last time."""

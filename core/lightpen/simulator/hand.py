@@ -10,12 +10,13 @@ from enum import Enum, auto
 from functools import partial
 from math import inf
 from threading import Lock
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.clock import Clock
+from lightpen.model.camera import Camera
 from lightpen.simulator.motion import (
     STEP,
     TrackingMotion,
@@ -26,9 +27,7 @@ from lightpen.simulator.motion import (
     swing_at,
 )
 from lightpen.simulator.postures import TREMOR, Postures
-
-if TYPE_CHECKING:
-    from lightpen.intrinsics.boards import Board
+from lightpen.simulator.sensor import Sensor
 
 N_REMEMBERED = 16  # moments: an exposure of 0.15 s
 PATIENCE = 20.0  # s without an image after which the hand rests until the next
@@ -49,6 +48,15 @@ GUIDED = TrackingMotion(gain=3.0, lag=0.13, top_speed=np.radians(30))
 SWUNG = TrackingMotion(gain=5.0, lag=0.078, top_speed=np.radians(60))
 MOUSE = TrackingMotion(gain=12.0, lag=0.0325, top_speed=np.radians(360))
 ARM = TrackingMotion(gain=4.0, lag=0.0975, top_speed=300.0)
+
+
+class HeldView(Protocol):
+    """What an operator holds in view instead of the pen."""
+
+    def image(
+        self, camera: Camera, sensor: Sensor, now: float, rng: np.random.Generator
+    ) -> Image:
+        """Return its image at a time, s."""
 
 
 class HandActivity(Enum):
@@ -114,7 +122,7 @@ class Operator:
         self._turn_tremor = Tremor(self._rng)
         self._tip_tremor = Tremor(self._rng)
         self._lock = Lock()
-        self.board: Board | None = None  # held in view instead of the pen
+        self.in_view: HeldView | None = None  # held in view instead of the pen
         self._wishes: list[_Wish] = []
         self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
         self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)

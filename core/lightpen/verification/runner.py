@@ -48,6 +48,23 @@ class VerificationRunner:
         """The last published status; thread-safe."""
         return self._workflow.status
 
+    @property
+    def is_here(self) -> bool:
+        """Whether an operator is present."""
+        return self.status.is_here
+
+    @property
+    def region(self) -> RegionOfInterest | None:
+        """What is searched for in the images; None while none are taken."""
+        status = self.status
+        return status.region if status.is_touching else None
+
+    @property
+    def stage(self) -> object:
+        """The task that takes images."""
+        status = self.status
+        return status.task if status.is_touching else None
+
     def ask(self, command: Callable[[VerificationWorkflow], None]) -> None:
         """Queue a command: a call of the workflow."""
         self._queue.ask(lambda: command(self._workflow))

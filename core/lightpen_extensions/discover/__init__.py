@@ -1,1 +1,1 @@
-"""Tip, pen and camera from one swing and one length."""
+"""Tip, pen and camera from one swing and one length, without files."""

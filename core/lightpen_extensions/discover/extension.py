@@ -6,7 +6,7 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_discover(parser: ArgumentParser) -> None:
-    from lightpen.commands.discover import add_discover
+    from lightpen_extensions.discover.command import add_discover
 
     add_discover(parser)
 

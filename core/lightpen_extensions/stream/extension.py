@@ -6,7 +6,7 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_stream(parser: ArgumentParser) -> None:
-    from lightpen.commands.stream import add_stream
+    from lightpen_extensions.stream.command import add_stream
 
     add_stream(parser)
 

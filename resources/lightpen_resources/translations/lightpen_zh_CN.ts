@@ -1623,10 +1623,6 @@
         <translation>中断的项目：{0}</translation>
     </message>
     <message>
-        <source>Interrupted verification</source>
-        <translation>中断的验证</translation>
-    </message>
-    <message>
         <source>Interrupted swings: {0}</source>
         <translation>中断的摆动：{0}</translation>
     </message>
@@ -3144,10 +3140,6 @@
         <translation>数据文件夹...</translation>
     </message>
     <message>
-        <source>Live stream...</source>
-        <translation>实时数据流...</translation>
-    </message>
-    <message>
         <source>About Lightpen</source>
         <translation>关于 Lightpen</translation>
     </message>
@@ -4342,14 +4334,6 @@ needed</source>
 <context>
     <name>Sidebar</name>
     <message>
-        <source>Live stream at {0}, clients: {1}</source>
-        <translation>实时数据流 {0}，客户端：{1}</translation>
-    </message>
-    <message>
-        <source>({0} of them miss images)</source>
-        <translation>（其中 {0} 个丢失图像）</translation>
-    </message>
-    <message>
         <source>Pen {0}</source>
         <translation>光笔 {0}</translation>
     </message>
@@ -4686,6 +4670,21 @@ needed</source>
     <message>
         <source>Close</source>
         <translation>关闭</translation>
+    </message>
+</context>
+<context>
+    <name>StreamService</name>
+    <message>
+        <source>Live stream...</source>
+        <translation>实时数据流...</translation>
+    </message>
+    <message>
+        <source>Live stream at {0}, clients: {1}</source>
+        <translation>实时数据流 {0}，客户端：{1}</translation>
+    </message>
+    <message>
+        <source>({0} of them miss images)</source>
+        <translation>（其中 {0} 个丢失图像）</translation>
     </message>
 </context>
 <context>

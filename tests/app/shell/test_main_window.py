@@ -30,10 +30,10 @@ from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.page_area import NoticeBar
 from lightpen_app.shell.sidebar import Subject
 from lightpen_app.shell.step_list import StepButton, StepState
-from lightpen_app.steps.page import MainAction, Page, step_titles
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.fitted_window import fitted_place
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page import MainAction, Page, step_titles
 from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings

@@ -11,8 +11,8 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.simulator.motion import TrackingMotion
 from lightpen_app.look.words import unbroken
-from lightpen_app.steps.page import Page
 from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.state_banner import StateBanner
 
 W = TypeVar("W", bound=QWidget)

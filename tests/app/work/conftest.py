@@ -15,7 +15,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app.work.verification_run import VerificationRun
+from lightpen_app_extensions.measure.verification_run import VerificationRun
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 

@@ -20,14 +20,14 @@ from lightpen.formats.decoding import encode_png
 from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.reading import open_record
 from lightpen.simulator.hand import Operator
-from lightpen.streaming.server import PoseStream
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app.work.verification_run import VerificationRun
+from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_extensions.stream.server import PoseStream
 
 TIMEOUT = 60.0  # s until a test gives up
 SIGNALS = (*("image_shown", "connection_changed", "settings_applied"),)
@@ -53,7 +53,9 @@ class Diary:
 def view(
     run: SwingRun, verification: VerificationRun, notifications: Notifications
 ) -> Iterator[LiveView]:
-    view = LiveView(run, (verification,), PoseStream(), notifications)
+    view = LiveView(run, notifications)
+    view.add_capture(verification.runner)
+    view.add_listener(PoseStream())
     yield view
     view.close()
     view.await_closed()

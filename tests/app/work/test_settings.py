@@ -16,8 +16,6 @@ from lightpen.formats.machine_settings import machine_file
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.fixed_point import FixedPointOptions
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings import Preferences, Settings, settings_file
@@ -31,7 +29,7 @@ STATION = Station(
         SourceChoice("folder", producer="/opt/vendor/producer.cti"),
         mask=((101.25, 0.1, 12.0), (1e-3, 700.0, 1 / 3)),
     ),
-    verification=VerificationChoices(options=(FixedPointOptions(n_touches=12),)),
+    extensions={"measure": {"n_frames": 12}, "later": {"any": [1, None]}},
 )
 ANN = Station(Names(operator="Ann"))
 CAMERA = CameraSettings(850.0, 6.0, 20.0, "Mono12", Region(8, 0, 640, 480), None, 1500)
@@ -85,7 +83,7 @@ def test_what_the_administrator_set_is_below_what_the_user_chose(
 
     assert settings.preferences().language == "zh_CN"
     assert settings.station("new").limits.max_uncertainty == 0.02
-    assert settings.station("new").verification.limits.tip == 0.05
+    assert settings.machine_limits().verification.tip == 0.05
     assert settings.due_rule().max_days == 14
     assert settings.laboratory() == Laboratory(name="Works 2", procedure="WI-0815")
 

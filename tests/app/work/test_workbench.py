@@ -22,7 +22,6 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
-from lightpen.streaming.server import StreamPlace
 from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen.swing.status import SwingStatus
@@ -30,6 +29,8 @@ from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, StoredCamera
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.stream.service import StreamService
+from lightpen_extensions.stream.server import StreamPlace
 
 OTHER = Names("Hall 3", "Bo", "LP-05", "T-11", "C-2", 6.0)
 MASK = np.array([[101.25, 0.1, 12.0], [1e-3, 700.0, 1 / 3]])
@@ -451,7 +452,8 @@ def test_a_newer_version_that_an_administrator_names_is_reported_at_the_start(
 
 def test_what_is_reported_after_shutting_down_begins_nothing(stage: Stage) -> None:
     workbench = stage.workbench
-    workbench.streaming.want(StreamPlace(port=0))  # a job that tells of its end later
+    stream = StreamService(workbench)
+    stream.streaming.want(StreamPlace(port=0))  # a job that tells of its end later
     workbench.library.refresh()
     workbench.shut_down()
     reported: list[str] = []

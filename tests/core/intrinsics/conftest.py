@@ -11,7 +11,7 @@ from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_centroids
-from lightpen.simulator.boards import simulate_board_poses
+from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
 NOISE = 0.03  # px
 

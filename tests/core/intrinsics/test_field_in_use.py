@@ -16,13 +16,13 @@ from lightpen.intrinsics.calibration import calibrate_camera
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
-from lightpen.simulator.boards import simulate_board_poses
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
     swing_poses,
 )
+from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
 N_VIEWS, N_IMAGES, NOISE = 24, 100, 0.03  # px
 AMPLITUDE, LENGTH = 0.06, 0.25  # px; of the width

@@ -13,7 +13,7 @@ from lightpen.intrinsics.pair import PairCalibration, calibrate_pair
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.boards import simulate_board_poses
+from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 
 MakeViews = Callable[..., Views]
 TURN = rotation_from_vector(np.array([0.02, -0.2, 0.01]))

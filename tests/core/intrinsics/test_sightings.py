@@ -23,8 +23,8 @@ from lightpen.intrinsics.sightings import (
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.boards.simulated_boards import expose_board, render_board
 
 SMALL = Camera(
     *(400, 320, 600.0, 599.0, 201.0, 158.0),

@@ -3,7 +3,7 @@
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
@@ -25,12 +25,12 @@ from lightpen.cameras.worker_events import (
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.formats.decoding import encode_png
-from lightpen.live.pipeline import UNHURRIED, Live, LiveImage
+from lightpen.live.pipeline import UNHURRIED, ImageListener, Live, LiveImage
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
 from lightpen.simulator.samples import SAMPLE_PENS
-from lightpen.streaming.server import LOOPBACK, PoseStream, StreamPlace
 from lightpen.swing.capture.state import Phase, SwingEventKind
+from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station
@@ -107,13 +107,13 @@ def make_live(station: "Station", screen: Screen) -> Iterator[MakeLive]:
         camera: ImageCamera | None = None,
         *,
         starts: bool = True,
-        stream: PoseStream | None = None,
+        listeners: Sequence[ImageListener] = (),
     ) -> Live:
         settings = CameraSettings(frame_rate=FRAME_RATE)
         live = Live(
             *([camera or station.new_camera()], settings, screen, station.runner),
             clock=station.clock,
-            stream=stream,
+            listeners=listeners,
         )
         lives.append(live)
         if starts:
@@ -210,7 +210,7 @@ def test_while_others_listen_every_image_is_looked_at_though_nobody_looks_on(
     stream = PoseStream()
     stream.open(StreamPlace(port=0))
     assert stream.status.place is not None
-    live = make_live(starts=False, stream=stream)
+    live = make_live(starts=False, listeners=[stream])
     live.set_watched(False)
     live.start()
     screen.wait_for_images(1)

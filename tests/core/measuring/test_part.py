@@ -22,7 +22,7 @@ from lightpen.measuring.touches import PartTouches
 from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.plate import plate_plan
+from lightpen_extensions.measure.plate import plate_plan
 
 R = rotation_from_vector(np.array([0.4, -0.7, 0.2]))
 T = np.array([120.0, -80.0, 1400.0])

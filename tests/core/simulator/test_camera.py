@@ -12,11 +12,11 @@ from lightpen.formats.images import ImageSource
 from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.sightings import find_points
 from lightpen.model.camera import Camera
-from lightpen.simulator.boards import HELD_IMAGES, HELD_S
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.simulator.view import Lamp
+from lightpen_extensions.boards.simulated_boards import HELD_IMAGES, HELD_S, HeldBoard
 
 SMALL = Camera(width=612, height=512, fx=1160, fy=1160, cx=305, cy=258)
 SCENE = Scene(camera=SMALL)
@@ -231,7 +231,7 @@ def test_a_board_is_held_still_for_a_slow_reader_too() -> None:
     clock = SkippingClock()
     board = parse_board("chessboard:7x5:20")
     camera = streaming_camera(clock=clock)
-    camera.operator.board = board
+    camera.operator.in_view = HeldBoard(board)
     seen = []
     for _ in range(HELD_IMAGES + 1):
         (frame,) = read(camera, 1)
@@ -249,7 +249,7 @@ def test_a_board_is_held_in_view_in_many_poses_until_the_pen_is_again() -> None:
     clock = SkippingClock()
     board = parse_board("chessboard:7x5:20")
     camera = streaming_camera(clock=clock)
-    camera.operator.board = board
+    camera.operator.in_view = HeldBoard(board)
     K = np.array([[SMALL.fx, 0, SMALL.cx], [0, SMALL.fy, SMALL.cy], [0, 0, 1]])
     seen = []
     for _ in range(3):
@@ -263,6 +263,6 @@ def test_a_board_is_held_in_view_in_many_poses_until_the_pen_is_again() -> None:
         clock.wait(HELD_S)
 
     assert min(np.ptp(each) for each in np.diff(seen, axis=0)) > 10  # px
-    camera.operator.board = None
+    camera.operator.in_view = None
     (frame,) = read(camera, 1)
     assert find_points(frame.image, board) is None

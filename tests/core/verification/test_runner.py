@@ -38,7 +38,6 @@ from lightpen.record.swings.reading import DISCARDED, Record, RecordedImage, ope
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
-from lightpen.simulator.toucher import ProbingOperator
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.history.recorded_tasks import read_fixed_point, read_scale
 from lightpen.verification.session.choices import VerificationChoices
@@ -47,6 +46,7 @@ from lightpen.verification.storage.checkpoint import find_interrupted
 from lightpen.verification.storage.point_images import CONCLUDED
 from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
 from lightpen.verification.tasks.part import PART
+from lightpen_extensions.measure.probing_operator import ProbingOperator
 
 EVE = Signature("Eve", "correct horse")
 SIX_POINTS = CHOICES.with_options(FixedPointOptions(6, n_frames=3))  # as many find it

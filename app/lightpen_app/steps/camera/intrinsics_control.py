@@ -3,21 +3,18 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QWidget
 
 from lightpen.formats.camera_file_writing import write_window
 from lightpen.formats.opened_files import CameraFile
+from lightpen_app.face import Services
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.work.job import LatestJob
 from lightpen_app.work.workbench import Workbench
-
-if TYPE_CHECKING:
-    from lightpen.record.folder.camera_calibrations import CameraTrial
-    from lightpen_app.steps.camera.board_window import BoardWindow
 
 Region: TypeAlias = tuple[int, int, int, int]  # x, y, width and height, px
 
@@ -26,16 +23,17 @@ class IntrinsicsControl(QObject):
     """Carries out requests of the intrinsics panel."""
 
     def __init__(
-        self, workbench: Workbench, panel: IntrinsicsPanel, page: QWidget
+        self,
+        workbench: Workbench,
+        panel: IntrinsicsPanel,
+        services: Services,
+        page: QWidget,
     ) -> None:
         super().__init__(page)
-        self._archive_writer = workbench.archive_writer
-        self._selection, self._live = workbench.selection, workbench.live
-        self._place = workbench.save_place
+        self._selection, self._services = workbench.selection, services
         self._panel = panel
         self._page = page
         self._reading = LatestJob(self)
-        self._board: BoardWindow | None = None  # made when it is requested
 
         # Connections
         workbench.selection.station_changed.connect(self._forget_file)
@@ -44,9 +42,7 @@ class IntrinsicsControl(QObject):
         panel.calibration_requested.connect(self._on_calibration_requested)
 
     def shut_down(self) -> None:
-        """Close the window and cancel reading."""
-        if self._board is not None:
-            self._board.close()
+        """Cancel reading."""
         self._reading.cancel()
 
     def _forget_file(self) -> None:
@@ -78,21 +74,9 @@ class IntrinsicsControl(QObject):
         )
 
     def _on_calibration_requested(self) -> None:
-        if self._board is None:
-            # A camera is calibrated once a year; it is not waited for at each start.
-            from lightpen_app.steps.camera.board_window import BoardWindow
-
-            self._board = BoardWindow(self._live, self._place, self._page)
-
-            # Connections
-            self._board.saved.connect(self._on_path_chosen)
-            self._board.concluded.connect(self._on_calibrated)
-        self._board.show()
-        self._board.raise_()
-
-    def _on_calibrated(self, trial: "CameraTrial") -> None:
-        names = self._selection.preparation.names
-        self._archive_writer.keep_camera_trial(trial, names)
+        for each in self._services:
+            if each.calibrates_cameras:
+                each.calibrate_camera(self._page, self._on_path_chosen)
 
     def _on_file_read(self, camera_file: CameraFile) -> None:
         now = self._selection.preparation

@@ -33,7 +33,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
     part_requested = Signal()  # the images are binned or cropped
     discovery_requested = Signal()  # no such file: find the camera by a swing
 
-    def __init__(self) -> None:
+    def __init__(self, can_calibrate: bool = True, can_discover: bool = True) -> None:
         super().__init__()
         self._file: CameraFile | None = None
         self._image_size: tuple[int, int] | None = None
@@ -47,6 +47,10 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._part = PushButton()
         self._calibrate = PushButton()
         self._discover = PushButton()
+        if not can_calibrate:
+            self._calibrate.hide()
+        if not can_discover:
+            self._discover.hide()
         self._problem = SignLabel()
         self._check = SignLabel()
         self._doubt = SignLabel()

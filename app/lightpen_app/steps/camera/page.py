@@ -6,6 +6,7 @@ from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import Exposure, inspect
 from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput
+from lightpen_app.face import Services
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing, missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
@@ -14,7 +15,7 @@ from lightpen_app.steps.camera.intrinsics_control import IntrinsicsControl
 from lightpen_app.steps.camera.mask_control import MaskControl
 from lightpen_app.steps.camera.source_control import BesideControl, SourceSearch
 from lightpen_app.steps.camera.view import CameraPanels
-from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
@@ -28,7 +29,9 @@ class CameraPage(Page):
     key = "camera"
     shows_images = True
 
-    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
+    def __init__(
+        self, workbench: Workbench, sounds: Sounds, services: Services = ()
+    ) -> None:
         super().__init__()
         self._sounds = sounds
         self._selection, self._run = workbench.selection, workbench.run
@@ -38,11 +41,11 @@ class CameraPage(Page):
 
         # Widgets
         self._view = view = CameraPanels(
-            self._selection, self._camera, self._chosen_files
+            self._selection, self._camera, self._chosen_files, services
         )
         self._search = SourceSearch(self._camera, view.source, view.second.source)
         self._beside = BesideControl(self._selection, self._chosen_files, view.source)
-        self._files = IntrinsicsControl(workbench, view.intrinsics, self)
+        self._files = IntrinsicsControl(workbench, view.intrinsics, services, self)
         self._mask = MaskControl(
             self._selection, self._live, view.stray_light, view.images
         )

@@ -4,6 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen_app.face import Services, can_calibrate, can_discover
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
@@ -29,7 +30,11 @@ class CameraPanels(ResponsiveLayout, QWidget):
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
     def __init__(
-        self, selection: Selection, camera: CameraSetup, files: ChosenFiles
+        self,
+        selection: Selection,
+        camera: CameraSetup,
+        files: ChosenFiles,
+        services: Services = (),
     ) -> None:
         super().__init__()
 
@@ -38,7 +43,9 @@ class CameraPanels(ResponsiveLayout, QWidget):
         self.source = SourcePanel()
         self.second = SecondCameraChoice(selection, camera, files)
         self.settings = SettingsPanel()
-        self.intrinsics = IntrinsicsPanel()
+        self.intrinsics = IntrinsicsPanel(
+            can_calibrate(services), can_discover(services)
+        )
         self.stray_light = StrayLightPanel()
         self.images = LivePanel()
         self.exposure = ExposurePanel()

@@ -192,7 +192,7 @@ class HistoryContent(Translated, QWidget):
     def _show_selection(self) -> None:
         entries = [line.entry for line in self.table.selected()]
         selected = [entry for entry in entries if entry is not None]
-        self._selection.set_limits(self._chosen.choices.limits)
+        self._selection.set_limits(self._chosen.limits.verification)
         self._selection.set_value(selected, self._trend)
 
     def _show_rule(self) -> None:

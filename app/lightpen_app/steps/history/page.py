@@ -6,8 +6,8 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.work.workbench import Workbench
 

@@ -34,7 +34,9 @@ class LedFilePanel(Translated, QWidget):
     exchange_requested = Signal(object)  # pair of int: numbers of two LEDs to swap
     discovery_requested = Signal()  # no such file: find the LEDs by a swing
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, parent: QWidget | None = None, *, can_discover: bool = True
+    ) -> None:
         super().__init__(parent)
         self._value = ""
         self._suffix = "csv"
@@ -50,6 +52,8 @@ class LedFilePanel(Translated, QWidget):
         self._save = PushButton()
         self._samples = PushButton()
         self._discover = PushButton()
+        if not can_discover:
+            self._discover.hide()
         self._label.setBuddy(self._path.edit)
         self._units = _UnitsRow()
         self._problem = SignLabel()

@@ -6,6 +6,7 @@ from typing_extensions import override
 from lightpen.pen_check.draft import PenDraft, corrected, exchanged
 from lightpen.pen_check.match import Finding, PenMatch
 from lightpen.swing.image_sources import SourceKind
+from lightpen_app.face import Services, can_discover
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sentences import worded
@@ -18,7 +19,7 @@ from lightpen_app.steps.leds.match_control import MatchControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.simulator_controls import LedSimulatorControls
 from lightpen_app.steps.leds.table_panel import LedTablePanel
-from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.pen_view import PenPicture
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
@@ -42,13 +43,13 @@ class LedsPage(ResponsiveLayout, Page):
     low_below = 62 * GRID  # px; then it scrolls
     very_large_from = QSize(240 * GRID, 130 * GRID)  # px; then the live image is larger
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
         self._selection = workbench.selection
         self._leds = LedDraft(self._selection, self)
 
         # Widgets
-        self._file = LedFilePanel()
+        self._file = LedFilePanel(can_discover=can_discover(services))
         self._table = LedTablePanel(UndoButtons(self._leds.edits, self))
         self._space = FramePanel()
         self._simulator = LedSimulatorControls(workbench.live)

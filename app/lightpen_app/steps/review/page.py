@@ -14,8 +14,8 @@ from lightpen.model.method import Method
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
+from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.review.acceptance_control import AcceptanceControl
 from lightpen_app.steps.review.next_tips import NextTipsControl
 from lightpen_app.steps.review.press_control import PressTestControl
@@ -34,6 +34,7 @@ from lightpen_app.steps.review.view_state import (
     unsaved_text,
     why_not_now,
 )
+from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -48,15 +49,16 @@ class ReviewPage(Page):
 
     key = "review"
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
+        verify = verify_step(services)
         self._selection = workbench.selection
         self._run, self._ask = workbench.run, workbench.run.runner.ask
         self._shown = SwingStatus()
 
         # Widgets
         place = workbench.save_place
-        self._view = view = ReviewView(self._run, place)
+        self._view = view = ReviewView(self._run, place, bool(verify))
         self._accepted = QTimer(self, singleShot=True)
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None
@@ -82,7 +84,7 @@ class ReviewPage(Page):
         self._reading.timeout.connect(self.changed)
         view.cancel.clicked.connect(lambda: self._ask(SwingWorkflow.cancel))
         view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
-        view.verify.clicked.connect(self._on_verify_clicked)
+        view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
         view.tabs.images_made.connect(self._on_images_made)
         view.tabs.methods_made.connect(self._on_methods_made)
         view.tabs.saved.connect(notices.show_status)
@@ -245,6 +247,3 @@ class ReviewPage(Page):
         """Return the tip that can be swung at once, as it is chosen by now."""
         now = self._selection.preparation
         return "" if now.missing_inputs() else now.names.tip
-
-    def _on_verify_clicked(self) -> None:
-        self.step_requested.emit("verify")

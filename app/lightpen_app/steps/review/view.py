@@ -39,8 +39,11 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     narrow_below, low_below = 112 * GRID, 60 * GRID
     very_large_from = QSize(190 * GRID, 100 * GRID)  # px; then it has the postures
 
-    def __init__(self, run: SwingRun, place: SavePlace) -> None:
+    def __init__(
+        self, run: SwingRun, place: SavePlace, can_verify: bool = False
+    ) -> None:
         super().__init__()
+        self._can_verify = can_verify
 
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
@@ -108,7 +111,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         for button in (self.repeat, self.capture_more):
             is_main = button.text() == state.main.text
             button.setVisible(not state.is_accepted and not is_main)
-        self.verify.setVisible(state.is_accepted)
+        self.verify.setVisible(state.is_accepted and self._can_verify)
         self.take_back.setVisible(state.is_accepted)
 
     def set_solving(self, is_solving: bool) -> None:

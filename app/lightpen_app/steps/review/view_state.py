@@ -18,7 +18,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import moment_text, shortened
-from lightpen_app.steps.page import MainAction
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.question_bar import Question
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.state_banner import State

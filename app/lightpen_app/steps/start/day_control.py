@@ -1,23 +1,24 @@
 """Controller of the day page."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.swing.preparation import Preparation
+from lightpen_app.face import ReadinessItem, Service
 from lightpen_app.look.words import PARTED, shortened
-from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.start.day_state import (
     CameraState,
-    ReadinessItem,
     readiness,
     tip_details,
     tip_rows,
 )
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.library_control import LibraryControl
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
@@ -33,10 +34,15 @@ class DayControl(QObject):
     step_requested = Signal(str)  # key of the step to show
 
     def __init__(
-        self, workbench: Workbench, library: LibraryControl, view: DayView
+        self,
+        workbench: Workbench,
+        services: Sequence[Service],
+        library: LibraryControl,
+        view: DayView,
     ) -> None:
         super().__init__(view)
         self._workbench, self._library, self._view = workbench, library, view
+        self._services = tuple(services)
         self._selection, self._live = workbench.selection, workbench.live
         self._misfits: deque[float] = deque(maxlen=N_MISFITS)
         self._refreshing = QTimer(self, interval=REFRESH_MS)
@@ -94,13 +100,7 @@ class DayControl(QObject):
             return MainAction(
                 self.tr("Swing tip {0}").format(tip), self._why_not_swing()
             )
-        steps = {
-            "camera": self.tr("Check the camera"),
-            "leds": self.tr("Check the LEDs"),
-            "temperature": self.tr("Enter the temperature"),
-            "verify": self.tr("Verify the tip"),
-        }
-        return MainAction(steps[amber.step])
+        return MainAction(amber.action)
 
     def run_main_action(self) -> None:
         """Run the action of the main button."""
@@ -131,13 +131,13 @@ class DayControl(QObject):
         misfit = float(np.median(self._misfits)) if self._misfits else None
         rate = self._live.settings.frame_rate if self._live.is_open else None
         camera = CameraState(self._live.worst_connection, rate, misfit)
-        return readiness(
+        own = readiness(
             self._selection.preparation,
             self._workbench.library.statuses,
             camera,
             self._workbench.pens.doubt(),
-            self._workbench.verification.status,
         )
+        return (*own, *(item for each in self._services for item in each.readiness()))
 
     def _on_selected(self, before: Preparation) -> None:
         now = self._selection.preparation

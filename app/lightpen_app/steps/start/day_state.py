@@ -14,7 +14,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import StationStatus, TipStatus
 from lightpen.record.library.tip_library import ItemKind
 from lightpen.swing.preparation import MissingInput, Preparation
-from lightpen.verification.session.status import VerificationStatus
+from lightpen_app.face import ReadinessItem
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import first_missing, grade_text
 from lightpen_app.look.quantities import number_text
@@ -44,19 +44,6 @@ class TipRow:
     def matches(self, text: str) -> bool:
         """Return whether a text is part of the name of tip or pen."""
         return any(text.casefold() in name.casefold() for name in (self.tip, self.pen))
-
-
-@dataclass(frozen=True)
-class ReadinessItem:
-    """One precondition of a swing."""
-
-    step: str  # key of the step where it is put right
-    message: StatusMessage
-
-    @property
-    def is_amber(self) -> bool:
-        """Whether it needs an action."""
-        return self.message.tone is Tone.WARN
 
 
 @dataclass(frozen=True)
@@ -102,18 +89,28 @@ def tip_rows(now: Preparation, statuses: StationStatus) -> tuple[TipRow, ...]:
 
 
 def readiness(
-    now: Preparation,
-    statuses: StationStatus,
-    camera: CameraState,
-    file_doubt: str,
-    verification: VerificationStatus,
+    now: Preparation, statuses: StationStatus, camera: CameraState, file_doubt: str
 ) -> tuple[ReadinessItem, ...]:
     """Return the preconditions of a swing, in order of examination."""
     return (
-        ReadinessItem("camera", _camera_message(now, camera)),
-        ReadinessItem("leds", _leds_message(now, statuses, camera, file_doubt)),
-        ReadinessItem("temperature", _temperature_message(now)),
-        ReadinessItem("verify", _reference_message(verification)),
+        ReadinessItem(
+            "camera",
+            translate("DayView", "Camera"),
+            _camera_message(now, camera),
+            translate("DayControl", "Check the camera"),
+        ),
+        ReadinessItem(
+            "leds",
+            translate("DayView", "LEDs"),
+            _leds_message(now, statuses, camera, file_doubt),
+            translate("DayControl", "Check the LEDs"),
+        ),
+        ReadinessItem(
+            "temperature",
+            translate("DayView", "Temperature"),
+            _temperature_message(now),
+            translate("DayControl", "Enter the temperature"),
+        ),
     )
 
 
@@ -239,14 +236,3 @@ def _temperature_message(now: Preparation) -> StatusMessage:
         return StatusMessage(text, Sign.RING, Tone.QUIET)
     text = translate("DayPage", "Pen at {0:.1f} \u00b0C").format(measured)
     return StatusMessage.good(text)
-
-
-def _reference_message(status: VerificationStatus) -> StatusMessage:
-    drift = status.lamp_drift
-    if drift is None:
-        text = translate("DayPage", "No drift reference")
-        return StatusMessage(text, Sign.RING, Tone.QUIET)
-    grade = drift.assessment.grade
-    if grade is not Grade.PASS:
-        return _amber(translate("DayPage", "The camera moved. Verify the tip."))
-    return StatusMessage.good(translate("DayPage", "Drift reference stable"))

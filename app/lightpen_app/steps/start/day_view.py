@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.model.assumptions import COLDEST, WARMEST
+from lightpen_app.face import ReadinessItem
 from lightpen_app.look.layouts import (
     fill,
     horizontal_layout,
@@ -16,7 +17,7 @@ from lightpen_app.look.layouts import (
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.steps.start.day_state import ReadinessItem, TipRow
+from lightpen_app.steps.start.day_state import TipRow
 from lightpen_app.steps.start.readiness_line import ReadinessLine
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.keys import ENTER_KEYS
@@ -164,13 +165,7 @@ class DayView(Translated, QWidget):
     ) -> None:
         """Show station, operator and readiness; offer a swing if it is incomplete."""
         self._ready.set_place(place)
-        names = (
-            self.tr("Camera"),
-            self.tr("LEDs"),
-            self.tr("Temperature"),
-            self.tr("Drift reference"),
-        )
-        self._ready.set_items(items, names)
+        self._ready.set_items(items)
         is_amber = any(item.is_amber for item in items)
         self._swing.setVisible(is_amber and can_swing)
 

@@ -1,6 +1,6 @@
 """Interrupted swings and verifications at the step Start: resume, discard."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,13 +19,7 @@ from lightpen.record.swings.interrupted import (
 )
 from lightpen.record.swings.reading import recorded_names, recorded_origin
 from lightpen.swing.resuming import Resumable, read_resumable
-from lightpen.verification.storage.checkpoint import (
-    InterruptedVerification,
-    VerificationCheckpoint,
-    find_interrupted,
-)
-from lightpen.verification.storage.resuming import abandon_interrupted
-from lightpen.verification.tasks.part import PART
+from lightpen_app.face import InterruptedWork, Service
 from lightpen_app.look.phrases import missing_input_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import listed
@@ -48,24 +42,23 @@ class InterruptedControl(QObject):
     def __init__(
         self,
         workbench: Workbench,
+        services: Sequence[Service],
         panel: InterruptedPanel,
         settle: Callable[[], None],
         parent: QObject,
     ) -> None:
         super().__init__(parent)
         self._selection, self._camera = workbench.selection, workbench.camera
-        self._run, self._verification = workbench.run, workbench.verification
-        self._measuring = workbench.measuring
+        self._run, self._services = workbench.run, tuple(services)
         self._notices = workbench.notifications
         self._live, self._archive_writer = workbench.live, workbench.archive_writer
-        self._data_folder, self._clock = workbench.folder, workbench.around.now
         self._panel = panel
         self._settle = settle
         self._search = LatestJob(self)
         self._work: Job | None = None
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
-        self._continued: VerificationCheckpoint | None = None
+        self._is_continuing = False
         self._searching = QTimer(self, singleShot=True)
 
         # Connections
@@ -78,12 +71,12 @@ class InterruptedControl(QObject):
         workbench.run.open_requested.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
         workbench.run.refused.connect(self._on_run_refused)
-        for probing in (workbench.verification, workbench.measuring):
-            probing.changed.connect(self._on_verification_changed)
-            probing.refused.connect(self._on_verification_refused)
+        for each in services:
+            each.resumed.connect(self._on_work_resumed)
+            each.refused.connect(self._on_work_refused)
 
     def search(self) -> None:
-        """Search for interrupted swings and verifications in the background."""
+        """Search for interrupted swings and other work in the background."""
         self._searching.start()
 
     def shut_down(self) -> None:
@@ -94,12 +87,13 @@ class InterruptedControl(QObject):
             self._work.cancel()
 
     def _search_now(self) -> None:
-        run, data = self._run, self._data_folder
+        run, services = self._run, self._services
         archive, folder = run.archive, run.records_folder
 
         def search(_: Report) -> Interrupted:
             swings = conclude_accepted(archive, find_unfinished(folder))
-            return Interrupted(swings, find_interrupted(data))
+            works = (work for each in services for work in each.find_interrupted())
+            return Interrupted(swings, tuple(works))
 
         self._search.start(search, self._on_found, self._show_fault)
 
@@ -111,9 +105,9 @@ class InterruptedControl(QObject):
             tuple(r for r in swings.under_way if r.folder != present),
             swings.damaged,
         )
-        if self._work is None and self._continued is None:
+        if self._work is None and not self._is_continuing:
             self._panel.set_waiting("")
-        self._panel.set_value(others, found.verifications)
+        self._panel.set_value(others, found.works)
 
     def _work_on(
         self,
@@ -265,64 +259,47 @@ class InterruptedControl(QObject):
         )
         self._search_now()
 
-    # Verifications
+    # Work of extensions
 
-    def _on_continue_requested(self, found: InterruptedVerification) -> None:
-        """Select the item of the verification and resume it."""
-        under_way, selection = found.under_way, self._selection
-        if under_way is None:
+    def _on_continue_requested(self, work: InterruptedWork) -> None:
+        """Select the item of the work and resume it."""
+        selection = self._selection
+        if work.names is None:
             return
         self._settle()
-        self._go_to_station(under_way.names.station)
-        selection.set_preparation(replace(selection.preparation, names=under_way.names))
-        chosen, is_part = selection.choices, under_way.choices.task is PART
-        kind = chosen.kind if is_part else under_way.choices.kind
-        again = replace(under_way.choices, kind=kind, limits=chosen.limits)
-        selection.set_choices(again.with_moves(()))  # as in the session
+        self._go_to_station(work.names.station)
+        selection.set_preparation(replace(selection.preparation, names=work.names))
         missing_inputs = selection.preparation.missing_inputs()
         if missing_inputs:
             self._notices.notify(NOTICE, missing_input_text(missing_inputs[0]))
             return
-        self._continued = under_way
-        self._panel.set_waiting(self.tr("Reading the verification"))
-        run = self._measuring if is_part else self._verification
-        run.runner.ask(lambda workflow: workflow.go_on(found))
+        self._is_continuing = True
+        self._panel.set_waiting(work.resume())
 
-    def _on_verification_changed(self) -> None:
-        continued = self._continued
-        for run, key in ((self._verification, "verify"), (self._measuring, "measure")):
-            if continued is not None and run.status.began == continued.began:
-                self._continued = None
-                self._panel.set_waiting("")
-                self.step_requested.emit(key)
+    def _on_work_resumed(self, key: str) -> None:
+        self._on_work_refused()
+        self.step_requested.emit(key)
 
-    def _on_verification_refused(self) -> None:
-        if self._continued is not None:
-            self._continued = None
+    def _on_work_refused(self) -> None:
+        if self._is_continuing:
+            self._is_continuing = False
             self._panel.set_waiting("")
 
-    def _on_close_requested(self, found: InterruptedVerification) -> None:
-        folder, now = self._data_folder, self._clock
-        self._work_on(
-            self.tr("Closing the verification"),
-            lambda _: abandon_interrupted(folder, found, now()),
-            self._on_closed,
-        )
+    def _on_close_requested(self, work: InterruptedWork) -> None:
+        def show(_: None) -> None:
+            self._archive_writer.enter_owed()
+            self._notices.show_status(work.closed_text())
+            self._search_now()
 
-    def _on_closed(self, _: object) -> None:
-        self._archive_writer.enter_owed()
-        self._notices.show_status(
-            self.tr("Verification closed as abandoned. See History.")
-        )
-        self._search_now()
+        self._work_on(work.closing_text(), lambda _: work.close(), show)
 
 
 @dataclass(frozen=True, eq=False)
 class Interrupted:
-    """The interrupted swings and verifications that were found."""
+    """The interrupted swings and works that were found."""
 
     swings: InterruptedSwings
-    verifications: tuple[InterruptedVerification, ...]
+    works: tuple[InterruptedWork, ...]
 
 
 def _source_text(swing: Resumable) -> str:

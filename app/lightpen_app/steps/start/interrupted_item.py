@@ -1,11 +1,11 @@
 """A row for interrupted work: resume, or discard after a question."""
 
-from dataclasses import dataclass
 from enum import StrEnum
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QPushButton, QWidget
 
+from lightpen_app.face import RowWords
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import unbroken
@@ -22,19 +22,6 @@ class RowKind(StrEnum):
     OFFERED = "offered"  # to continue with
     UNDER_WAY = "under way"  # in another program
     DAMAGED = "damaged"
-
-
-@dataclass(frozen=True)
-class RowWords:
-    """Texts of a row."""
-
-    heading: str
-    description: str
-    question: str
-    # Label of each button, and its accessible name.
-    resume: tuple[str, str]
-    discard: tuple[str, str]
-    keep: tuple[str, str]
 
 
 class InterruptedItem(Translated, QFrame):

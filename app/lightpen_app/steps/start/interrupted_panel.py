@@ -10,13 +10,13 @@ from typing_extensions import override
 
 from lightpen.record.swings.interrupted import DamagedSwing, InterruptedSwings
 from lightpen.record.swings.reading import Record, recorded_names
-from lightpen.verification.storage.checkpoint import InterruptedVerification
+from lightpen_app.face import InterruptedWork, RowWords
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import n_images_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
-from lightpen_app.steps.start.interrupted_item import InterruptedItem, RowKind, RowWords
+from lightpen_app.steps.start.interrupted_item import InterruptedItem, RowKind
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -67,55 +67,32 @@ class InterruptedRow(InterruptedItem):
         return PARTED.join(filter(None, parts))
 
 
-class VerificationRow(InterruptedItem):
-    """One verification that was interrupted."""
+class WorkRow(InterruptedItem):
+    """One work of an extension that was interrupted."""
 
-    def __init__(self, found: InterruptedVerification) -> None:
-        self._found = found
-        is_damaged = found.under_way is None
-        super().__init__(RowKind.DAMAGED if is_damaged else RowKind.OFFERED)
+    def __init__(self, work: InterruptedWork) -> None:
+        self._work = work
+        super().__init__(RowKind.DAMAGED if work.names is None else RowKind.OFFERED)
 
     @override
     def _words(self) -> RowWords:
-        return RowWords(
-            self._heading(),
-            self._description(),
-            self.tr("Close this verification as abandoned? Its recorded data remains."),
-            (self.tr("Continue"), self.tr("Continue the verification of {0}")),
-            (self.tr("Close verification"), self.tr("Close the verification of {0}")),
-            (self.tr("Keep"), self.tr("Keep the verification of {0}")),
-        )
-
-    def _heading(self) -> str:
-        under_way = self._found.under_way
-        if under_way is None:
-            return self.tr("Damaged: {0}").format(shortened(self._found.path.stem))
-        return moment_text(under_way.began)
-
-    def _description(self) -> str:
-        under_way, fault = self._found.under_way, self._found.fault
-        if under_way is None:
-            return "" if fault is None else breakable(worded(fault))
-        names = under_way.names
-        called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-        task = worded(under_way.choices.task.title)
-        return PARTED.join(filter(None, (*called, task)))
+        return self._work.words()
 
 
 class InterruptedPanel(Translated, QGroupBox):
-    """Lists swings and verifications that have no end; hidden while there are none."""
+    """Lists swings and other work that have no end; hidden while there are none."""
 
     # Path: the folder of the record
     resume_requested = Signal(object)
     discard_requested = Signal(object)
-    continue_requested = Signal(object)  # InterruptedVerification
-    close_requested = Signal(object)  # InterruptedVerification
+    continue_requested = Signal(object)  # InterruptedWork
+    close_requested = Signal(object)  # InterruptedWork
     search_requested = Signal()  # search again
 
     def __init__(self) -> None:
         super().__init__()
         self._value = InterruptedSwings()
-        self._verifications: tuple[InterruptedVerification, ...] = ()
+        self._works: tuple[InterruptedWork, ...] = ()
         self._rows: list[InterruptedItem] = []
         self._why_waiting = ""
 
@@ -140,14 +117,12 @@ class InterruptedPanel(Translated, QGroupBox):
         return self._value
 
     def set_value(
-        self,
-        swings: InterruptedSwings,
-        verifications: tuple[InterruptedVerification, ...] = (),
+        self, swings: InterruptedSwings, works: tuple[InterruptedWork, ...] = ()
     ) -> None:
-        """List these swings and verifications."""
-        self._value, self._verifications = swings, verifications
+        """List these swings and works of extensions."""
+        self._value, self._works = swings, works
         self._rows = [
-            *map(self._verification_row, verifications),
+            *map(self._work_row, works),
             *(self._row(record) for record in swings.interrupted),
             *(self._row(record, is_under_way=True) for record in swings.under_way),
             *(self._row(swing) for swing in swings.damaged),
@@ -157,7 +132,7 @@ class InterruptedPanel(Translated, QGroupBox):
         content = QWidget()
         vertical_layout(content, *self._rows, 1, margins=(0, 0, GRID, 0))
         self._scroll.setWidget(content)
-        can_go_on = any(each.under_way is not None for each in verifications)
+        can_go_on = any(each.names is not None for each in works)
         self._hint.setVisible(bool(swings.interrupted) or can_go_on)
         self._again.setVisible(bool(swings.under_way or swings.damaged))
         self._retranslate()
@@ -194,10 +169,10 @@ class InterruptedPanel(Translated, QGroupBox):
         row.discard_requested.connect(lambda: self.discard_requested.emit(folder))
         return row
 
-    def _verification_row(self, found: InterruptedVerification) -> VerificationRow:
-        row = VerificationRow(found)
-        row.resume_requested.connect(lambda: self.continue_requested.emit(found))
-        row.discard_requested.connect(lambda: self.close_requested.emit(found))
+    def _work_row(self, work: InterruptedWork) -> WorkRow:
+        row = WorkRow(work)
+        row.resume_requested.connect(lambda: self.continue_requested.emit(work))
+        row.discard_requested.connect(lambda: self.close_requested.emit(work))
         return row
 
     def _retranslate(self) -> None:
@@ -206,11 +181,9 @@ class InterruptedPanel(Translated, QGroupBox):
         self._again.setText(self.tr("Search again"))
 
     def _title(self) -> str:
-        n_rows, n_verifications = len(self._rows), len(self._verifications)
-        if n_verifications and n_rows > 1:
+        n_rows = len(self._rows)
+        if self._works:
             return self.tr("Interrupted: {0}").format(n_rows)
-        if n_verifications:
-            return self.tr("Interrupted verification")
         if n_rows > 1:
             return self.tr("Interrupted swings: {0}").format(n_rows)
         return self.tr("Interrupted swing")

@@ -207,9 +207,7 @@ class LimitsControl(QObject):
 
     def open(self) -> None:
         """Show the dialog."""
-        now, choices = self._selection.preparation, self._selection.choices
-        due = self._selection.limits.due
-        limits = StationLimits(now.limits, choices.limits, due)
+        limits = self._selection.limits
         is_guarded = self._selection.supervision.is_guarded
         self._shown = limits
         self._dialog.set_value(limits, is_guarded=is_guarded)

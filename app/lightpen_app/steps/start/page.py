@@ -6,9 +6,9 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from typing_extensions import override
 
 from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.start.barcode import HearsBarcodes
 from lightpen_app.steps.start.day_control import DayControl
 from lightpen_app.steps.start.day_view import DayView
@@ -23,6 +23,7 @@ from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.setup_view import SetupView
 from lightpen_app.steps.start.welcome_control import WelcomeControl
 from lightpen_app.steps.start.welcome_view import WelcomeView
+from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
@@ -40,8 +41,9 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
     very_large_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
+        verify, show = verify_step(services), self.step_requested.emit
         self._selection, self._tips = workbench.selection, workbench.library
 
         # Widgets: the order of making them is the order of the Tab key
@@ -52,13 +54,13 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         self._setup = setup = SetupView(workbench, is_known=is_known)
         self._welcome = WelcomeView()
         self._begin = WelcomeControl(workbench, self._welcome, self)
-        self._result = LastResultPanel(workbench.around.now)
+        self._result = LastResultPanel(workbench.around.now, bool(verify))
         self._large = LargeScreenPanel(workbench.run.logbook)
         self._views = QStackedWidget()
         self._all_limits = LimitsControl(workbench, self)
         self._library = LibraryControl(workbench, setup.names, self._unknown_code, self)
         self._unfinished = InterruptedControl(
-            workbench, self._interrupted, lambda: self._entries.settle(), self
+            workbench, services, self._interrupted, lambda: self._entries.settle(), self
         )
         self._last = LastResultPresenter(
             self._selection, workbench.run, self._tips, self._result, self._large
@@ -66,7 +68,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         self._entries = EntryPresenter(
             self._selection, self._library, setup.names, setup.limits, setup.assumed
         )
-        self._control = DayControl(workbench, self._library, self._day)
+        self._control = DayControl(workbench, services, self._library, self._day)
         self.barcodes = self._library.barcodes
 
         # Layout
@@ -95,7 +97,8 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         self._control.step_requested.connect(self.step_requested)
         self._entries.edited.connect(self._refresh)
         self._unfinished.step_requested.connect(self.step_requested)
-        self._last.verification_requested.connect(self._on_verification_requested)
+        self._last.verification_requested.connect(self._entries.settle)
+        self._last.verification_requested.connect(lambda: show(verify))
         workbench.folder_watch.counted.connect(setup.folder.set_others)
         workbench.folder_watch.fault_changed.connect(setup.folder.set_fault)
         workbench.library.changed.connect(self._refresh)
@@ -244,7 +247,3 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         if not before.names.station and not now.start_missing_inputs():
             self.show_day()  # the station is known from before
         self._refresh()
-
-    def _on_verification_requested(self) -> None:
-        self._entries.settle()
-        self.step_requested.emit("verify")

@@ -8,10 +8,10 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QFrame
 from typing_extensions import override
 
+from lightpen_app.face import ReadinessItem
 from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, set_tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.steps.start.day_state import ReadinessItem
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.status_mark import message_icon
@@ -61,15 +61,17 @@ class ReadinessLine(QFrame):
         """Show station and operator."""
         self._place.setText(place)
 
-    def set_items(self, items: Sequence[ReadinessItem], names: Sequence[str]) -> None:
+    def set_items(self, items: Sequence[ReadinessItem]) -> None:
         """Show other items; those not ready with name and reason."""
         if tuple(items) == self._items:
             return
         self._items = tuple(items)
-        for item, name, button, reason in zip(
-            items, names, self._buttons, self._reasons, strict=True
+        for button in self._buttons[len(items) :]:
+            button.hide()
+        for item, button, reason in zip(
+            items, self._buttons, self._reasons, strict=False
         ):
-            text = name if item.is_amber else item.message.text
+            text = item.name if item.is_amber else item.message.text
             button.setText(text)
             button.setIcon(message_icon(item.message, self))
             button.setAccessibleDescription(item.message.text)

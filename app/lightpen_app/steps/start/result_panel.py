@@ -58,7 +58,7 @@ class LastResultPanel(Translated, QGroupBox):
     take_back_requested = Signal(object, str, object)
     verification_requested = Signal()  # verify the displayed tip
 
-    def __init__(self, now: Callable[[], datetime]) -> None:
+    def __init__(self, now: Callable[[], datetime], can_verify: bool = True) -> None:
         super().__init__()
         self._now = now
         self._value = LastResult()
@@ -80,6 +80,8 @@ class LastResultPanel(Translated, QGroupBox):
         self._reason = SignLabel()
         self._warning = SignLabel()
         self._verify = PushButton()
+        if not can_verify:
+            self._verify.hide()
         self._take_back = PushButton()
         self._question = QuestionBar()
         self._question.set_words(self._taking_back)

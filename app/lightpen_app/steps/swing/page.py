@@ -8,10 +8,10 @@ from lightpen.cameras.worker_events import Connection
 from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.image_sources import SourceKind
 from lightpen.swing.workflow import SwingWorkflow
+from lightpen_app.face import Services
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sounds import Sound, Sounds
-from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.swing.page_state import (
     SOUNDS,
     SideAction,
@@ -25,6 +25,7 @@ from lightpen_app.steps.swing.page_state import (
 )
 from lightpen_app.steps.swing.simulator_controls import SwingSimulatorControls
 from lightpen_app.steps.swing.view import SwingView
+from lightpen_app.widgets.page import MainAction, Page
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
@@ -47,12 +48,14 @@ class SwingPage(Page):
     key = "swing"
     shows_images = True
 
-    def __init__(self, workbench: Workbench, sounds: Sounds) -> None:
+    def __init__(
+        self, workbench: Workbench, sounds: Sounds, services: Services = ()
+    ) -> None:
         super().__init__()
         self._sounds, self._notices = sounds, workbench.notifications
         self._selection, self._run = workbench.selection, workbench.run
         self._live, self._camera = workbench.live, workbench.camera
-        self._verification, self._runner = workbench.verification, self._run.runner
+        self._services, self._runner = tuple(services), self._run.runner
         self._presenter = SwingPresenter(self._run, self._live, self)
         self._shown = self._presenter.page_state(is_away=True)
         self._is_shown = False
@@ -70,7 +73,8 @@ class SwingPage(Page):
         # Connections
         self._run.changed.connect(self._on_run_changed)
         self._run.happened.connect(self._on_happened)
-        self._verification.changed.connect(self._show_soon)
+        for each in services:
+            each.changed.connect(self._show_soon)
         self._run.progressed.connect(self._on_progressed)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
@@ -173,7 +177,7 @@ class SwingPage(Page):
         is_other = now.side is not before.side and {now.side, before.side} != PAUSES
         if is_other and self._view.side.hasFocus():
             self._view.dial.setFocus()  # Enter would run an action that was not shown
-        if not self._verification.status.is_here:
+        if not any(each.is_here for each in self._services):
             self.operator_value_changed.emit(now.operator_value)
         self._view.dial.set_interactive(self._live.operator is not None)
         if now.has_fault and not before.has_fault:

@@ -16,12 +16,12 @@ from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound
-from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.swing.live_detection import LiveDetectionView
 from lightpen_app.steps.swing.remaining_images import RemainingImages
 from lightpen_app.steps.swing.view_state import SwingViewState
 from lightpen_app.steps.swing.words import SwingWords
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.pen_in_space import DisplayedPosture
 from lightpen_app.widgets.question_bar import Question
 from lightpen_app.widgets.sign_label import StatusMessage

@@ -4,25 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 
 from lightpen.errors import FileError
 from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import (
-    ProgramName,
-    plain,
-    record_bytes,
-    record_heading,
-)
+from lightpen.formats.json_records import ProgramName, record_bytes, record_heading
 from lightpen.formats.own_json import (
     DamagedError,
     ZonedTime,
     parse_checked,
     require_usual,
 )
-from lightpen.intrinsics.calibration import CameraCalibration
-from lightpen.intrinsics.report import intrinsics_record
 from lightpen.messages import message
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
@@ -42,7 +36,7 @@ class CameraTrial:
     serial: str  # empty for images from a folder
     origin: Origin | None
     images: Mapping[str, str]  # SHA-256 of file or pixels by name
-    found: CameraCalibration | None = None  # None if abandoned
+    found: Mapping[str, Any] | None = None  # the result, plain; None if abandoned
     camera_file: InputFile | None = None  # None if not accepted
 
 
@@ -66,10 +60,7 @@ def keep_camera_trial(
     data: Path, trial: CameraTrial, names: Names, now: datetime
 ) -> Path:
     """Write the file of a camera calibration and return it."""
-    found, file = trial.found, trial.camera_file
-    intrinsics = None
-    if found is not None:
-        intrinsics = plain(intrinsics_record(found, ()))
+    file = trial.camera_file
     record = {
         **record_heading(now),
         "outcome": trial.outcome.value,
@@ -79,7 +70,7 @@ def keep_camera_trial(
         "serial": trial.serial,
         "origin": trial.origin,
         "camera_file": None if file is None else _entry(file.path.name, file.sha256),
-        "calibration": intrinsics,
+        "calibration": trial.found,
         "inputs": {"images": [_entry(*image) for image in trial.images.items()]},
     }
     return add_numbered(data, data / CAMERA_CALIBRATIONS, record_bytes(record))

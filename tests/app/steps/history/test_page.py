@@ -734,9 +734,7 @@ def test_a_rule_that_is_being_typed_stays_while_something_else_changes(
         QTest.keyClicks(field, "7")
 
         workbench = desk.workbench
-        workbench.selection.set_choices(
-            replace(workbench.selection.choices, n_frames=12)
-        )
+        workbench.selection.set_of_extension("measure", DueRule(12))
         assert field.text() == "7"
 
 

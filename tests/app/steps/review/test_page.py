@@ -67,7 +67,6 @@ from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import Resumable, read_resumable, recorded_setup
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.print_report.preview import PrintReportWindow
-from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import STATE, ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
@@ -85,6 +84,7 @@ from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.figure import MARK_HEIGHT, PNG_SCALE, Figure
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar

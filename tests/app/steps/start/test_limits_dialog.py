@@ -129,11 +129,11 @@ def test_limits_are_laid_down_once_however_often_enter_is_pressed(
 def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) -> None:
     workbench.selection.set_supervision(Supervision(limits={"Hall 2": TIGHT}))
     assert workbench.selection.preparation.limits == TIGHT.swing
-    assert workbench.selection.choices.limits == TIGHT.verification
+    assert workbench.selection.limits.verification == TIGHT.verification
 
     workbench.selection.choose_station("Hall 3")
     assert workbench.selection.preparation.limits == SwingLimits()
-    assert workbench.selection.choices.limits == VerificationLimits()
+    assert workbench.selection.limits.verification == VerificationLimits()
 
 
 def test_a_supervisor_is_asked_for_name_and_password(qtbot: QtBot) -> None:

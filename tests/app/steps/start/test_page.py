@@ -44,12 +44,12 @@ from lightpen.swing.record_header import record_header
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.sidebar import subject_of
-from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.start.day_view import DayView, TemperatureField
 from lightpen_app.steps.start.interrupted_item import InterruptedItem
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
+from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings

@@ -18,7 +18,6 @@ from lightpen.model.rig import rig_of
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen.simulator.toucher import ProbingOperator
 from lightpen.verification.probing.probing import ProbingEvent, ProbingEventKind
 from lightpen.verification.session.session import (
     advance_session,
@@ -38,6 +37,7 @@ from lightpen.verification.tasks.part import PART, sizes_of
 from lightpen.verification.tasks.part_course import Move, PartOptions
 from lightpen.verification.tasks.registry import TASKS, AnyTask
 from lightpen.verification.tasks.task import TaskOptions
+from lightpen_extensions.measure.probing_operator import ProbingOperator
 
 LONGEST = 180.0  # s of the operator's time, from the first touch to the verdict
 GIVE_UP = 240.0  # s

@@ -21,7 +21,6 @@ from lightpen.arrays import FloatArray
 from lightpen.measuring.plan import Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import FeatureKind
 from lightpen.record.swings.reading import DISCARDED, open_record
-from lightpen.simulator.plate import plate_plan
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session_state import SessionState
@@ -33,6 +32,7 @@ from lightpen.verification.storage.point_images import CONCLUDED
 from lightpen.verification.storage.resuming import abandon_interrupted
 from lightpen.verification.tasks.part import PART
 from lightpen.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.plate import plate_plan
 
 # Verifies until it is killed, at most one touch longer than said, and tells how many
 # touches count.

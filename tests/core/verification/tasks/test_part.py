@@ -26,7 +26,6 @@ from lightpen.measuring.surfaces import CENTRED, FeatureKind
 from lightpen.messages import Message
 from lightpen.model.posture import FACING
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.session.choices import VerificationChoices
 from lightpen.verification.session.session import (
@@ -53,6 +52,7 @@ from lightpen.verification.tasks.part_course import (
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen.verification.tasks.task import Conditions
+from lightpen_extensions.measure.plate import plate_plan
 
 BALL = 10.0  # mm
 QIF = Path(os.environ.get("LIGHTPEN_DATA", "no such folder")) / "qif/QIFDocument.xsd"

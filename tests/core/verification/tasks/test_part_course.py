@@ -10,7 +10,6 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.measuring.plan import Nominal, Plan, PlannedFeature, Side
 from lightpen.measuring.surfaces import FeatureKind
-from lightpen.simulator.plate import plate_plan
 from lightpen.simulator.swings import PAPER_CONE
 from lightpen.verification.tasks.part_course import (
     Move,
@@ -25,6 +24,7 @@ from lightpen.verification.tasks.part_course import (
 )
 from lightpen.verification.tasks.probed_point import ProbedPoint, joint_covariance
 from lightpen.verification.tasks.task import Conditions, TaskProgress
+from lightpen_extensions.measure.plate import plate_plan
 
 Placed = Callable[[Sequence[Sequence[float]]], tuple[ProbedPoint, ...]]
 PLATE = plate_plan()

@@ -1,0 +1,172 @@
+"""What an extension adds to the window."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from lightpen.record.swings.names import Names
+from lightpen_app.look.sounds import Sounds
+from lightpen_app.look.theme import Tone
+from lightpen_app.widgets.page import Page
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.work.workbench import Workbench
+
+
+@dataclass(frozen=True)
+class ReadinessItem:
+    """One precondition of a swing."""
+
+    step: str  # key of the step where it is put right
+    name: str  # a word or two
+    message: StatusMessage
+    action: str  # the main button that leads there, a verb first
+
+    @property
+    def is_amber(self) -> bool:
+        """Whether it needs an action."""
+        return self.message.tone is Tone.WARN
+
+
+@dataclass(frozen=True)
+class RowWords:
+    """Texts on interrupted work."""
+
+    heading: str
+    description: str
+    question: str
+    # Label of each button, and its accessible name.
+    resume: tuple[str, str]
+    discard: tuple[str, str]
+    keep: tuple[str, str]
+
+
+class InterruptedWork:
+    """Work of an extension that was interrupted."""
+
+    names: Names | None = None  # what it was done with; None of what is damaged
+
+    def words(self) -> RowWords:
+        """Return the texts of its row, in the language of the window."""
+        raise NotImplementedError
+
+    def resume(self) -> str:
+        """Go on with it, with its names chosen; return what the user waits for."""
+        raise NotImplementedError
+
+    def closing_text(self) -> str:
+        """Return what the user waits for while it is closed."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Close it as abandoned, in a job."""
+        raise NotImplementedError
+
+    def closed_text(self) -> str:
+        """Return the sentence once it is closed."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class DemoStep:
+    """What the demo shows of an extension after a tip is accepted."""
+
+    key: str  # of its page
+    text: str
+    begin: Callable[[], None]
+    is_done: Callable[[], bool]  # asked again and again
+
+
+@dataclass(frozen=True)
+class MenuEntry:
+    """An entry of the menu of options."""
+
+    text: Callable[[], str]  # in the language of the window
+    choose: Callable[[QWidget], None]  # given the window
+
+
+class Service(QObject):
+    """An extension at work in one window; by default it does nothing.
+
+    It is made after the workbench and before the pages. What it starts and ends with
+    the workbench it adds to the workbench's `parts`.
+    """
+
+    remark_changed = Signal()  # `remark` is different
+    changed = Signal()  # `readiness` or `is_here` may be different
+    resumed = Signal(str)  # interrupted work goes on at the step of this key
+    refused = Signal()  # interrupted work cannot go on
+
+    step_requested = Signal(str)  # key of the step to show
+
+    verify_step = ""  # key of its page where a tip is verified
+    calibrates_cameras = False  # by `calibrate_camera`
+    discovers = False  # finds pen and camera without files, by `discover`
+
+    @property
+    def is_here(self) -> bool:
+        """Whether an operator is present, who is shown its page and not the swing."""
+        return False
+
+    def titles(self) -> tuple[str, ...]:
+        """Return the titles of its pages, shown before these are made."""
+        return ()
+
+    def pages(self, sounds: Sounds) -> Iterator[Page]:
+        """Make its pages one after the other, and import their modules only then."""
+        return iter(())
+
+    def menu_entries(self) -> tuple[MenuEntry, ...]:
+        """Return what it adds to the menu of options."""
+        return ()
+
+    def remark(self) -> StatusMessage:
+        """Return what is shown beside the steps on every page."""
+        return StatusMessage()
+
+    def discover(self, window: QWidget, *, is_camera_known: bool) -> None:
+        """Show what finds pen and camera, or the pen alone, without files."""
+        raise NotImplementedError
+
+    def calibrate_camera(self, page: QWidget, on_saved: Callable[[str], None]) -> None:
+        """Show what calibrates a camera; call with the path of each file written."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Close its windows: that of the program closes."""
+
+    def readiness(self) -> tuple[ReadinessItem, ...]:
+        """Return its preconditions of a swing."""
+        return ()
+
+    def find_interrupted(self) -> tuple[InterruptedWork, ...]:
+        """Return interrupted work, in a job."""
+        return ()
+
+    def demo_steps(self) -> tuple[DemoStep, ...]:
+        """Return what the demo shows of it."""
+        return ()
+
+
+Services: TypeAlias = Sequence[Service]
+
+
+def verify_step(services: Services) -> str:
+    """Return the key of the page where a tip is verified; empty for none."""
+    return next(filter(None, (each.verify_step for each in services)), "")
+
+
+def can_discover(services: Services) -> bool:
+    """Return whether pen and camera can be found without files."""
+    return any(each.discovers for each in services)
+
+
+def can_calibrate(services: Services) -> bool:
+    """Return whether a camera can be calibrated."""
+    return any(each.calibrates_cameras for each in services)
+
+
+Face: TypeAlias = Callable[[Workbench], Service]
+"""An extension of the window: makes its service for a workbench."""

@@ -1,1 +1,0 @@
-"""The step Verify: verification of the current tip on reference artefacts."""

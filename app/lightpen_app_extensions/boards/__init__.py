@@ -1,0 +1,1 @@
+"""Camera calibration with boards in the window."""

@@ -1,0 +1,242 @@
+"""The calibration of a camera by views of a board, until its file is written."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QCoreApplication, QObject, Signal
+
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.hashes import InputFile, all_hashed, hashed
+from lightpen.formats.images import find_images
+from lightpen.formats.json_records import plain
+from lightpen.intrinsics.boards import Board
+from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.observing import observe_board
+from lightpen.intrinsics.report import intrinsics_record
+from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
+from lightpen.intrinsics.views import Views
+from lightpen.local_time import local_now
+from lightpen.model.camera import Camera
+from lightpen.model.origin import Origin
+from lightpen.record.folder.camera_calibrations import CameraTrial
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.work.job import Job, LatestJob, Report
+from lightpen_app.work.live_view import LiveView
+from lightpen_app_extensions.boards.board_capture import BoardCapture
+
+
+@dataclass(frozen=True, eq=False)
+class ComputedCamera:
+    """A calibration, and the hash of each image by its name."""
+
+    found: CameraCalibration
+    hashes: Mapping[str, str]
+
+
+class BoardCalibration(QObject):
+    """Computes intrinsics, saves them, and reports the outcome."""
+
+    found_changed = Signal()
+    remark_changed = Signal()
+    saved = Signal(str)  # a camera file was written
+    concluded = Signal(object)  # CameraTrial: outcome of an attempt
+
+    def __init__(self, capture: BoardCapture, live: LiveView, parent: QObject) -> None:
+        super().__init__(parent)
+        self._capture, self._live = capture, live
+        self._computed: ComputedCamera | None = None
+        self._is_saved = False
+        self._job = LatestJob(self)
+        self._remark: Callable[[], StatusMessage] = StatusMessage
+
+    @property
+    def found(self) -> CameraCalibration | None:
+        """The last result; None if it was discarded."""
+        return None if self._computed is None else self._computed.found
+
+    def remark(self) -> StatusMessage:
+        """Return the result of the last step, in the present language."""
+        return self._remark()
+
+    def set_remark(self, remark: Callable[[], StatusMessage]) -> None:
+        """State a result, again in each language."""
+        self._remark = remark
+        self.remark_changed.emit()
+
+    def calibrate_by_capture(self) -> None:
+        """Calibrate from the captured views."""
+        state = self._capture.state
+        if state.capture is not None:
+            self._capture.stop()
+            views = state.capture.views
+            self._run(partial(calibrate_by_views, views, state.hashes))
+
+    def calibrate_by_folder(self, folder: str, board: Board) -> None:
+        """Calibrate by the images in a folder."""
+        self.conclude()
+        self._capture.start(None)
+        self._run(partial(calibrate_by_folder, folder, board))
+
+    def leave_out(self, name: str) -> None:
+        """Calibrate again without one of the views."""
+        if self._computed is not None:
+            views, hashes = self._computed.found.views, self._computed.hashes
+            kept = np.array([each != name for each in views.names])
+            self._run(partial(calibrate_by_views, views.chosen(kept), hashes))
+
+    def save(self, path: Path) -> None:
+        """Write the camera file and offer it for use."""
+        if self._computed is None:
+            return
+        found = self._computed.found
+        trial = self._trial(TrialOutcome.ACCEPTED)
+        self._is_saved = True  # reset if saving fails
+        camera = replace(found.camera, serial=trial.serial)
+        job = Job(partial(save_camera, camera, path), self)
+        refused = partial(self._on_save_refused, trial, self._computed)
+        job.start(partial(self._on_saved, trial), refused)
+
+    def conclude(self) -> None:
+        """Discard the result, and report the outcome of the attempt."""
+        if self._computed is None and self._capture.state.n_kept:
+            self.concluded.emit(self._trial(TrialOutcome.ABANDONED))
+        self._give_up()
+
+    def _give_up(self) -> None:
+        """Cancel the computation and discard an unused result."""
+        self._job.cancel()
+        if self._computed is not None and not self._is_saved:
+            self.concluded.emit(self._trial(TrialOutcome.REFUSED))
+        self._computed = None
+        self.found_changed.emit()
+
+    def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
+        self._give_up()
+        self._job.start(
+            calibrate, self._on_found, self._on_refused, progressed=self._on_progressed
+        )
+
+    def _on_progressed(self, fraction: float) -> None:
+        self.set_remark(partial(self._progress_message, fraction))
+
+    def _progress_message(self, fraction: float) -> StatusMessage:
+        words = self.tr("Calibrating: {0:.0%}").format(fraction)
+        return StatusMessage(words, Sign.WAIT, Tone.QUIET)
+
+    def _on_refused(self, sentence: str) -> None:
+        self.set_remark(partial(StatusMessage.fault, sentence))
+
+    def _on_found(self, computed: ComputedCamera) -> None:
+        self._computed, self._is_saved = computed, False
+        self.found_changed.emit()
+        self.set_remark(partial(self._found_message, computed.found))
+
+    def _found_message(self, found: CameraCalibration) -> StatusMessage:
+        words = " ".join(map(worded, found.remarks))
+        if words:
+            return StatusMessage.warning(words)
+        return StatusMessage.good(self.tr("Camera calibrated."))
+
+    def _on_saved(self, trial: CameraTrial, file: InputFile) -> None:
+        self.set_remark(partial(self._saved_message, file))
+        self.concluded.emit(replace(trial, camera_file=file))
+        self.saved.emit(str(file.path))
+
+    def _saved_message(self, file: InputFile) -> StatusMessage:
+        return StatusMessage.good(self.tr("Saved and in use: {0}").format(file.path))
+
+    def _on_save_refused(
+        self, trial: CameraTrial, computed: ComputedCamera, sentence: str
+    ) -> None:
+        self.set_remark(partial(StatusMessage.fault, sentence))
+        if computed is self._computed:
+            self._is_saved = False
+        else:  # it was left meanwhile
+            self.concluded.emit(replace(trial, outcome=TrialOutcome.REFUSED))
+
+    def _trial(self, outcome: TrialOutcome) -> CameraTrial:
+        state, computed, live = self._capture.state, self._computed, self._live
+        is_live = state.capture is not None
+        board = "" if state.capture is None else state.capture.board.name
+        images = state.hashes
+        if computed is not None:
+            board, names = computed.found.views.board.name, computed.found.views.names
+            images = {n: h for n, h in computed.hashes.items() if n in names}
+        origin = Origin.LIVE if live.operator is None else Origin.SIMULATED
+        return CameraTrial(
+            outcome=outcome,
+            board=board,
+            serial=live.serial if is_live else "",
+            origin=origin if is_live else Origin.RECORDED,
+            images=images,
+            found=None
+            if computed is None
+            else plain(intrinsics_record(computed.found, ())),
+        )
+
+
+def calibrate_by_views(
+    views: Views, hashes: Mapping[str, str], report: Report
+) -> ComputedCamera:
+    """Calibrate the camera from captured views."""
+    found = calibrate_camera(views, local_now().date(), report)
+    return ComputedCamera(found, hashes)
+
+
+def calibrate_by_folder(folder: str, board: Board, report: Report) -> ComputedCamera:
+    """Calibrate the camera by images in a folder.
+
+    Raises `CalibrationError` if they do not show the camera.
+    """
+    images = find_images(folder)
+    observed = observe_board(images, board, lambda fraction: report(0.7 * fraction))
+    found = calibrate_camera(
+        observed.views,
+        local_now().date(),
+        lambda fraction: report(0.7 + 0.3 * fraction),
+    )
+    files = all_hashed(images.files)
+    return ComputedCamera(found, {file.path.name: file.sha256 for file in files})
+
+
+def save_camera(camera: Camera, path: Path, report: Report) -> InputFile:
+    """Write a camera file, and return it with its hash."""
+    write_camera(camera, path)
+    return hashed(path)
+
+
+def facts_text(found: CameraCalibration) -> str:
+    """Return the result, one text a line."""
+    camera, translate = found.camera, QCoreApplication.translate
+    assert camera.covariance is not None
+    fx, fy, cx, cy = camera.intrinsics[:4].tolist()
+    u = (2 * np.sqrt(np.diag(camera.covariance)[:4])).tolist()
+    uncertain = uncertainty_over_image(found)
+    residuals = translate(
+        "BoardWindow", "Residuals: RMS {0:.4f} px, cross-validated {1:.4f} px"
+    )
+    projection = translate(
+        "BoardWindow", "Projection uncertainty: RMS {0:.3f} px, max. {1:.3f} px"
+    )
+    return "\n".join(
+        [
+            f"fx {fx:.2f} \u00b1 {u[0]:.2f}, fy {fy:.2f} \u00b1 {u[1]:.2f} px (k = 2)",
+            f"cx {cx:.2f} \u00b1 {u[2]:.2f}, cy {cy:.2f} \u00b1 {u[3]:.2f} px (k = 2)",
+            residuals.format(found.adjustment.rms, found.held_out_rms),
+            projection.format(uncertain.typical, uncertain.worst),
+            worded(found.choice.message),
+        ]
+    )
+
+
+def uncertainty_over_image(found: CameraCalibration) -> UncertaintyMap:
+    """Return the text on the projection uncertainty of the intrinsics."""
+    assert found.camera.covariance is not None
+    return map_uncertainty(found.camera, found.camera.covariance)

@@ -1,0 +1,1 @@
+"""Verification of tips and measurement of parts in the window."""

@@ -1,0 +1,288 @@
+"""The step Measure: features of a part with their U, without a key between touches."""
+
+from dataclasses import replace
+
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.measuring.report import DECISIONS
+from lightpen.measuring.surfaces import NAMES
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    bands_so_far,
+)
+from lightpen.verification.tasks.assessment import VerificationAssessment
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import (
+    FeatureSoFar,
+    base_name,
+    course,
+    feature_so_far,
+    planned_at,
+)
+from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
+from lightpen.verification.tasks.task import Band
+from lightpen_app.look.grades import DECISION_MARKS
+from lightpen_app.look.quantities import number_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.sounds import Sounds
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page import MainAction
+from lightpen_app.widgets.state_banner import State
+from lightpen_app_extensions.measure.band_chart import band_name, value_text
+from lightpen_app_extensions.measure.check_list import CheckRow
+from lightpen_app_extensions.measure.figure import FigureValue
+from lightpen_app_extensions.measure.part_view import part_value
+from lightpen_app_extensions.measure.plan_panel import PlanPanel
+from lightpen_app_extensions.measure.presenter import VerifyPresenter
+from lightpen_app_extensions.measure.probing_page import ProbingPage
+from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_app_extensions.measure.view_state import VerifyView
+
+FEW = 4  # values that leave room for the picture
+NEAR = 10.0  # mm, from which the deviation of the tip at present is shown
+
+
+class MeasurePresenter(VerifyPresenter):
+    """Computes the view from the status of runner, camera and station."""
+
+    tasks = (PART,)
+
+    @override
+    def view(self) -> VerifyView:
+        return replace(super().view(), can_be_accepted=False)
+
+    @override
+    def next_step(self) -> str:
+        return ""  # the next part by the same plan
+
+    @override
+    def rows(self) -> tuple[CheckRow, ...]:
+        """Return the features in their order, with the values that end with each."""
+        return self._listed()[0]
+
+    @override
+    def current_row(self) -> int:
+        return self._listed()[1]
+
+    def _listed(self) -> tuple[tuple[CheckRow, ...], int]:
+        """Return the rows, and which of them is probed now."""
+        setup, state = self._status.setup, self._status.state
+        if setup is None or state is None:
+            return (), 0
+        features = course(setup.choices.options_of(PART))
+        n_done, found = len(state.runs), state.found_by(PART)
+        if found is not None:
+            features = tuple(e for e in features if e.name not in found.missing)
+            n_done = len(features)
+        ends = self._values_by_last(setup, state)
+        rows, current = list[CheckRow](), 0
+        for i, planned in enumerate(features):
+            name = planned.name
+            if i < n_done:
+                values = ends.get(base_name(name), [])
+                rows += [_value_row(each) for each in values]
+                if not values:
+                    rows.append(CheckRow(name, "", *DECISION_MARKS[None]))
+            elif i == n_done:
+                current = len(rows)
+                now = Sign.PLAY, Tone.ACTIVE
+                rows.append(CheckRow(name, self.tr("now"), *now))
+            elif planned.kind is not None:  # what is recognised may be the last one
+                rows.append(CheckRow(name, "", Sign.RING, Tone.QUIET))
+        return tuple(rows), current
+
+    def _values_by_last(
+        self, setup: SessionSetup, state: SessionState
+    ) -> dict[str, list[Band]]:
+        """Return the values so far by the last probed of their features."""
+        names = [base_name(e.name) for e in course(setup.choices.options_of(PART))]
+        order = {name: i for i, name in enumerate(dict.fromkeys(names))}
+        found: dict[str, list[Band]] = {}
+        for band in bands_so_far(setup, state):
+            last = max((n for n in band.of if n in order), key=order.__getitem__)
+            found.setdefault(last, []).append(band)
+        return found
+
+    @override
+    def figure(self, row: int) -> FigureValue:
+        setup, state = self._status.setup, self._status.state
+        if setup is None or state is None:
+            return FigureValue()
+        options, bands = setup.choices.options_of(PART), bands_so_far(setup, state)
+        picture = part_value(setup, state)
+        if state.done is not None:
+            name = "" if options.plan is None else worded(options.plan.words)
+            shown = picture if len(bands) < FEW else None
+            return FigureValue(name, picture=shown, bands=bands)
+        progress = state.progress(setup, PART)
+        now = feature_so_far(options, progress, setup.conditions)
+        if now is None:
+            return FigureValue()
+        kind = "" if now.kind is None else worded(NAMES[now.kind])
+        name = now.planned.name
+        title = name if not kind or kind in name else f"{name} ({kind})"
+        before = planned_at(options, len(state.runs) - 1) if state.runs else None
+        last = None if before is None else base_name(before.name)
+        ended = self._values_by_last(setup, state).get(last or "", [])
+        live = self._live_deviation(now, state)
+        return FigureValue(title, live, picture, tuple(ended))
+
+    def _live_deviation(self, now: FeatureSoFar, state: SessionState) -> str:
+        """Return how far the tip is from the feature; the points done without one."""
+        touching = state.touching
+        if now.fit is not None and touching.held and not touching.n_lost:
+            off = now.fit.distance_of(touching.held[-1].tip_cam)
+            if abs(off) < NEAR:
+                words = self.tr("Deviation {0} mm")
+                return words.format(number_text(off, 3))
+        done, needed = len(state.touches), now.planned.n_touches
+        return self.tr("Point {0} of {1}").format(min(done + 1, needed), needed)
+
+    def lacks_plan(self) -> bool:
+        """Return whether a plan is all that is missing."""
+        status = self._status
+        return status.tip is not None and status.refusal is not None
+
+    @override
+    def _action(self) -> MainAction:
+        if self.lacks_plan():
+            return MainAction(self.tr("Open a plan..."))
+        if self._status.is_done:
+            return MainAction(self.tr("Measure the next part"))
+        return super()._action()
+
+    @override
+    def _banner(self) -> State:
+        if self.lacks_plan():
+            return State(self.tr("NO PLAN YET"), "", Sign.RING, Tone.QUIET)
+        return super()._banner()
+
+    @override
+    def operator_value(self) -> OperatorValue:
+        value, status = super().operator_value(), self._status
+        if status.setup is None or status.state is None or value.fraction is None:
+            return value
+        place = self._live_tip(status.setup, status.state)
+        banner = replace(value.state, detail=place or value.state.detail)
+        if status.task is PART:  # the hint counts the points
+            progress = status.state.progress(status.setup, PART)
+            count = self.tr("Feature {0} of {1}").format(progress.run, progress.n_runs)
+            value = replace(value, count=count)
+            if status.setup.choices.options_of(PART).plan is None:
+                value = replace(value, count="", fraction=None)
+            ended = bands_so_far(status.setup, status.state)[-1:]
+            words = (f"{band_name(e)}  {value_text(e)}" for e in ended)
+            value = replace(value, time_left="".join(words))
+        return replace(value, state=banner)
+
+    @override
+    def _lead(self) -> str:
+        plan = self._service.choices.options_of(PART).plan
+        lead = super()._lead()
+        return lead if plan is None else PARTED.join((lead, worded(plan.words)))
+
+    def _live_tip(self, setup: SessionSetup, state: SessionState) -> str:
+        """Return the tip with its U at the present pose; empty if it is not seen."""
+        touching = state.touching
+        if not touching.held or touching.n_lost:
+            return ""
+        still = StillFrames((touching.held[-1].frame,))
+        (point,) = measure_touches(setup.instrument, (still,))
+        spread = COVERAGE_FACTOR * point.covariance(setup.instrument).diagonal() ** 0.5
+        numbers = (number_text(x, 2) for x in point.point_cam.tolist())
+        u = number_text(float(spread.max()), 3)
+        place = self.tr("{0}  {1}  {2}  \u00b1 {3} mm (k = 2)").format(*numbers, u)
+        tail = place.rindex("\u00b1")  # from which number and unit stay together
+        return place[:tail] + place[tail:].replace(" ", "\u00a0", 2)
+
+    @override
+    def _purpose(self) -> str:
+        return self.tr("Measure features of a part with the current tip.")
+
+    @override
+    def _missing(self) -> str:
+        return self.tr("Choose a plan")
+
+    @override
+    def _refused(self) -> str:
+        return self.tr("Nothing to measure")
+
+    @override
+    def _verdict(self, found: VerificationAssessment) -> str:
+        if found.is_accepted:
+            return self.tr("Part measured")
+        if found.grade is Grade.CHECK:
+            return self.tr("Not proven")
+        return self.tr("Out of tolerance")
+
+    @override
+    def _grade_text(self, grade: Grade) -> str:
+        if grade is Grade.REPEAT:
+            return self.tr("NOT OK")
+        return super()._grade_text(grade)
+
+
+def _value_row(band: Band) -> CheckRow:
+    verdict, mark = DECISIONS[band.decision], DECISION_MARKS[band.decision]
+    words = verdict if isinstance(verdict, str) else worded(verdict)
+    return CheckRow(band_name(band), value_text(band), *mark, words)
+
+
+class MeasurePage(ProbingPage):
+    """Shows a part that is measured and leads through its plan."""
+
+    key = "measure"
+
+    def __init__(self, service: MeasureService, sounds: Sounds) -> None:
+        run = service.measuring
+        self._measures = MeasurePresenter(service, run)
+        self._plan = PlanPanel(service)
+        super().__init__(service, sounds, run, self._measures)
+
+        # Layout
+        self._rows.insertWidget(0, self._plan)
+        self._figure.head.addWidget(self._plan.of_feature)
+        self._use_room()
+
+        self._on_workbench_changed()
+        self._retranslate()
+
+    @override
+    def title(self) -> str:
+        return self.tr("Measure")
+
+    @override
+    def first_control(self) -> QWidget:
+        lacks_plan = self._measures.lacks_plan()
+        return self._plan.first_control() if lacks_plan else self._checks
+
+    @override
+    def run_main_action(self) -> None:
+        if self._measures.lacks_plan():
+            self._plan.pick_plan()
+        else:
+            super().run_main_action()
+
+    @override
+    def _use_room(self) -> None:
+        super()._use_room()
+        of_part, is_narrow = self._plan.of_part, self._room.is_narrow
+        self._tabs.setCornerWidget(QWidget() if is_narrow else of_part)
+        if is_narrow:
+            self._rows.addWidget(of_part)
+        of_part.show()
+
+    @override
+    def _show(self) -> None:
+        lacks_plan = self._measures.lacks_plan()
+        for widget in (self._work, self._plan.of_part):
+            widget.setVisible(not lacks_plan)
+        super()._show()
+        self._plan.set_status(self._run.status, lacks_plan=lacks_plan)

@@ -1,0 +1,326 @@
+"""The measuring plan: opened or taught; the kind of the current feature; exports."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from msgspec import structs
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QWidget
+from typing_extensions import override
+
+from lightpen.formats.file_format import FileFormat
+from lightpen.measuring.artefacts import Artefact, artefact_plan
+from lightpen.measuring.exports import EXPORTS
+from lightpen.measuring.part import MeasuredPart, taught_plan
+from lightpen.measuring.plan import Plan, PlannedFeature, free_plan
+from lightpen.measuring.plan_checks import read_plan, write_plan
+from lightpen.measuring.surfaces import NAMES, FeatureKind
+from lightpen.record.exports.exports import save_new
+from lightpen.record.library.tip_library import Library
+from lightpen.verification.session.status import VerificationStatus
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions, base_name, planned_at
+from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.theme import GRID, TextSize, text_label
+from lightpen_app.look.tooltips import set_tooltip
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import Question, QuestionBar
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job, Report
+from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.measure.plate import plate_plan
+
+SUFFIXES = "*.yaml *.yml"
+BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least
+
+
+def listed_artefacts(library: Library) -> dict[str, Artefact]:
+    """Return the artefacts in use by their names."""
+    return {
+        name: item.artefact
+        for name, item in library.references.items()
+        if item.artefact is not None and not item.is_retired
+    }
+
+
+def choose_plan(service: MeasureService, plan: Plan | None) -> None:
+    """Measure by a plan from its first feature, or leave the plan."""
+    run, choices = service.measuring, service.choices
+    options = structs.replace(choices.options_of(PART), plan=plan)
+    state = run.status.state
+    if state is not None and state.is_begun:
+        run.runner.ask(lambda workflow: workflow.start_over())
+    service.set_choices(choices.with_options(options))
+
+
+class PlanPanel(Translated, QWidget):
+    """Chooses a plan, changes the kind of the current feature, and saves results.
+
+    Without a plan it shows the choices of one, else a row of controls.
+    """
+
+    def __init__(self, service: MeasureService) -> None:
+        super().__init__()
+        workbench = service.workbench
+        self._workbench, self._run = workbench, service.measuring
+        self._service, self._live = service, workbench.live
+        self._notices = workbench.notifications
+        self._status = VerificationStatus()
+
+        # Widgets
+        self._question = QuestionBar()
+        self._question.set_words(self._leaving)
+        self._start, self.of_part, self.of_feature = (QWidget() for _ in range(3))
+        self._open, self._teach, self._plate = (PushButton() for _ in range(3))
+        self._texts = tuple(text_label(TextSize.LEAD) for _ in range(3))
+        self._artefact = ChoiceField()
+        self._kind = ChoiceField()
+        for kind in (None, *FeatureKind):
+            self._kind.addItem("", None if kind is None else kind.value)
+        self._scan = QCheckBox()
+        self._moved, self._save_plan, self._export = (PushButton() for _ in range(3))
+        self._other = PushButton()
+
+        # Layout
+        vertical_layout(self, self._question, (self._start, 1))
+        rows = vertical_layout(self._start, 1, spacing=3 * GRID, margins=4 * GRID)
+        buttons = self._open, self._teach, self._plate
+        for button, words in zip(buttons, self._texts, strict=True):
+            button.setProperty("inviting", button is self._open)
+            button.setMinimumSize(BUTTON_WIDTH, BUTTON_HEIGHT)
+            horizontal_layout(rows, button, (words, 1), spacing=3 * GRID)
+        fill(rows, (self._artefact, 0, Qt.AlignmentFlag.AlignLeft), 2)
+        horizontal_layout(self.of_feature, self._kind, self._scan)
+        of_part = self._moved, self._save_plan, self._export, self._other
+        horizontal_layout(self.of_part, *of_part)
+
+        # Connections
+        self._open.clicked.connect(self.pick_plan)
+        self._teach.clicked.connect(self._on_teach_clicked)
+        self._plate.clicked.connect(self._on_plate_clicked)
+        self._other.clicked.connect(self._on_other_clicked)
+        self._question.agreed.connect(self._leave_plan)
+        self._artefact.activated.connect(self._on_artefact_chosen)
+        workbench.library.changed.connect(self._list_artefacts)
+        self._kind.activated.connect(self._on_kind_chosen)
+        self._scan.clicked.connect(self._on_scan_clicked)
+        self._moved.clicked.connect(self._on_moved_clicked)
+        self._save_plan.clicked.connect(self._on_save_plan_clicked)
+        self._export.clicked.connect(self._on_export_clicked)
+
+        self._retranslate()
+
+    def set_status(self, status: VerificationStatus, *, lacks_plan: bool) -> None:
+        """Show a measurement."""
+        self._status = status
+        self._start.setVisible(lacks_plan)
+        planned = self._planned()
+        is_taught = planned is not None and planned.nominal is None
+        self.of_feature.setVisible(is_taught)
+        has_runs = status.state is not None and bool(status.state.runs)
+        self._moved.setVisible(planned is not None and has_runs)
+        kind = None if planned is None else planned.kind
+        self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
+        self._scan.setChecked(planned is not None and planned.scan)
+        is_simulated = self._live.operator is not None
+        why_not = "" if is_simulated else self.tr("Only with the simulated camera.")
+        self._plate.set_why_not(why_not)
+        for button in (self._save_plan, self._export):
+            button.setVisible(self._part() is not None)
+
+    def first_control(self) -> QWidget:
+        """Return the first choice of a plan."""
+        return self._open
+
+    def choose(self, plan: Plan) -> None:
+        """Measure by a plan, from its first feature."""
+        choose_plan(self._service, plan)
+
+    def _plan(self) -> Plan | None:
+        return self._service.choices.options_of(PART).plan
+
+    def _planned(self) -> PlannedFeature | None:
+        state = self._status.state
+        if state is None or state.done is not None:
+            return None
+        return planned_at(self._options(), len(state.runs))
+
+    def _options(self) -> PartOptions:
+        """Return the options of the session, or those chosen for the next one."""
+        setup = self._status.setup
+        choices = self._service.choices if setup is None else setup.choices
+        return choices.options_of(PART)
+
+    def _part(self) -> MeasuredPart | None:
+        state = self._status.state
+        found = None if state is None else state.found_by(PART)
+        return None if found is None else found.part
+
+    @override
+    def _retranslate(self) -> None:
+        self._open.setText(self.tr("Open a plan..."))
+        self._teach.setText(self.tr("Teach a plan"))
+        self._plate.setText(self.tr("Try the simulated plate"))
+        texts = (
+            self.tr("Measure by a plan in a YAML file."),
+            self.tr(
+                "Features are recognised while they are probed; save them as a plan "
+                "at the end."
+            ),
+            self.tr("Ten features of a plate that the simulated operator probes."),
+        )
+        for label, text in zip(self._texts, texts, strict=True):
+            label.setText(text)
+        self._other.setText(self.tr("Other plan"))
+        self._artefact.setAccessibleName(self.tr("Artefact of the library"))
+        self._list_artefacts()
+        self._kind.setAccessibleName(self.tr("Kind of the feature that is probed"))
+        self._kind.setItemText(0, self.tr("Recognise"))
+        for index, kind in enumerate(FeatureKind, start=1):
+            self._kind.setItemText(index, worded(NAMES[kind]))
+        self._scan.setText(self.tr("Scan"))
+        set_tooltip(
+            self._scan, self.tr("Hold still on the feature, then slide along it.")
+        )
+        self._moved.setText(self.tr("Part moved"))
+        set_tooltip(
+            self._moved,
+            self.tr(
+                "Part or camera was moved: probe three datum points again, which "
+                "connect the new position with the old."
+            ),
+        )
+        self._save_plan.setText(self.tr("Save plan..."))
+        set_tooltip(
+            self._save_plan,
+            self.tr("Save a plan with the measured features as nominals."),
+        )
+        self._export.setText(self.tr("Export..."))
+
+    def pick_plan(self) -> None:
+        """Let the user choose the file of a plan."""
+        name, _ = QFileDialog.getOpenFileName(
+            self,
+            self.tr("Open a measuring plan"),
+            self._folder(),
+            self.tr("Measuring plans ({0})").format(SUFFIXES),
+        )
+        if name:
+            self.open_plan(Path(name))
+
+    def open_plan(self, path: Path) -> None:
+        """Read a plan and measure by it, or report why that is impossible."""
+        job = Job(lambda _: read_plan(path), self)
+        job.succeeded.connect(self.choose)
+        job.start(
+            lambda _: self._notices.withdraw(self), partial(self._notices.notify, self)
+        )
+
+    def _folder(self) -> str:
+        return str(self._workbench.save_place.folder())
+
+    def _on_teach_clicked(self) -> None:
+        self.choose(free_plan(self.tr("Part")))
+
+    def _leaving(self) -> Question:
+        return Question(
+            self.tr("Leave the plan? The points of this part are discarded."),
+            self.tr("Leave the plan"),
+            self.tr("Continue"),
+        )
+
+    def _on_other_clicked(self) -> None:
+        state = self._status.state
+        if state is not None and state.is_begun and not self._status.is_done:
+            self._question.ask()
+        else:
+            self._leave_plan()
+
+    def _leave_plan(self) -> None:
+        choose_plan(self._service, None)
+
+    def _list_artefacts(self) -> None:
+        """Offer the references of the library that have a plan."""
+        self._artefact.clear()
+        self._artefact.addItem(self.tr("Artefact..."))
+        library = self._workbench.library.statuses.library
+        for name, artefact in listed_artefacts(library).items():
+            self._artefact.addItem(name, artefact)
+        self._artefact.setVisible(self._artefact.count() > 1)
+
+    def _on_artefact_chosen(self) -> None:
+        artefact = self._artefact.currentData()
+        if artefact is not None:
+            self.choose(artefact_plan(self._artefact.currentText(), [artefact]))
+
+    def _on_plate_clicked(self) -> None:
+        self.choose(plate_plan())
+
+    def _on_kind_chosen(self) -> None:
+        word = self._kind.currentData()
+        kind = None if word is None else FeatureKind(word)
+        self._change(lambda each: structs.replace(each, kind=kind))
+
+    def _on_scan_clicked(self) -> None:
+        scan = self._scan.isChecked()
+        self._change(lambda each: structs.replace(each, scan=scan))
+
+    def _change(self, changed: Callable[[PlannedFeature], PlannedFeature]) -> None:
+        plan, planned = self._plan(), self._planned()
+        if plan is None or planned is None:
+            return
+        name = base_name(planned.name)
+        features = tuple(
+            changed(each) if each.name == name else each for each in plan.features
+        )
+        choices = self._service.choices
+        options = structs.replace(
+            choices.options_of(PART), plan=structs.replace(plan, features=features)
+        )
+        self._service.set_choices(choices.with_options(options))
+
+    def _on_moved_clicked(self) -> None:
+        self._run.runner.ask(lambda workflow: workflow.part_moved())
+
+    def _on_save_plan_clicked(self) -> None:
+        part = self._part()
+        name, _ = QFileDialog.getSaveFileName(
+            self,
+            self.tr("Save the measuring plan"),
+            str(Path(self._folder()) / "plan.yaml"),
+            self.tr("Measuring plans ({0})").format(SUFFIXES),
+        )
+        if part is None or not name:
+            return
+        path, plan = Path(name), taught_plan(part)
+        self._save(lambda _: write_plan(plan, path), path)
+
+    def _on_export_clicked(self) -> None:
+        part = self._part()
+        filters = {f"{worded(each.label)} (*{each.suffix})": each for each in EXPORTS}
+        name, chosen = QFileDialog.getSaveFileName(
+            self,
+            self.tr("Export the measured part"),
+            self._folder(),
+            ";;".join(filters),
+        )
+        if part is not None and name:
+            self.export(part, filters[chosen], Path(name))
+
+    def export(self, part: MeasuredPart, export: FileFormat, path: Path) -> None:
+        """Write a measured part in a format for other programs."""
+        named = path if path.suffix else path.with_suffix(export.suffix)
+        self._save(
+            lambda _: save_new(named.parent, named.name, export.encoded(part)), named
+        )
+
+    def _save(self, work: Callable[[Report], object], path: Path) -> None:
+        self._workbench.save_place.remember(path.parent)
+        job = Job(work, self)
+        job.start(lambda _: self._on_saved(path), partial(self._notices.notify, self))
+
+    def _on_saved(self, path: Path) -> None:
+        self._notices.show_status(self.tr("Saved: {0}").format(path))

@@ -1,0 +1,344 @@
+"""View state of the step Verify, computed from the status of the verification."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QObject
+
+from lightpen.cameras.worker_events import Connection
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.formats.hashes import InputFile
+from lightpen.model.origin import Origin
+from lightpen.record.library.calibration_status import TipStatus
+from lightpen.verification.probing.probing import ProbingPhase
+from lightpen.verification.session.session import BROKEN_OFF, rules_of
+from lightpen.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    bands_so_far,
+    fraction_done,
+    instruction,
+    is_at_rest,
+)
+from lightpen.verification.session.status import ReadingState, VerificationStatus
+from lightpen.verification.tasks.assessment import (
+    CALIBRATE_AGAIN,
+    VerificationAssessment,
+)
+from lightpen.verification.tasks.registry import TASKS, AnyTask
+from lightpen.verification.tasks.task import Band
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import Instruction, grade_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED, moment_text, shortened
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page import MainAction
+from lightpen_app.widgets.state_banner import State
+from lightpen_app.widgets.status_mark import status_text
+from lightpen_app_extensions.measure.band_chart import value_text
+from lightpen_app_extensions.measure.check_list import CheckRow
+from lightpen_app_extensions.measure.figure import FigureValue, posture_value
+from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.view_state import (
+    Headline,
+    VerifyView,
+    is_held,
+    lamps_message,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckResult:
+    """What a check found."""
+
+    bands: tuple[Band, ...]
+    grade: Grade
+
+
+class VerifyPresenter(QObject):
+    """Computes the view from the status of runner, camera and station."""
+
+    tasks: tuple[AnyTask, ...] = TASKS
+
+    def __init__(self, service: MeasureService, run: VerificationRun) -> None:
+        super().__init__()
+        workbench = service.workbench
+        self._service = service
+        self._selection, self._tips = workbench.selection, workbench.library
+        self._verification, self._live = run, workbench.live
+        self._results: dict[str, CheckResult] = {}  # of the present tip, by task
+        self._tip_file: InputFile | None = None
+
+    def view(self) -> VerifyView:
+        """Return the view."""
+        status = self._status
+        headline = self.headline()
+        return VerifyView(
+            headline=headline,
+            operator=self.operator_value(),
+            lamps=lamps_message(status),
+            rows=self.rows(),
+            current=self.current_row(),
+            task=None if status.refusal is not None else status.task,
+            pause=(
+                self.tr("Continue (Space)")
+                if status.is_paused
+                else self.tr("Pause (Space)")
+            ),
+            can_be_accepted=headline.is_doubtful
+            and status.is_done
+            and not status.accepted_by,
+            has_report=status.is_done and bool(status.files),
+            can_start_over=status.state is not None and status.state.is_begun,
+            can_undo=status.state is not None and bool(status.state.touches),
+        )
+
+    def headline(self) -> Headline:
+        """Return the status of the page."""
+        status, found = self._status, self._status.assessment
+        is_doubted = self._tip_is_doubted()
+        return Headline(
+            lead=self._lead(),
+            tone=Tone.WARN if is_doubted else Tone.QUIET,
+            action=self._action(),
+            is_complete=status.is_done,
+            is_doubtful=found is not None and not found.is_accepted,
+        )
+
+    def next_step(self) -> str:
+        """Return the key of the step after this one; empty for another check."""
+        found = self._status.assessment
+        if found is not None and found.is_accepted:
+            return "measure"
+        again = found is not None and found.next_step.code == CALIBRATE_AGAIN.code
+        return "swing" if again else ""
+
+    def rows(self) -> tuple[CheckRow, ...]:
+        """Return the checks, each with its value and verdict once it is done."""
+        self._keep_result()
+        return tuple(map(self._row, self.tasks))
+
+    def current_row(self) -> int:
+        """Return the row of what is probed now, or was last."""
+        setup = self._status.setup
+        chosen = None if setup is None else setup.choices.task
+        return self.tasks.index(chosen) if chosen in self.tasks else 0
+
+    def figure(self, row: int) -> FigureValue:
+        """Return the figure of a row."""
+        setup, state, task = self._status.setup, self._status.state, self.tasks[row]
+        title, purpose = worded(task.title), worded(task.purpose)
+        if setup is None or state is None or task is not setup.choices.task:
+            result = self._results.get(task.kind)
+            bands = () if result is None else result.bands
+            return FigureValue(title, purpose, bands=bands, action=self.tr("Do now"))
+        bands = bands_so_far(setup, state)
+        if state.done is not None:
+            return FigureValue(title, bands=bands)
+        return FigureValue(title, purpose, posture_value(setup, state), bands[:1])
+
+    def operator_value(self) -> OperatorValue:
+        """Return the content of page and operator view."""
+        status, instruction, banner = self._status, self._instruction(), self._banner()
+        setup, state, task = status.setup, status.state, status.task
+        if setup is None or state is None or task is None:
+            return OperatorValue(instruction.short, instruction.hint, banner)
+        options = setup.choices.options_of(task)
+        shown = task.shows_postures
+        return OperatorValue(
+            instruction=instruction.short,
+            hint=instruction.hint,
+            state=banner,
+            count=worded(task.counted(options, state.progress(setup, task))),
+            fraction=fraction_done(setup, state),
+            keys=(
+                self.tr("Space: continue")
+                if status.is_paused
+                else self.tr("Space: pause")
+            ),
+            dial=posture_value(setup, state) if shown else None,
+        )
+
+    @property
+    def _status(self) -> VerificationStatus:
+        return self._verification.status
+
+    # State of the page
+
+    def _lead(self) -> str:
+        status = self._status
+        if status.tip is None:
+            return self._purpose()
+        tip = status.tip
+        is_practice = self._selection.preparation.origin is Origin.SIMULATED
+        words = (
+            self.tr("Practice tip {0} of pen {1}, saved {2}")
+            if is_practice
+            else self.tr("Tip {0} of pen {1}, in use since {2}")
+        ).format(
+            shortened(tip.names.tip),
+            shortened(tip.names.pen),
+            moment_text(tip.calibration.when),
+        )
+        doubt = grade_text(Grade.CHECK) if self._tip_is_doubted() else ""
+        files = ", ".join(file.name for file in status.files)
+        kept = self.tr("saved as {0}").format(files) if files else ""
+        by = shortened(status.accepted_by) if status.accepted_by else ""
+        accepted = self.tr("accepted by {0}").format(by) if by else ""
+        parts = words, doubt, self._tip_status(), kept, accepted
+        return PARTED.join(filter(None, parts))
+
+    def _purpose(self) -> str:
+        return self.tr("Verify the current tip on reference artefacts.")
+
+    def _tip_is_doubted(self) -> bool:
+        """Return whether the tip was accepted though its grade is CHECK."""
+        tip = self._status.tip
+        return tip is not None and tip.calibration.grade == Grade.CHECK
+
+    def _tip_status(self) -> str:
+        """Return the status of a tip; nothing of a valid one."""
+        tip, statuses = self._status.tip, self._tips.statuses
+        if tip is None or self._selection.preparation.origin is Origin.SIMULATED:
+            return ""
+        overdue = statuses.overdue(tip.names.pen, tip.names.tip)
+        if overdue is not None:
+            return worded(overdue)
+        status = statuses.of_tip(tip.names.pen, tip.names.tip)
+        return "" if status in (None, TipStatus.VALID) else status_text(status)
+
+    def _action(self) -> MainAction:
+        status = self._status
+        if status.is_done:
+            words = {
+                "measure": self.tr("Measure a part"),
+                "swing": self.tr("Calibrate again"),
+                "": self.tr("Check again"),
+            }
+            return MainAction(words[self.next_step()])
+        has_points = status.state is not None and status.state.is_begun
+        why_not = "" if has_points else self.tr("No point is recorded yet.")
+        return MainAction(self.tr("Finish early"), why_not, is_early=True)
+
+    def _keep_result(self) -> None:
+        """Remember what the checks of the present tip found."""
+        status, tip = self._status, self._status.tip
+        if tip is not None and tip.tip_file != self._tip_file:
+            self._results, self._tip_file = {}, tip.tip_file
+        setup, state, found = status.setup, status.state, status.assessment
+        if setup is not None and state is not None and found is not None:
+            bands = bands_so_far(setup, state)
+            self._results[setup.choices.kind] = CheckResult(bands, found.grade)
+
+    def _row(self, task: AnyTask) -> CheckRow:
+        status, name = self._status, worded(task.title)
+        if task is status.task:
+            return CheckRow(name, self.tr("now"), Sign.PLAY, Tone.ACTIVE)
+        result = self._results.get(task.kind)
+        if result is None:
+            return CheckRow(name, "", Sign.RING, Tone.QUIET)
+        value = f"{self._grade_text(result.grade)} {value_text(result.bands[0])}"
+        return CheckRow(name, value, *GRADE_MARKS[result.grade])
+
+    def _grade_text(self, grade: Grade) -> str:
+        """Return a grade; REPEAT refers to the verification, not to a swing."""
+        return self.tr("REPEAT") if grade is Grade.REPEAT else grade_text(grade)
+
+    # What the operator has to do
+
+    def _instruction(self) -> Instruction:
+        status = self._status
+        setup, state = status.setup, status.state
+        if status.reading is ReadingState.IMAGES:
+            hint = self.tr("Measuring the points in the recorded images.")
+            return Instruction(self.tr("Reading images"), hint)
+        if status.refusal is not None:
+            is_possible = status.tip is not None  # once the missing value is entered
+            short = self._missing() if is_possible else self._refused()
+            return Instruction(short, worded(status.refusal))
+        if setup is None or state is None:
+            return Instruction(self.tr("Wait"), self.tr("Reading the current tip."))
+        if status.assessment is not None and status.is_done:
+            short = self._verdict(status.assessment)
+            return Instruction(short, worded(status.assessment.next_step))
+        if self._live.connection is not Connection.STREAMING:
+            hint = self.tr(
+                "The camera sends no images. Probing continues when they arrive."
+            )
+            return Instruction(self.tr("No images"), hint)
+        if status.is_paused:
+            return Instruction(self.tr("Paused"), self.tr("Press Space to continue."))
+        return Instruction(self._short(setup, state), worded(instruction(setup, state)))
+
+    def _missing(self) -> str:
+        return self.tr("Enter the value")
+
+    def _refused(self) -> str:
+        return self.tr("Nothing to verify")
+
+    def _verdict(self, found: VerificationAssessment) -> str:
+        if found.grade is Grade.REPEAT:
+            return self.tr("Not verified")
+        if found.grade is Grade.CHECK:
+            return self.tr("Check needed")
+        if found.grade is Grade.PASS:
+            return self.tr("Tip verified")
+        if found.grade is Grade.STEADY:
+            return self.tr("Nothing moved")
+        return self.tr("Scale and form verified")
+
+    def _short(self, setup: SessionSetup, state: SessionState) -> str:
+        task, touching = state.task(setup), state.touching
+        if is_held(state):
+            return self.tr("Hold still")
+        if is_at_rest(state):
+            return self.tr("Pick up the pen")
+        if touching.phase is ProbingPhase.KNOWN:
+            return self.tr("Probe elsewhere")
+        if state.fault is not None:
+            is_broken = state.fault.code == BROKEN_OFF.code
+            return self.tr("Not recorded") if is_broken else self.tr("Not counted")
+        if task is None:
+            return ""
+        progress = state.progress(setup, task)
+        is_next = touching.phase is ProbingPhase.RECORDED
+        return worded(task.headline(progress, is_next=is_next))
+
+    def _banner(self) -> State:
+        status = self._status
+        setup, state, task = status.setup, status.state, status.task
+        if status.reading is ReadingState.IMAGES:
+            fraction = self._verification.progress
+            return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE, fraction)
+        if status.refusal is not None and status.tip is not None:  # an input is missing
+            return State(self.tr("NOT READY"), "", Sign.WARNING, Tone.WARN)
+        if status.refusal is not None:
+            return State(self.tr("NOT POSSIBLE"), "", Sign.CROSS, Tone.BAD)
+        if setup is None or state is None:
+            return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
+        if task is None and status.assessment is not None:
+            grade = status.assessment.grade
+            leading, limits = setup.choices.task, setup.choices.limits
+            rule = worded(leading.rule_of(setup.choices.options_of(leading), limits))
+            why = f"{worded(status.assessment.reason)} {rule}"
+            return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
+        if self._live.connection is not Connection.STREAMING:
+            return State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)
+        if status.is_paused:
+            return State(self.tr("PAUSED"), "", Sign.PAUSE, Tone.WARN)
+        assert task is not None
+        touching = state.touching
+        if touching.phase is ProbingPhase.RECORDED:
+            return State(self.tr("POINT RECORDED"), "", Sign.CHECK, Tone.GOOD)
+        if touching.phase is ProbingPhase.KNOWN:
+            return State(self.tr("PROBED BEFORE"), "", Sign.WARNING, Tone.WARN)
+        if is_held(state):
+            fraction = touching.progress(rules_of(setup, state, task))
+            return State(self.tr("STEADY"), "", Sign.RECORD, Tone.ACTIVE, fraction)
+        if state.fault is not None:
+            return State(self.tr("NOT RECORDED"), "", Sign.WARNING, Tone.WARN)
+        if touching.n_lost or not (touching.held or touching.path):
+            return State(self.tr("WAITING"), "", Sign.WAIT, Tone.QUIET)
+        return State(self.tr("PEN DETECTED"), "", Sign.EYE, Tone.ACTIVE)

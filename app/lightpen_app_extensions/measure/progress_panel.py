@@ -1,0 +1,214 @@
+"""Instruction, progress and buttons of a verification."""
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import QProgressBar, QWidget
+from typing_extensions import override
+
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.library.supervision import Signature
+from lightpen_app.look.layouts import (
+    fill,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
+from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.look.tooltips import set_tooltip
+from lightpen_app.print_report.control import PrintReportControl
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import Question, QuestionBar
+from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
+from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
+from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_app_extensions.measure.view_state import VerifyView
+
+PROGRESS_STEPS = 1000
+STATE_HEIGHT = 9 * GRID  # px, at least
+# Row, column, and how many of these each takes; the state is beside the instruction, or
+# below it where there is little width.
+PLACES = {
+    "_instruction": (0, 0),
+    "_hint": (1, 0),
+    "_buttons": (2, 0),
+    "_state": (0, 1, 3, 1),
+}
+NARROW_PLACES = {
+    "_instruction": (0, 0),
+    "_buttons": (0, 1),
+    "_hint": (1, 0, 1, 2),
+    "_state": (2, 0, 1, 2),
+}
+
+
+class ProgressPanel(ResponsiveLayout, Translated, QWidget):
+    """Shows instruction, state and progress of a verification in one row."""
+
+    narrow_below = 100 * GRID  # px; then the instruction stands above
+
+    def __init__(self, workbench: Workbench, run: VerificationRun) -> None:
+        super().__init__()
+        self._workbench, self._run = workbench, run
+        self._runner = self._run.runner
+        self._room = NO_ROOM
+
+        # Widgets
+        self._question = QuestionBar()
+        self._question.set_words(self._starting_over)
+        self._reason = ReasonBar()
+        self._instruction = FittedText(TextSize.TITLE)
+        self._instruction.setMinimumHeight(4 * GRID)
+        self._act, self._start_over, self._accept = (PushButton() for _ in range(3))
+        self._report = PushButton()
+        self._print_report = PrintReportControl(workbench.save_place, self)
+        self._undo = PushButton()
+        self._undo.setShortcut(QKeySequence.StandardKey.Undo)
+        self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
+        self._banner = StateBanner(TextSize.TITLE)
+        self._banner.setMinimumHeight(STATE_HEIGHT)
+        self._lamps = SignLabel()
+        self._state, self._numbers, self._buttons = (QWidget() for _ in range(3))
+        self._count = FittedText(TextSize.DISPLAY)
+        self._count.setMaximumHeight(self._count.sizeHint().height())  # one line
+        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
+
+        # Layout
+        layout = vertical_layout(self, self._question, self._reason)
+        self._rows = grid_layout(layout, spacing=(2 * GRID, GRID // 2))
+        horizontal_layout(
+            self._state, (self._banner, 3), (self._numbers, 2), spacing=2 * GRID
+        )
+        numbers = 1, self._count, self._progress, 1
+        vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
+        buttons = self._accept, self._report, self._act, self._undo, self._start_over
+        horizontal_layout(self._buttons, *buttons, 1)
+        fill(layout, self._lamps)
+        self._use_room()
+
+        # Connections
+        self._run.refused.connect(self._on_refused)
+        self._act.clicked.connect(self.toggle_pause)
+        self._undo.clicked.connect(self._on_undo_clicked)
+        self._start_over.clicked.connect(self._on_start_over_clicked)
+        self._question.agreed.connect(self._begin_anew)
+        self._accept.clicked.connect(self._ask_reason)
+        self._report.clicked.connect(self._on_report_clicked)
+        self._print_report.failed.connect(partial(workbench.notifications.notify, self))
+        self._print_report.saved.connect(self._on_saved)
+        self._reason.given.connect(self._on_reason_given)
+        self._reason.declined.connect(self._accept.setFocus)
+
+        self._retranslate()
+
+    def set_value(self, view: VerifyView) -> None:
+        """Show another snapshot of the verification."""
+        operator = view.operator
+        self._instruction.set_text(operator.instruction)
+        self._hint.set_text(operator.hint, bold=False)
+        self._banner.set_value(operator.state)
+        self._count.set_text(operator.count)
+        self._lamps.set_value(view.lamps)
+        self._numbers.setVisible(operator.fraction is not None)
+        self._progress.setValue(round(PROGRESS_STEPS * (operator.fraction or 0.0)))
+        self._act.setText(view.pause)
+        self._act.setVisible(view.task is not None)
+        self._undo.setVisible(view.task is not None)
+        self._undo.setEnabled(view.can_undo)
+        self._start_over.setVisible(view.can_start_over)
+        self._accept.setVisible(view.can_be_accepted)
+        self._report.setVisible(view.has_report)
+        if not view.can_be_accepted:
+            self._reason.hide()
+
+    def toggle_pause(self) -> None:
+        """Pause the verification, or continue."""
+        self._runner.ask(lambda workflow: workflow.toggle_pause())
+
+    def hide_question(self) -> None:
+        """Hide the question."""
+        self._question.hide()
+
+    @override
+    def _use_room(self) -> None:
+        is_narrow = self._room.is_narrow
+        for widget, place in (NARROW_PLACES if is_narrow else PLACES).items():
+            child = getattr(self, widget)
+            self._rows.removeWidget(child)
+            self._rows.addWidget(child, *place)
+        self._rows.setColumnStretch(0, 1)
+        self._rows.setColumnStretch(1, 0 if is_narrow else 1)
+
+    @override
+    def _retranslate(self) -> None:
+        self._reason.set_words(
+            self.tr(
+                "This result needs checking. Enter the reason for using the tip. It is "
+                "kept with the verification."
+            ),
+            self.tr("Reason"),
+            self.tr("Accept with reason"),
+            self.tr("Do not accept"),
+            usual_reasons(),
+        )
+        self._accept.setText(self.tr("Accept..."))
+        set_tooltip(self._accept, self.tr("Use the tip with a reason"))
+        self._report.setText(self.tr("Report..."))
+        self._undo.setText(self.tr("Undo point"))
+        set_tooltip(self._undo, self.tr("Discard the last point of the current task."))
+        self._start_over.setText(self.tr("Start over"))
+        set_tooltip(
+            self._start_over,
+            self.tr("Discard all points, and start with the current tip."),
+        )
+        self._progress.setAccessibleName(self.tr("Progress"))
+
+    def _starting_over(self) -> Question:
+        return Question(
+            self.tr("Start over? Results are kept."),
+            self.tr("Start over"),
+            self.tr("Continue"),
+        )
+
+    def _begin_anew(self) -> None:
+        self._runner.ask(lambda workflow: workflow.start_over())
+
+    def _on_undo_clicked(self) -> None:
+        self._runner.ask(lambda workflow: workflow.undo())
+
+    def _on_report_clicked(self) -> None:
+        """Show the report of the only task, or of the conclusion of several."""
+        *tasks, conclusion = self._run.status.files
+        self._print_report.show_verification(
+            tasks[0] if len(tasks) == 1 else conclusion
+        )
+
+    def _on_saved(self, path: Path) -> None:
+        words = self.tr("Saved: {0}").format(path)
+        self._workbench.notifications.show_status(words)
+
+    def _ask_reason(self) -> None:
+        found = self._run.status.assessment
+        is_beyond = found is not None and found.grade is Grade.REPEAT
+        is_guarded = self._workbench.selection.supervision.is_guarded
+        self._reason.ask(of_supervisor=is_guarded or is_beyond)
+
+    def _on_reason_given(self, reason: str, signature: Signature | None) -> None:
+        self._runner.ask(lambda workflow: workflow.accept(reason, signature))
+
+    def _on_refused(self) -> None:
+        if not self._accept.isHidden():
+            self._reason.refuse()
+
+    def _on_start_over_clicked(self) -> None:
+        status = self._run.status
+        if status.state is not None and status.state.is_begun and not status.is_done:
+            self._question.ask()
+        else:
+            self._begin_anew()

@@ -1,0 +1,234 @@
+"""Verification and measuring in the window: runs, choices, and what Start shows."""
+
+from dataclasses import replace
+from functools import partial
+
+from PySide6.QtCore import QCoreApplication
+from typing_extensions import override
+
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.verification.session.choices import VerificationChoices
+from lightpen.verification.storage.checkpoint import (
+    InterruptedVerification,
+    find_interrupted,
+)
+from lightpen.verification.storage.resuming import abandon_interrupted
+from lightpen.verification.tasks.part import PART
+from lightpen.verification.tasks.part_course import PartOptions
+from lightpen_app.face import (
+    DemoStep,
+    InterruptedWork,
+    ReadinessItem,
+    RowWords,
+    Service,
+)
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
+from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.probing_operator import ProbingOperator
+
+KEY = "measure"
+LONGEST = 16  # characters of a name
+
+translate = QCoreApplication.translate
+
+
+class MeasureService(Service):
+    """Verifies tips by reference artefacts, and measures parts by the tip.
+
+    The pages are those of `MeasureFace`.
+    """
+
+    verify_step = "verify"
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__(workbench)
+        self.workbench, self._selection = workbench, workbench.selection
+        archive, folder = workbench.run.archive, workbench.folder
+        now, notices = workbench.around.now, workbench.notifications
+        self.verification = VerificationRun(archive, folder, now, notices, self)
+        self.measuring = VerificationRun(archive, folder, now, notices, self)
+        self._resumed: InterruptedVerification | None = None
+
+        # Connections
+        workbench.selection.changed.connect(self._update_runners)
+        workbench.live.connection_changed.connect(self._on_connection_changed)
+        for run in (self.verification, self.measuring):
+            workbench.live.add_capture(run.runner)
+            workbench.parts.append(run)
+            run.files_changed.connect(workbench.archive_writer.enter_owed)
+            run.changed.connect(self._on_run_changed)
+            run.refused.connect(self._on_run_refused)
+
+        self._update_runners()
+
+    @property
+    def choices(self) -> VerificationChoices:
+        """Choices for a verification, with the limits of the station."""
+        choices = self._selection.of_extension(KEY, VerificationChoices())
+        return replace(choices, limits=self._selection.limits.verification)
+
+    def set_choices(self, choices: VerificationChoices) -> None:
+        """Take over other choices for verifications, and remember them."""
+        self._selection.set_of_extension(KEY, choices)
+
+    def set_touching(self, touches: bool) -> None:
+        """Set whether the simulated operator probes."""
+        operator = self.workbench.live.operator
+        for run in (self.verification, self.measuring):
+            is_led = touches and run.runner.status.is_here
+            run.probing_operator = (
+                ProbingOperator(operator) if is_led and operator else None
+            )
+
+    @property
+    @override
+    def is_here(self) -> bool:
+        return self.verification.status.is_here
+
+    @override
+    def readiness(self) -> tuple[ReadinessItem, ...]:
+        name = translate("DayView", "Drift reference")
+        action = translate("DayControl", "Verify the tip")
+        return (ReadinessItem("verify", name, self._reference_message(), action),)
+
+    @override
+    def find_interrupted(self) -> tuple[InterruptedWork, ...]:
+        found = find_interrupted(self.workbench.folder)
+        return tuple(map(partial(_Interrupted, self), found))
+
+    @override
+    def demo_steps(self) -> tuple[DemoStep, ...]:
+        text = translate(
+            "Demo", "Demo: the simulated operator measures a plate of ten features."
+        )
+        begin, is_done = self._begin_demo, self._is_demo_done
+        return (DemoStep("measure", text, begin, is_done),)
+
+    def resume(self, found: InterruptedVerification) -> None:
+        """Go on with a verification, with its choices."""
+        under_way = found.under_way
+        assert under_way is not None
+        chosen, is_part = self.choices, under_way.choices.task is PART
+        kind = chosen.kind if is_part else under_way.choices.kind
+        again = replace(under_way.choices, kind=kind, limits=chosen.limits)
+        self.set_choices(again.with_moves(()))  # as in the session
+        self._resumed = found
+        run = self.measuring if is_part else self.verification
+        run.runner.ask(lambda workflow: workflow.go_on(found))
+
+    def _update_runners(self) -> None:
+        chosen, choices = self._selection.preparation, self.choices
+        part = replace(choices, kind=PART.kind)
+        self.verification.runner.ask(lambda workflow: workflow.choose(chosen, choices))
+        self.measuring.runner.ask(lambda workflow: workflow.choose(chosen, part))
+
+    def _on_connection_changed(self) -> None:
+        if not self.workbench.live.is_open:
+            self.set_touching(False)
+
+    def _on_run_changed(self) -> None:
+        resumed = self._resumed
+        if resumed is not None and resumed.under_way is not None:
+            began = resumed.under_way.began
+            runs = ((self.verification, "verify"), (self.measuring, "measure"))
+            for run, key in runs:
+                if run.status.began == began:
+                    self._resumed = None
+                    self.resumed.emit(key)
+        self.changed.emit()
+
+    def _on_run_refused(self) -> None:
+        self._resumed = None
+        self.refused.emit()
+
+    def _begin_demo(self) -> None:
+        self.set_choices(self.choices.with_options(PartOptions(plate_plan())))
+
+    def _is_demo_done(self) -> bool:
+        if self.measuring.probing_operator is None:  # once it is here
+            self.set_touching(True)
+        return self.measuring.status.is_done
+
+    def _reference_message(self) -> StatusMessage:
+        drift = self.verification.status.lamp_drift
+        if drift is None:
+            text = translate("DayPage", "No drift reference")
+            return StatusMessage(text, Sign.RING, Tone.QUIET)
+        if drift.assessment.grade is not Grade.PASS:
+            text = translate("DayPage", "The camera moved. Verify the tip.")
+            return StatusMessage.warning(text)
+        return StatusMessage.good(translate("DayPage", "Drift reference stable"))
+
+
+class _Interrupted(InterruptedWork):
+    """A verification that was interrupted."""
+
+    def __init__(self, service: MeasureService, found: InterruptedVerification) -> None:
+        self._service, self._found = service, found
+        under_way = found.under_way
+        self.names = None if under_way is None else under_way.names
+
+    @override
+    def words(self) -> RowWords:
+        return RowWords(
+            self._heading(),
+            self._description(),
+            translate(
+                "VerificationRow",
+                "Close this verification as abandoned? Its recorded data remains.",
+            ),
+            (
+                translate("VerificationRow", "Continue"),
+                translate("VerificationRow", "Continue the verification of {0}"),
+            ),
+            (
+                translate("VerificationRow", "Close verification"),
+                translate("VerificationRow", "Close the verification of {0}"),
+            ),
+            (
+                translate("VerificationRow", "Keep"),
+                translate("VerificationRow", "Keep the verification of {0}"),
+            ),
+        )
+
+    @override
+    def resume(self) -> str:
+        self._service.resume(self._found)
+        return translate("InterruptedControl", "Reading the verification")
+
+    @override
+    def closing_text(self) -> str:
+        return translate("InterruptedControl", "Closing the verification")
+
+    @override
+    def close(self) -> None:
+        workbench = self._service.workbench
+        abandon_interrupted(workbench.folder, self._found, workbench.around.now())
+
+    @override
+    def closed_text(self) -> str:
+        return translate(
+            "InterruptedControl", "Verification closed as abandoned. See History."
+        )
+
+    def _heading(self) -> str:
+        under_way = self._found.under_way
+        if under_way is None:
+            words = translate("VerificationRow", "Damaged: {0}")
+            return words.format(shortened(self._found.path.stem))
+        return moment_text(under_way.began)
+
+    def _description(self) -> str:
+        under_way, fault = self._found.under_way, self._found.fault
+        if under_way is None:
+            return "" if fault is None else breakable(worded(fault))
+        names = under_way.names
+        called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
+        task = worded(under_way.choices.task.title)
+        return PARTED.join(filter(None, (*called, task)))

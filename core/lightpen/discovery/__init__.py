@@ -1,1 +1,0 @@
-"""Tip, pen and camera from one swing and one length, without files."""

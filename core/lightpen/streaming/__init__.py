@@ -1,1 +1,0 @@
-"""Live streaming of pose and tip to other programs."""

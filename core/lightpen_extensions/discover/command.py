@@ -1,0 +1,305 @@
+"""``lightpen discover``: tip, pen and camera from one swing and one length."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from lightpen.commands.arguments import (
+    above_zero,
+    add_bits,
+    add_camera,
+    add_file,
+    add_json,
+    finite,
+)
+from lightpen.commands.calibrate_options import separation_of
+from lightpen.commands.console import (
+    are_same,
+    images_at,
+    printing,
+    progress,
+    shown,
+    write_record,
+)
+from lightpen.commands.touched import touches_at
+from lightpen.errors import UsageError
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import require_folder_of, write_whole
+from lightpen.formats.images import SUFFIXES
+from lightpen.formats.observation_files import read_unlabelled_centers
+from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import DISC_DIAMETER, Pen, check_leds
+from lightpen_extensions.discover.discover import discover
+from lightpen_extensions.discover.picture import picture_of_pen
+from lightpen_extensions.discover.report import (
+    discovery_record,
+    discovery_text,
+    swings_record,
+    swings_text,
+)
+from lightpen_extensions.discover.request import Request, SecondSightings, TouchedLength
+from lightpen_extensions.discover.requirements import require_lens
+from lightpen_extensions.discover.scale import MeasuredLength
+from lightpen_extensions.discover.sightings import (
+    Report,
+    Sightings,
+    find_spots,
+    sightings_of_centers,
+)
+from lightpen_extensions.discover.together import discover_together
+
+LONGEST = "longest"
+CALIPER = 0.02  # mm, standard uncertainty of a length unless given
+LEAST_SIDE, MOST_SIDE = 32, 65_536  # px, of an image
+SEARCHING = 0.6  # of the progress with images
+
+
+def add_discover(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen discover``."""
+    parser.set_defaults(run=_discover)
+    parser.add_argument(
+        "images",
+        nargs="*",
+        metavar="IMAGES",
+        help="image folder, file name pattern, video or record of a swing, in the "
+        "order of time, 10 images a second or more; several folders or videos are "
+        "swings of the same pen and tip, adjusted together",
+    )
+    parser.add_argument(
+        "--centers",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FILE.csv",
+        help="spot centres without LED numbers (frame,x_px,y_px) instead of IMAGES, "
+        "one file per swing; needs --image-size",
+    )
+    parser.add_argument(
+        "--image-size", type=_size, metavar="WxH", help="size of the images, 2448x2048"
+    )
+    add_bits(parser)
+    parser.add_argument(
+        "--length",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="LENGTH",
+        help="known length: 'longest MM' between the two LEDs farthest apart, or "
+        "'A B MM' between two LEDs by number (repeatable)",
+    )
+    parser.add_argument(
+        "--length-sigma",
+        type=above_zero,
+        default=CALIPER,
+        metavar="MM",
+        help=f"standard uncertainty of each length ({CALIPER})",
+    )
+    parser.add_argument(
+        "--second-cone",
+        metavar="IMAGES",
+        help="a swing in a second cone, given like the first; the camera must not have "
+        "moved. With --distance it gives the scale",
+    )
+    parser.add_argument(
+        "--touched",
+        nargs="+",
+        default=[],
+        metavar="RUN",
+        help="points of two cones at a certified distance, as for verify length: "
+        "image folders, videos, records or FILE.csv (frame,led,x_px,y_px). With "
+        "--distance they give the scale",
+    )
+    parser.add_argument(
+        "--distance",
+        type=above_zero,
+        metavar="MM",
+        help="distance of the two cones, or of the touched ends",
+    )
+    parser.add_argument(
+        "--distance-sigma",
+        type=above_zero,
+        metavar="MM",
+        help="standard uncertainty of the distance",
+    )
+    parser.add_argument(
+        "--led-diameter",
+        type=above_zero,
+        metavar="MM",
+        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
+    )
+    add_camera(parser, "intrinsics file, if there is one")
+    rough = parser.add_mutually_exclusive_group()
+    rough.add_argument(
+        "--pen-sketch",
+        type=Path,
+        metavar="FILE",
+        help="LED file with rough coordinates, which gives numbers and frame",
+    )
+    rough.add_argument(
+        "--pen", type=Path, metavar="FILE", help="the same as --pen-sketch"
+    )
+    for name, what in (("pen", "LED file"), ("camera", "intrinsics file")):
+        suffix = "json" if name == "pen" else "yaml"
+        add_file(parser, f"--out-{name}", f"FILE.{suffix}", f"write the {what}")
+    add_file(
+        parser, "--picture", "FILE.png", "draw the pen with the numbers of its LEDs"
+    )
+    add_json(parser)
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text} is no size such as 2448x2048.")
+    width, height = int(found[1]), int(found[2])
+    if not all(LEAST_SIDE <= side <= MOST_SIDE for side in (width, height)):
+        raise argparse.ArgumentTypeError(
+            f"{text} is no size from {LEAST_SIDE} to {MOST_SIDE} px."
+        )
+    return width, height
+
+
+@printing
+def _discover(options: argparse.Namespace) -> None:
+    lengths = tuple(_length(words, options.length_sigma) for words in options.length)
+    separation = separation_of(options, is_touched=bool(options.touched))
+    if not lengths and separation is None and options.out_pen is not None:
+        raise UsageError("discover.no-length")
+    camera = None if options.camera is None else read_camera(options.camera)
+    rough = options.pen_sketch or options.pen
+    sketch = None if rough is None else read_unchecked_pen(rough, "mm")
+    _check_outputs(options)
+    places = _places(options)
+    has_cone = options.second_cone is not None
+    if has_cone and len(places) > 1:
+        raise UsageError("cli.discover-swings-and-cone")
+    n_read = len(places) + has_cone
+    read = partial(_sightings, options, camera)
+    with progress("Finding pen and camera") as report:
+        share = 0.0 if options.centers else SEARCHING
+        each = share / n_read
+        swings = [
+            read(place, partial(_report_part, report, each * k, each))
+            for k, place in enumerate(places)
+        ]
+        request = Request(lengths, _diameter(options, sketch), camera, sketch)
+        if separation is not None and options.touched:
+            touches = partial(touches_at, options.touched)
+            request = replace(request, touched=TouchedLength(touches, separation))
+        elif separation is not None:
+            last = partial(_report_part, report, each, each)
+            other = read([options.second_cone], last)
+            request = replace(request, second=SecondSightings(other, separation))
+        rest = partial(_report_part, report, share, 1 - share)
+        together = None
+        if len(swings) > 1:
+            together = discover_together(swings, request, rest)
+        found = together.found if together else discover(swings[0], request, rest)
+    if options.out_camera is not None:
+        require_lens(found.camera)
+    if options.out_pen is not None:
+        check_leds(found.pen.leds, found.pen.diameter)
+        write_pen(found.pen, options.out_pen)
+    if options.out_camera is not None:
+        write_camera(found.camera, options.out_camera)
+    if options.picture is not None:
+        write_whole(options.picture, picture_of_pen(found))
+    record = discovery_record(found)
+    if together is not None:
+        record |= swings_record(together)
+    if options.json is not None:
+        write_record(options.json, record)
+    print(shown(discovery_text(found)))
+    if together is not None:
+        print(shown(swings_text(together)))
+
+
+def _report_part(report: Report, start: float, share: float, fraction: float) -> None:
+    report(start + share * fraction)
+
+
+def _places(options: argparse.Namespace) -> list[list[str]]:
+    """Return the places of the images of each swing."""
+    if bool(options.images) == bool(options.centers):
+        raise UsageError("cli.discover-images-or-centers")
+    if options.centers:
+        return [[str(path)] for path in options.centers]
+    suffixes = {Path(place).suffix.lower() for place in options.images}
+    if suffixes <= set(SUFFIXES):  # a pattern, as a shell makes it
+        return [options.images]
+    return [[place] for place in options.images]
+
+
+def _length(words: Sequence[str], sigma: float) -> MeasuredLength:
+    try:
+        if len(words) == 2 and words[0].strip().casefold() == LONGEST:
+            return MeasuredLength(None, above_zero(words[1]), sigma)
+        if len(words) == 3:
+            first, second = (int(word) for word in words[:2])
+            return MeasuredLength((first, second), above_zero(words[2]), sigma)
+    except (ValueError, argparse.ArgumentTypeError):
+        pass
+    raise UsageError("cli.discover-length-words", words=" ".join(words))
+
+
+def _diameter(options: argparse.Namespace, sketch: Pen | None) -> float:
+    if options.led_diameter is not None:
+        return float(finite(str(options.led_diameter)))
+    return DISC_DIAMETER if sketch is None else sketch.diameter
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Refuse outputs in no folder, over an input or each other, or of other suffix."""
+    inputs = [*options.centers, options.camera, options.pen, options.pen_sketch]
+    inputs = [path for path in inputs if path is not None]
+    seen: list[Path] = []
+    outputs = (options.out_pen, options.out_camera, options.picture, options.json)
+    for path in outputs:
+        if path is None:
+            continue
+        require_folder_of(path)
+        if any(are_same(path, other) for other in (*inputs, *seen)):
+            raise UsageError("cli.discover-output-twice", file=path)
+        seen.append(path)
+    for path, suffixes in (
+        (options.out_pen, (".json",)),
+        (options.out_camera, (".yaml", ".yml")),
+        (options.picture, (".png",)),
+    ):
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise UsageError(
+                "cli.discover-suffix", file=path, suffix=" or ".join(suffixes)
+            )
+
+
+def _sightings(
+    options: argparse.Namespace,
+    camera: Camera | None,
+    places: Sequence[str],
+    report: Report,
+) -> Sightings:
+    """Read a swing, which must be of the images of the camera file."""
+    if not options.centers:
+        sightings = find_spots(images_at(*places).of_bits(options.bits), report)
+    else:
+        size = options.image_size or (None if camera is None else camera.image_size)
+        if size is None:
+            raise UsageError("cli.discover-no-size")
+        given = read_unlabelled_centers(Path(places[0]))
+        names = tuple(f"frame {frame}" for frame in given.frames)
+        sightings = sightings_of_centers(names, given.centers, size)
+    if camera is not None and camera.image_size != sightings.size:
+        raise UsageError(
+            "cli.camera-of-other-size",
+            file=options.camera,
+            width=camera.width,
+            height=camera.height,
+            seen_width=sightings.size[0],
+            seen_height=sightings.size[1],
+        )
+    return sightings

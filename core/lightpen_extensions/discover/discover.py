@@ -1,0 +1,348 @@
+"""Tip, pen and camera from one swing about a fixed point.
+
+The steps: spots are followed (`tracks`), a part of the swing is solved for every mirror
+and focal length (`hypotheses`), all images are labelled by it (`labelling`), the LEDs
+are numbered and scaled by a known length (`numbering`, `scale`), and the calibration of
+a tip that `lightpen.estimation` does adjusts everything, with priors that leave all but
+the length to the images.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.observations import Observations
+from lightpen.detection.pose import MIN_POSE_LEDS
+from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import EXACT_SIGMA
+from lightpen.errors import CalibrationError
+from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import ConeSeparation
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.uncertainty.second_cone import SecondSwing
+from lightpen.intrinsics.distortion import Choice
+from lightpen.measuring.artefacts import Artefact, ArtefactKind
+from lightpen.model.ellipse import centers_from_centroids
+from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.rigid import fit_rigid
+from lightpen.verification.tasks.artefact import measure_artefacts
+from lightpen.verification.tasks.task import Conditions
+from lightpen_extensions.discover.found import Discovery, discovery_of
+from lightpen_extensions.discover.hypotheses import (
+    Hypothesis,
+    require_one_focal_length,
+    solve_seed,
+)
+from lightpen_extensions.discover.labelling import Labelled, label, pixels_of
+from lightpen_extensions.discover.numbering import number_by_sketch
+from lightpen_extensions.discover.request import Request
+from lightpen_extensions.discover.requirements import (
+    SECOND_PEN,
+    contradicting_distance,
+    require_certain,
+    require_distance,
+    require_enough,
+    require_length,
+    require_no_second_pen,
+    require_one_camera,
+    require_sketched,
+)
+from lightpen_extensions.discover.scale import (
+    CONTRADICTING,
+    SHAPE,
+    MeasuredLength,
+    known_lengths,
+    with_lengths_known,
+)
+from lightpen_extensions.discover.scaled_start import (
+    RELATIVE,
+    adjust_halves,
+    numbered,
+    scaled_start,
+)
+from lightpen_extensions.discover.sightings import Report, Sightings
+from lightpen_extensions.discover.starts import any_covariance, scaled_to
+from lightpen_extensions.discover.tracks import (
+    Pieces,
+    find_lamps,
+    follow,
+    without_lamps,
+)
+
+NOT_SETTLED = (
+    "bundle.not-settled",
+    "joint.not-settled",
+    "calibrate.files-disagree",
+    "calibrate.leds-do-not-fit",
+    "calibrate.leds-do-not-fit-nor-tip",
+)
+SAME_CONE = 0.02  # of the largest distance of two LEDs, between two cones
+SLIPPED = 0.03  # of the images, that are left out after a slip
+
+
+@dataclass(frozen=True, eq=False)
+class _Swing:
+    """A swing with its spots labelled."""
+
+    sightings: Sightings
+    centers: tuple[FloatArray, ...]  # spots that are no lamps, px
+    kept: tuple[IntArray, ...]  # (S,) each, their numbers in the sightings
+    pieces: Pieces
+    found: Labelled
+    hypotheses: tuple[Hypothesis, ...]
+    n_lamps: int
+
+    @property
+    def numbers(self) -> IntArray:
+        """Spot of each LED in the sightings, with lamps, (N, L); -1 without one."""
+        own = self.found.spots.copy()
+        for row, numbers in zip(own, self.kept, strict=True):
+            row[row >= 0] = numbers[row[row >= 0]]
+        return own
+
+
+def discover(
+    sightings: Sightings, request: Request, report: Report = lambda fraction: None
+) -> Discovery:
+    """Find tip, pen and camera.
+
+    ``sightings`` are of one swing with the tip in the cone, in time order. ``report``
+    is called with the fraction done; an exception from it stops the computation. Raises
+    `CalibrationError` if the images do not determine them.
+    """
+    swing = _labelled_swing(sightings, request, report)
+    swing = replace(swing, found=numbered(swing.found, request))
+    report(0.5)
+    if request.touched is not None:
+        free = replace(request, lengths=(), touched=None)
+        request = with_touched_length(request, _adjusted(swing, free))
+    return _adjusted(swing, request, report)
+
+
+def _adjusted(
+    swing: _Swing,
+    request: Request,
+    report: Report = lambda fraction: None,
+    *,
+    is_cleared: bool = False,
+) -> Discovery:
+    """Return tip, pen and camera by a swing with numbered LEDs.
+
+    Where many images are left out, as after a slip, all is begun anew without them:
+    they have shifted the start, which gives the lens model and the normal of the discs.
+    """
+    sightings = swing.sightings
+    pixels = pixels_of(swing.found.spots, swing.centers)
+    scaled = start, lengths, choice = scaled_start(request, swing.found, pixels)
+    if request.sketch is not None and request.lengths:
+        require_sketched(lengths, request.sketch)
+    halves = partial(adjust_halves, scaled, pixels[swing.found.images])
+    try:
+        require_one_camera(halves(request.camera))
+    except CalibrationError as error:
+        if request.camera is None:
+            raise
+        require_one_camera(halves(None))
+        raise CalibrationError("discover.other-camera") from error
+    report(0.6)
+    second = None
+    if request.second is not None:
+        start, second = _with_second(start, request, report)
+        lengths = lengths if request.lengths else ()
+    observations = _labelled_observations(
+        sightings, start, swing.found.images, swing.numbers
+    )
+    start = replace(start, pen=with_lengths_known(start.pen, lengths))
+    try:
+        if second is not None and lengths:
+            stated = second.separation
+            unknown = ConeSeparation(stated.distance, stated.distance)
+            free = replace(second, separation=unknown)
+            without = _calibrated(start, choice, request, observations, free)
+            require_distance(without, stated, lengths)
+        calibration = _calibrated(start, choice, request, observations, second)
+    except CalibrationError as error:
+        if error.message.code not in NOT_SETTLED:
+            raise
+        if request.camera is not None:
+            raise CalibrationError("discover.other-camera") from error
+        if second is None:
+            require_one_focal_length(swing.pieces, sightings.size, request.camera)
+            raise CalibrationError("discover.not-settled") from error
+        distance = second.separation.distance
+        raise CalibrationError(
+            "discover.cones-not-settled", distance=distance
+        ) from error
+    fits = calibration.used[swing.found.images]
+    if not is_cleared and np.mean(~fits) > SLIPPED:
+        cleared = replace(swing, found=_of_images(swing.found, fits))
+        return _adjusted(cleared, request, report, is_cleared=True)
+    is_off = not all(each.of_pen for each in calibration.contradictions)
+    if (
+        request.camera is not None
+        and is_off
+        and np.mean(calibration.used) < 1 - SLIPPED
+    ):
+        raise CalibrationError("discover.other-camera")
+    require_length(calibration, request, lengths)
+    report(0.95)
+    discovery = discovery_of(
+        *(calibration, choice, lengths, request.rough_leds, second),
+        is_relative=request.is_relative,
+    )
+    try:
+        require_certain(discovery, sightings)
+    except CalibrationError:  # perhaps because the focal length changed
+        require_one_focal_length(swing.pieces, sightings.size, request.camera)
+        raise
+    return replace(discovery, hypotheses=swing.hypotheses, n_lamps=swing.n_lamps)
+
+
+def _labelled_swing(sightings: Sightings, request: Request, report: Report) -> _Swing:
+    """Return a swing with its spots labelled, LEDs in any order."""
+    require_enough(sightings)
+    width = sightings.size[0]
+    centers = sightings.centers
+    kept = tuple(np.arange(len(each)) for each in centers)
+    certain, joined = follow(centers, width)
+    lamps = find_lamps(joined)
+    if len(lamps):
+        centers, kept = without_lamps(centers, lamps)
+        certain, joined = follow(centers, width)
+    report(0.2)
+    seed = solve_seed(joined, sightings.size, request.camera)
+    report(0.4)
+    found = label(seed, certain, centers, width)
+    require_no_second_pen(found)
+    if np.median(found.unexplained.sum(axis=1)) >= SECOND_PEN:
+        require_one_focal_length(joined, sightings.size, request.camera)
+    return _Swing(sightings, centers, kept, joined, found, seed.hypotheses, len(lamps))
+
+
+def _of_images(found: Labelled, some: BoolArray) -> Labelled:
+    """Return the labelling with some of the images that have a rotation."""
+    state = replace(found.state, rotations=found.state.rotations[some])
+    return replace(found, state=state, images=found.images[some])
+
+
+def with_touched_length(request: Request, relative: Discovery) -> Request:
+    """Return a request with the distance of two LEDs by the touched length.
+
+    The touches measure that length in the unit of the relative result. The ratio to the
+    certified length is the scale, and so the distance of the LEDs farthest apart.
+    Raises `CalibrationError` if the touches are not of two ends, or a known length
+    contradicts theirs.
+    """
+    touched = request.touched
+    assert touched is not None
+    instrument = relative.calibration.instrument
+    runs = [("--touched", touched.touches(instrument))]
+    unknown = [Artefact(ArtefactKind.LENGTH, 0.0)]
+    (found,) = measure_artefacts("", unknown, runs, Conditions(instrument)).part.results
+    measured = found.value.value
+    known, certified = relative.lengths[0], touched.separation
+    length = known.length * certified.distance / measured
+    own = found.value.uncertainty / COVERAGE_FACTOR / measured
+    sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
+    for each in known_lengths(request.lengths, relative.pen.leds):
+        implied = measured * each.length / each.between(relative.pen.leds)
+        relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
+        by_chance = np.hypot(implied * relative_sigma, certified.sigma)
+        if abs(implied - certified.distance) > CONTRADICTING * by_chance:
+            raise contradicting_distance(certified.distance, implied, each)
+    by_touches = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
+    return replace(request, lengths=(*request.lengths, by_touches))
+
+
+def _with_second(
+    start: BundleState, request: Request, report: Report
+) -> tuple[BundleState, SecondSwing]:
+    """Return a start with the scale by two cones, and the second swing in its frame."""
+    assert request.second is not None
+    separation, sightings = request.second.separation, request.second.sightings
+    swing = _labelled_swing(sightings, request, lambda done: report(0.6 + 0.3 * done))
+    state = swing.found.state
+    order = number_by_sketch(state.pen.leds, start.pen.leds)
+    leds = state.pen.leds[order]
+    leds_there = start.pen.leds - start.pen.leds.mean(axis=0)
+    ratio = np.linalg.norm(leds_there) / np.linalg.norm(leds - leds.mean(axis=0))
+    R, _ = fit_rigid(ratio * leds, start.pen.leds)
+    cone = ratio * state.cone_rig
+    factor = 1.0
+    if not request.lengths:
+        apart = float(np.linalg.norm(cone - start.cone_rig))
+        if apart < SAME_CONE * RELATIVE:
+            raise CalibrationError("discover.one-cone")
+        factor = separation.distance / apart
+    start = scaled_to(start, factor)
+    start = replace(start, pen=replace(start.pen, diameter=request.diameter))
+    there = replace(start, cone_rig=factor * cone, rotations=state.rotations @ R.T)
+    swing = replace(
+        swing, found=replace(swing.found, spots=swing.found.spots[:, order])
+    )
+    observations = _labelled_observations(
+        sightings, there, swing.found.images, swing.numbers
+    )
+    return start, SecondSwing(observations, separation)
+
+
+def _labelled_observations(
+    sightings: Sightings, start: BundleState, images: IntArray, spots: IntArray
+) -> Observations:
+    """Return the labelled observations; ``spots`` (N, L) are numbers in sightings."""
+    n_images, n_leds = spots.shape
+    pixels = pixels_of(spots, sightings.centers)
+    areas = np.full((n_images, n_leds), np.nan)
+    if sightings.shapes is not None and sightings.areas is not None:
+        shapes = np.full((n_images, n_leds, 2, 2), np.nan)
+        for i, j in zip(*np.nonzero(spots >= 0), strict=True):
+            shapes[i, j] = sightings.shapes[i][spots[i, j]]
+            areas[i, j] = sightings.areas[i][spots[i, j]]
+        pixels = centers_from_centroids(start.rig.cameras[0], pixels, shapes)
+    rotations = np.full((n_images, 3, 3), np.nan)
+    rotations[images] = start.rotations
+    translations = start.cone_rig - rotations @ start.tip_pen
+    widths = sightings.edge_widths
+    return Observations(
+        names=sightings.names,
+        pixels=pixels,
+        seen_pixels=pixels,
+        areas=areas,
+        sigmas=np.where(np.isfinite(pixels[..., 0]), EXACT_SIGMA, np.nan),
+        rotations=rotations,
+        translations=translations,
+        edge_widths=np.full(n_images, np.nan) if widths is None else widths,
+        lamps=np.zeros((n_images, 0, 2)),
+        reasons=tuple(
+            _reason(int((row >= 0).sum()), bool(np.isfinite(R[0, 0])))
+            for row, R in zip(spots, rotations, strict=True)
+        ),
+        details=(None,) * n_images,
+    )
+
+
+def _reason(n_seen: int, has_rotation: bool) -> Reason:
+    if not has_rotation:
+        return Reason.NOT_THE_PEN
+    return Reason.NONE if n_seen >= MIN_POSE_LEDS else Reason.TOO_FEW_LEDS
+
+
+def _calibrated(
+    start: BundleState,
+    choice: Choice | None,
+    request: Request,
+    observations: Observations,
+    second: SecondSwing | None,
+) -> Calibration:
+    """Return the calibration.
+
+    The camera is read from a file, or starts with a wide covariance.
+    """
+    pen, camera = start.pen, start.rig.cameras[0]
+    if choice is None:  # the camera is known
+        camera = request.camera or camera
+        return calibrate(camera, pen, observations, second=second)
+    of_any = replace(camera, covariance=any_covariance(camera))
+    return calibrate(of_any, pen, observations, second=second)
