@@ -22,7 +22,7 @@ from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
 from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
-from lightpen.archive.chains.growth import adopt_entries, append, own_chain
+from lightpen.archive.chains.growth import append, copy_entries, own_chain
 from lightpen.archive.chains.signatures import entry_signature
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
@@ -114,7 +114,7 @@ def _fill(database: Database, chain: str) -> None:
             signature = entry_signature(head, event, entry.sha256)
             entries.append(replace(entry, signature=signature))
             head = ChainHead(chain, n + 1, entry.sha256, entry.entry.since)
-        adopt_entries(database, chain, entries, records)
+        copy_entries(database, chain, entries, records)
 
 
 def _milliseconds(acts: Iterable[Callable[[], object]]) -> list[float]:

@@ -39,6 +39,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import sha256
 from lightpen.formats.own_json import CHECKSUM, with_checksum
 from lightpen.model.limits import StationLimits, SwingLimits
+from lightpen.record.library import entered_files
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.signing.chain_keys import entry_text
@@ -122,7 +123,10 @@ def station(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stat
     shutil.copytree(made, tmp_path / "plant")
     monkeypatch.setenv(KEYS, str(tmp_path / "plant" / "keys"))
     folders = (tmp_path / "plant" / name for name in ("data", "backup", "other"))
-    return Station(*folders)
+    station = Station(*folders)
+    assert state_of(station.data) == BEFORE  # the account knows it at this place
+    monkeypatch.setattr(entered_files, "_readings", {})  # another program then
+    return station
 
 
 def appended(file: Path, entries: str) -> None:
@@ -221,6 +225,17 @@ def other_chain(station: Station) -> None:
         put(name, name, of="other")(station)
 
 
+def other_folder(station: Station) -> None:
+    """Let the whole folder be that of another station."""
+    shutil.rmtree(station.data)
+    shutil.copytree(station.other, station.data)
+
+
+def other_folder_behind_a_link(station: Station) -> None:
+    station.data.rename(station.data.with_name("real"))
+    station.data.symlink_to(station.other, target_is_directory=True)
+
+
 def as_link(station: Station) -> None:
     """Reach the folder by a link, without its limits."""
     remove("limits")(station)
@@ -270,6 +285,9 @@ FORGED: dict[str, Callable[[Station], None]] = {
         put("library", "library", of="backup"),
     ),
     "the archive and its results are another station's": other_chain,
+    "the folder is another station's": other_folder,
+    "the folder leads to another station's": other_folder_behind_a_link,
+    "the archive is removed with the name of its chain": remove(ARCHIVE, STATION_FILE),
     "the archive is not one": lambda station: sql(
         station.data, "DROP TABLE archive_entries"
     ),
@@ -399,17 +417,6 @@ def test_what_is_hidden_is_found(station: Station, attack: str) -> None:
     FOUND[attack](station)
     started(station.data)
     assert findings(station.data)
-
-
-def test_an_archive_that_is_removed_with_the_name_of_its_chain_brings_nothing_back(
-    station: Station,
-) -> None:
-    """A folder begun anew has nothing in force, and says which chain it has."""
-    remove(ARCHIVE, STATION_FILE)(station)
-    started(station.data)
-    assert FolderArchive(station.data).in_force("LP-04", "T-10") is None
-    assert read_library(station.data).tips == {}
-    assert not read_supervision(station.data).is_guarded
 
 
 def test_a_result_that_a_backup_accepts_in_another_account_counts_nowhere_else(

@@ -95,11 +95,6 @@ def entry_of_result(database: Database, chain: str, place: str) -> StoredEntry |
     return None if row is None else read_row(database, row)
 
 
-def entries_of_limits(database: Database, chain: str) -> tuple[StoredEntry, ...]:
-    """Return the entries of limits of a chain, the oldest first."""
-    return read_entries(database, of_limits(chain))
-
-
 def is_swing_entered(database: Database, chain: str, place: str) -> bool:
     """Return whether a swing was entered; if its result was revoked, it was not."""
     last = (

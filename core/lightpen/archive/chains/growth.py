@@ -36,7 +36,7 @@ from lightpen.archive.store.tables import CHAIN_WRITERS, ENTRIES, RECORDS
 from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.own_json import DamagedError
 from lightpen.messages import Message, message
-from lightpen.record.library.entered_files import require_remembered
+from lightpen.record.library.entered_files import require_own, require_remembered
 from lightpen.record.library.signing.account import remember_head
 from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
 from lightpen.record.library.signing.station import station_name
@@ -69,7 +69,7 @@ def append(
     with database.writing() as connection:
         if _is_entered(connection, chain, event):
             return None
-        _require_remembered(connection, chain, database.name)
+        _require_remembered(connection, chain, database)
         head = head_in(connection, chain)
         entry = chained(head, event)
         signature = entry_signature(head, event, entry.sha256)
@@ -82,55 +82,47 @@ def append(
 
 
 def copy_entries(
-    server: Database,
+    database: Database,
     chain: str,
     entries: Iterable[StoredEntry],
     records: Mapping[str, str],
 ) -> int:
-    """Let the copy on a server grow by entries, in their order; return how many.
+    """Let a chain grow by entries from elsewhere, in their order; return how many.
 
-    Those that another program delivered meanwhile are passed. Raises `ArchiveError` if
-    they do not continue the copy, or are not signed by the station of the chain.
+    It is the copy on a server, or the own chain in a file that lost them. Those that
+    are there are passed. Raises `ArchiveError` if they do not continue the chain, or
+    are not signed by its station.
     """
-    known_chain = select(CHAIN_WRITERS.c.chain).where(CHAIN_WRITERS.c.chain == chain)
-    with server.writing() as connection:
-        connection.execute(select(func.pg_advisory_xact_lock(int(chain[:15], 16))))
+    with database.writing() as connection:
+        if database.file is None:
+            _begin_on_server(connection, chain)
         head = head_in(connection, chain)
-        if head.number == 0 and connection.execute(known_chain).first() is None:
-            connection.execute(insert(CHAIN_WRITERS).values(chain=chain))
         new = [each for each in entries if each.entry.number > head.number]
+        if new and database.file and chain_in(connection) not in (None, chain):
+            raise ArchiveError(_forked(new[0]))
         _require_next(head, new)
         if new:
             _require_signed(connection, chain, new)
         _keep_records(connection, _named(new, records))
         _put(connection, new)
+    if new and database.file:
+        remember_head(chain, new[-1].entry.number, new[-1].sha256)
     return len(new)
 
 
-def adopt_entries(
-    database: Database,
-    chain: str,
-    entries: Sequence[StoredEntry],
-    records: Mapping[str, str],
-) -> None:
-    """Let the own chain here grow by entries that this folder lost.
-
-    Raises `ArchiveError` if they do not continue the chain, are not signed by its
-    station, or the own chain is another one.
-    """
-    with database.writing() as connection:
-        if chain_in(connection) not in (None, chain):
-            raise ArchiveError(_forked(entries[0]))
-        _require_next(head_in(connection, chain), list(entries))
-        _require_signed(connection, chain, entries)
-        _keep_records(connection, _named(entries, records))
-        _put(connection, entries)
-    remember_head(chain, entries[-1].entry.number, entries[-1].sha256)
+def _begin_on_server(connection: Connection, chain: str) -> None:
+    """Begin a copy that is not there; no other program writes to it meanwhile."""
+    connection.execute(select(func.pg_advisory_xact_lock(int(chain[:15], 16))))
+    known = select(CHAIN_WRITERS.c.chain).where(CHAIN_WRITERS.c.chain == chain)
+    if connection.execute(known).first() is None:
+        connection.execute(insert(CHAIN_WRITERS).values(chain=chain))
 
 
-def _require_remembered(connection: Connection, chain: str, name: str) -> None:
+def _require_remembered(connection: Connection, chain: str, database: Database) -> None:
+    assert database.file is not None
     try:
-        require_remembered(name, chain, partial(hash_in, connection, chain))
+        require_own(database.file.parent, chain)
+        require_remembered(database.name, chain, partial(hash_in, connection, chain))
     except FileError as error:
         raise ArchiveError(error.message) from error
 

@@ -61,9 +61,11 @@ def check_archive(
         else:
             stages.append(iter([message("archive.other-chain", chain=chain[:SHORT])]))
     stages += [_changed_records(database), _lost_records(database)]
-    findings = tuple(each for stage in stages for each in _findings(stage))
-    notes = () if data is None else tuple(_findings(check_notes(database, data)))
-    return ArchiveCheckResult(n_entries, files.n_files, findings, notes)
+    found = [each for stage in stages for each in _findings(stage)]
+    findings = tuple(each for each in found if each.code != UNAPPROVED)
+    notes = [each for each in found if each.code == UNAPPROVED]
+    notes += [] if data is None else _findings(check_notes(database, data))
+    return ArchiveCheckResult(n_entries, files.n_files, findings, tuple(notes))
 
 
 def check_file(archive: Path, data: Path, report: Report) -> ArchiveCheckResult:
@@ -119,7 +121,7 @@ def _walked(
 ) -> Iterator[Message]:
     """Check a chain from its first entry to its last, and yield the findings.
 
-    Entries added meanwhile are checked as well.
+    A key that nobody approved is among them. Entries added meanwhile are checked.
     """
     number, previous, keys = 0, NOTHING_BEFORE, ChainKeys(chain)
     while rows := _rows_after(database, chain, number):
@@ -141,7 +143,7 @@ def _walked(
             else:
                 sound.append(entry)
                 unsigned = signature_finding(keys, entry)
-                if unsigned is not None and unsigned.code != UNAPPROVED:
+                if unsigned is not None:
                     yield unsigned
             number, previous = row.number, row.sha256
         yield from files.findings(sound)

@@ -7,18 +7,12 @@ computer. Neither proves a change.
 from collections.abc import Iterator
 from pathlib import Path
 
-from lightpen.archive.chains.chains import (
-    chain_at_home,
-    entries_of_limits,
-    entry_of_result,
-)
+from lightpen.archive.chains.chains import chain_at_home, entry_of_result
 from lightpen.archive.chains.entries import SHORT
-from lightpen.archive.chains.signatures import signature_finding
 from lightpen.archive.events.station_events import station_files
 from lightpen.archive.store.database import Database
 from lightpen.messages import Message, message, printable
 from lightpen.record.library.signing.account import owed_files, remembered_head
-from lightpen.record.library.signing.chain_keys import UNAPPROVED, ChainKeys
 from lightpen.record.library.signing.keys import station_key
 from lightpen.record.library.tip_library import library_files
 from lightpen.record.results.result_folder import FolderArchive
@@ -27,11 +21,10 @@ from lightpen.record.results.result_folder import FolderArchive
 def check_notes(database: Database, data: Path) -> Iterator[Message]:
     """Yield notes on the archive of a data folder.
 
-    Files without entries, and keys that are not known or that nobody approved.
+    A chain that is not known here, and files without entries.
     """
     home = chain_at_home(database)
     if home is not None:
-        yield from _unapproved_keys(database, home)
         yield from _unknown_here(home)
         yield from _not_entered(database, data, home)
 
@@ -39,14 +32,6 @@ def check_notes(database: Database, data: Path) -> Iterator[Message]:
 def _unknown_here(home: str) -> Iterator[Message]:
     if station_key(home) is None and remembered_head(home) is None:
         yield message("archive.unknown-here", chain=home[:SHORT])
-
-
-def _unapproved_keys(database: Database, chain: str) -> Iterator[Message]:
-    keys = ChainKeys(chain)
-    for entry in entries_of_limits(database, chain):
-        finding = signature_finding(keys, entry)
-        if finding is not None and finding.code == UNAPPROVED:
-            yield finding
 
 
 def _not_entered(database: Database, data: Path, home: str) -> Iterator[Message]:

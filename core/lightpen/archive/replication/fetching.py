@@ -18,7 +18,7 @@ from lightpen.archive.chains.chains import (
     records_of,
 )
 from lightpen.archive.chains.entries import SHORT, StoredEntry
-from lightpen.archive.chains.growth import adopt_entries
+from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.replication.comparison import first_difference
 from lightpen.archive.store.database import Database
 from lightpen.errors import ArchiveError, NameTakenError
@@ -58,7 +58,7 @@ def fetch(
         raise ArchiveError("archive.server-differs", number=number, chain=home[:SHORT])
     last = n_here
     while batch := batch_of(server, home, last):
-        adopt_entries(database, home, batch, records_of(server, batch))
+        copy_entries(database, home, batch, records_of(server, batch))
         last = batch[-1].entry.number
     n_files, lost = _restore_files(database, data, home)
     return FetchResult(last - n_here, n_files, lost)

@@ -35,10 +35,12 @@ from lightpen.record.library.signing.account import (
     is_approved,
     owe,
     owed_files,
+    remember_chain,
+    remembered_chain,
     remembered_head,
 )
 from lightpen.record.library.signing.chain_keys import LIMITS, UNAPPROVED, ChainKeys
-from lightpen.record.library.signing.keys import SigningKey, station_key
+from lightpen.record.library.signing.keys import SigningKey
 from lightpen.record.library.signing.station import known_station_name, station_name
 
 ARCHIVE = "archive.sqlite"
@@ -235,6 +237,8 @@ def entered_files(data: Path) -> EnteredFiles:
             *(data / ARCHIVE, found.chain),
             lambda number: hashes[number - 1] if number <= len(hashes) else None,
         )
+        if hashes and remembered_head(found.chain) is not None:
+            remember_chain(data, found.chain)
         return found
 
 
@@ -242,12 +246,12 @@ def _read(data: Path) -> _Reading:
     file = data / ARCHIVE
     try:
         if not file.is_file():
-            return _Reading(data, known_station_name(data))
+            return _not_begun(data)
         with closing(_connected(file)) as connection:
             chain = _chain_in(connection)
             if not chain:
-                return _Reading(data, known_station_name(data))
-            _require_own(data, chain)
+                return _not_begun(data)
+            require_own(data, chain)
             reading = _readings.get(data)
             if reading is None or not _is_continued(connection, reading, chain):
                 reading = _Reading(data, chain)
@@ -299,12 +303,20 @@ def _is_continued(
     return row is not None and row[0] == reading.hashes[-1]
 
 
-def _require_own(data: Path, chain: str) -> None:
-    """Refuse a chain unknown to this user account in place of one that is known."""
-    named = known_station_name(data)
-    is_known = remembered_head(chain) is not None or station_key(chain) is not None
-    if named not in ("", chain) and not is_known:
-        require_remembered(data / ARCHIVE, named, lambda number: None)
+def _not_begun(data: Path) -> _Reading:
+    chain = known_station_name(data)
+    require_own(data, chain)
+    return _Reading(data, chain)
+
+
+def require_own(data: Path, chain: str) -> None:
+    """Refuse another chain than the one that this user account remembers here.
+
+    ``station.pub`` names it as well, where the folder was moved.
+    """
+    for before in (remembered_chain(data), known_station_name(data)):
+        if before not in ("", chain):
+            require_remembered(data / ARCHIVE, before, lambda number: None)
 
 
 def require_remembered(

@@ -1,14 +1,17 @@
 """What a user account remembers of the archive of its station, beside the private keys.
 
 The last entry of its chain: so an archive that was removed or replaced by an older copy
-is found, whatever else was removed with it, and at whatever path. And the files that
+is found, whatever else was removed with it, and at whatever path. Which chain a data
+folder has: so another one in its place is found. And the files that
 the program is writing, until they are entered: after a power cut these are entered, and
 no others.
 """
 
 import logging
+import os
 from contextlib import suppress
 from hashlib import sha256
+from os.path import normcase
 from pathlib import Path
 from typing import TypeVar
 
@@ -36,6 +39,11 @@ class RememberedHead(Struct, frozen=True):
 
     number: int
     sha256: Digest
+
+
+class _Folder(Struct, frozen=True):
+    chain: str
+    path: str
 
 
 class OwedFile(Struct, frozen=True):
@@ -77,6 +85,22 @@ def remember_head(chain: str, number: int, digest: str) -> None:
         _logger.warning("the last entry is not remembered: %s", error)
 
 
+def remembered_chain(data: Path) -> str:
+    """Return the chain that a data folder had in this account; empty if not known."""
+    files = [file for file in _folder_files(data) if file.exists()]
+    return _read(files[0], _Folder).chain if files else ""
+
+
+def remember_chain(data: Path, chain: str) -> None:
+    """Remember the chain of a data folder, by its path as it is given and as it is."""
+    try:
+        for file in _folder_files(data):
+            if not file.exists() or _read(file, _Folder).chain != chain:
+                _write(file, _Folder(chain, str(data)))
+    except FileError as error:
+        _logger.warning("the chain of %s is not remembered: %s", data, error)
+
+
 def approval_of(key: SigningKey | None, chain: str, place: str, digest: str) -> str:
     """Return the signature by which a supervisor approves a file; empty without one."""
     return "" if key is None else key.sign(_approved(chain, place, digest))
@@ -106,6 +130,12 @@ def owed_files(chain: str) -> tuple[OwedFile, ...]:
 def forget_owed(chain: str, file: OwedFile) -> None:
     """Forget a file that was entered, or not written."""
     (_owed(chain) / f"{file.name}.json").unlink(missing_ok=True)
+
+
+def _folder_files(data: Path) -> list[Path]:
+    paths = {normcase(data.absolute()), normcase(data.resolve())}
+    names = (sha256(os.fsencode(path)).hexdigest()[:32] for path in sorted(paths))
+    return [key_folder() / f"folder-{name}.json" for name in names]
 
 
 def _owed(chain: str) -> Path:
