@@ -1,11 +1,14 @@
 """Tests of `lightpen measure`."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
 
 import pytest
+
+TOLERANCE = re.compile(r"tolerance: [0-9.]+")
 
 Run = Callable[..., CompletedProcess[str]]
 PLAN = """\
@@ -64,6 +67,38 @@ def test_recorded_touches_are_measured_by_a_plan(
     lightpen(*words)
     again = json.loads(json_file.read_bytes())
     assert again["features"] == json.loads(first)["features"]
+
+
+@pytest.mark.parametrize(
+    ("options", "rule", "is_open"),
+    [
+        ((), "simple acceptance", False),
+        (("--decision-rule", "guard-band"), "guard band", True),
+        (("--decision-rule", "risk", "--max-risk", "10"), "at most 10 %", True),
+    ],
+)
+def test_a_plan_without_a_rule_is_judged_by_the_one_given(
+    shared_data: Path,
+    lightpen: Run,
+    plan: Path,
+    files: list[str | Path],
+    tmp_path: Path,
+    options: tuple[str, ...],
+    rule: str,
+    is_open: bool,
+) -> None:
+    narrow = TOLERANCE.sub("tolerance: 0.0005", PLAN)  # U is larger
+    plan.write_text(narrow, encoding="utf-8")
+    json_file = tmp_path / "part.json"
+
+    words = ("measure", plan, shared_data / "circle", *files, "--json", json_file)
+    outcome = lightpen(*words, *options)
+
+    assert rule in outcome.stdout
+    record = json.loads(json_file.read_bytes())
+    decisions = {each["decision"] for each in record["characteristics"]}
+    assert ("open" in decisions) == is_open
+    assert rule in record["verdict"]["decision_rule"]
 
 
 @pytest.mark.parametrize(

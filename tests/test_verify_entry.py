@@ -20,7 +20,6 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import StationLimits, VerificationLimits
-from lightpen.record.folder.verifications import read_verification
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits
@@ -89,14 +88,14 @@ def entered(data: Path) -> list[Event]:
 def test_a_verification_of_an_accepted_tip_is_entered_beside_it(
     verify: Verify, lightpen: Run, tmp_path: Path
 ) -> None:
-    outcome = verify("--operator", "Bob", "--json", tmp_path / "point.json")
+    outcome = verify("--json", tmp_path / "point.json")
 
     assert outcome.returncode == 0, outcome.stderr
     assert "Entered in the archive: " in outcome.stdout
     data = tmp_path / "data"
     accepted, verified = entered(data)
     assert (accepted.kind, verified.kind) == ("accepted", "verification")
-    assert verified.names == Names("Hall 2", "Bob", "LP-04", "T-10")
+    assert verified.names == Names("Hall 2", "Ann", "LP-04", "T-10")
     assert (verified.origin, verified.grade) == ("simulated", "pass")
     assert verified.outcome == "accepted"
     assert verified.settings["verified"] == "fixed point"
@@ -104,25 +103,6 @@ def test_a_verification_of_an_accepted_tip_is_entered_beside_it(
     assert kept.read_bytes() == (tmp_path / "point.json").read_bytes()
     checked = lightpen("archive", "check", "--data", data)
     assert "No change was found: 2 entries, 2 files." in checked.stdout
-
-
-def test_conditions_that_are_given_are_in_the_record(
-    verify: Verify, tmp_path: Path
-) -> None:
-    verify("--pen-temperature", "23.4", "--humidity", "41")
-
-    kept = tmp_path / "data" / "simulated" / "verifications" / "000001.json"
-    done = read_verification(kept.read_bytes(), kept)
-    assert (done.temperature_c, done.humidity_percent) == (23.4, 41.0)
-    assert len(done.camera_serials) == 1
-
-
-def test_conditions_out_of_range_are_refused(verify: Verify) -> None:
-    for option, number in (("--pen-temperature", "500"), ("--humidity", "101")):
-        outcome = verify(option, number)
-
-        assert outcome.returncode == 2
-        assert option in outcome.stderr
 
 
 def test_images_of_the_calibration_verify_no_tip(

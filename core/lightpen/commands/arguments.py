@@ -147,17 +147,20 @@ def use_window(options: argparse.Namespace) -> None:
     note(message("cli.window-written", file=options.camera))
 
 
-def add_camera_and_pen(parser: argparse.ArgumentParser) -> None:
+def add_camera_and_pen(
+    parser: argparse.ArgumentParser, *, states_pen: bool = True
+) -> None:
     """Add ``--camera`` and ``--pen``, both required, and the options of the pen."""
     add_camera(parser, "intrinsics file of the camera", is_required=True)
     parser.add_argument(
         "--pen", type=Path, required=True, metavar="FILE", help="LED file of the pen"
     )
-    add_pen_options(parser)
+    if states_pen:
+        add_pen_options(parser)
 
 
 def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> None:
-    """Add ``--camera`` or ``--rig``, ``--pen``, and the options of the pen."""
+    """Add ``--camera`` or ``--rig``, and ``--pen``."""
     add_camera(parser, "intrinsics file of the camera")
     parser.add_argument(
         "--rig",
@@ -167,7 +170,6 @@ def add_cameras_and_pen(parser: argparse.ArgumentParser, rig_images: str) -> Non
         f"{rig_images}",
     )
     parser.add_argument("--pen", type=Path, metavar="FILE", help="LED file of the pen")
-    add_pen_options(parser)
 
 
 def add_pen_options(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,7 @@ from lightpen.commands.arguments import (
     add_cameras_and_pen,
     add_conditions,
     add_json,
+    add_pen_options,
     finite,
     number_from,
 )
@@ -46,6 +47,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     add_cameras_and_pen(
         parser, "give IMAGES (or FILE.csv) once per camera, in the order of this file"
     )
+    add_pen_options(parser)
     add_bits(parser)
     parser.add_argument(
         "--fps",

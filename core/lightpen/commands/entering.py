@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from lightpen.commands.arguments import add_conditions, chosen_limits
+from lightpen.commands.arguments import chosen_limits
 from lightpen.commands.console import shown, write_record
 from lightpen.errors import UsageError
 from lightpen.local_time import local_now
@@ -21,10 +21,7 @@ from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
-from lightpen.verification.storage.verification_files import (
-    conditions_entries,
-    keep_verification,
-)
+from lightpen.verification.storage.verification_files import keep_verification
 
 
 def add_entering(parser: argparse.ArgumentParser) -> None:
@@ -40,12 +37,6 @@ def add_entering(parser: argparse.ArgumentParser) -> None:
     place.add_argument(
         "--no-entry", action="store_true", help="do not enter the result in an archive"
     )
-    parser.add_argument(
-        "--operator",
-        metavar="NAME",
-        help="operator of the entry (default: of the result)",
-    )
-    add_conditions(parser)
 
 
 def limits_in_force(
@@ -100,12 +91,10 @@ def keep_record(
     is_simulated = Origin.SIMULATED in (origin, own)
     if is_simulated:
         origin = Origin.SIMULATED
-    if options.operator is not None:
-        names = replace(names, operator=options.operator)
-    record = {
-        **attributed(record, names, origin or own),
-        **conditions_entries(options.pen_temperature, options.humidity),
-    }
+    operator = record.get("operator")  # of recorded images
+    if operator:
+        names = replace(names, operator=operator)
+    record = attributed(record, names, origin or own)
     if options.json is not None:
         write_record(options.json, record)
     data = _data_of_entry(options, tip)

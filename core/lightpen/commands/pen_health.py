@@ -27,6 +27,7 @@ from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.local_time import local_now
 from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.calibrations.recomputing import recompute
 from lightpen.record.calibrations.tip_bending import keep_bending
@@ -94,7 +95,7 @@ def _add_swings(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT.json",
         help="calibrations with this pen, in any order",
     )
-    add_camera_and_pen(parser)
+    add_camera_and_pen(parser, states_pen=False)
 
 
 @printing
@@ -102,7 +103,7 @@ def _verify_pen(options: argparse.Namespace) -> int:
     files = [*options.results, options.camera, options.pen]
     require_other_file(options.json, *files)
     swings = _swings(options)
-    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    pen = _pen(options, swings[0])
     found = examine_pen(swings, read_camera(options.camera), pen.leds)
     print(shown(pen_health_text(found)))
     record = verification_record(
@@ -123,7 +124,7 @@ def _improve_pen(options: argparse.Namespace) -> None:
             if path is not None and out is not None and are_same(path, out):
                 raise UsageError("cli.out-over-input", out=out)
     swings = _swings(options)
-    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    pen = _pen(options, swings[0])
     camera = read_camera(options.camera)
     scale = None if options.length is None else read_scale(options.length)
     found = improve_pen(
@@ -134,6 +135,12 @@ def _improve_pen(options: argparse.Namespace) -> None:
         write_camera(found.camera, options.out_camera)
     print(shown(improved_pen_text(found)))
     print(shown(f"The new LED file is {options.out}."))
+
+
+def _pen(options: argparse.Namespace, swing: CalibrationFile) -> Pen:
+    """Read the LED file, with what a calibration states where it does not."""
+    stated = swing.calibration.inputs
+    return read_pen(options.pen, stated.units, stated.led_diameter_mm, None)
 
 
 def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
@@ -206,8 +213,7 @@ def _keep_bending(
         return
     if light.origin is Origin.SIMULATED:
         return
-    operator = options.operator or names.operator
     signature = supervisor_signature(options.supervisor)
-    by = Author(names.station, operator, "press test", signature)
+    by = Author(names.station, names.operator, "press test", signature)
     keep_bending(data, names.tip, bending, by, now)
     print(shown(f"Stored with tip {names.tip}, due {bending.due}."))

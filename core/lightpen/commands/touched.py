@@ -35,6 +35,7 @@ from lightpen.verification.probing.drift_reference import LampDrift, lamp_drift_
 from lightpen.verification.probing.image_locations import (
     ImageLocation,
     PenCameras,
+    RecordedConditions,
     RecordedTouch,
     read_viewers,
     touch_place,
@@ -56,6 +57,7 @@ from lightpen.verification.probing.sources import (
 from lightpen.verification.reports.records import verification_record
 from lightpen.verification.storage.verification_files import (
     camera_serials,
+    conditions_entries,
     viewer_entries,
 )
 from lightpen.verification.tasks.assessment import VerificationAssessment
@@ -120,6 +122,7 @@ class MeasuredRuns:
     viewers: PenCameras
     pen_file: Path
     lamp_drift: LampDrift | None
+    recorded: RecordedConditions | None  # if the images are of a record
 
     @property
     def instrument(self) -> Instrument:
@@ -167,6 +170,7 @@ class MeasuredRuns:
             {
                 "camera_serials": camera_serials(self.instrument),
                 "remarks": list(self.instrument.remarks),
+                **self._conditions(),
                 **entries,
                 "rejected": rejected_entries(self.rejected),
                 "witness": lamp_drift_entries(self.lamp_drift),
@@ -179,6 +183,16 @@ class MeasuredRuns:
             self._input_entries(options),
             rule,
         )
+
+    def _conditions(self) -> dict[str, Any]:
+        """Return operator and environment as far as the images state them."""
+        if self.recorded is None:
+            return {}
+        now = self.recorded.conditions
+        return {
+            "operator": self.recorded.operator,
+            **conditions_entries(now.temperature_c, now.humidity_percent),
+        }
 
     def _input_entries(self, options: argparse.Namespace) -> dict[str, Any]:
         """Return the files that were read."""
@@ -219,11 +233,12 @@ def measure_runs(
     viewers = given or (found[0].viewers if found else None)
     if viewers is None:
         raise lacking("--camera or --rig")
-    pen, pen_file = _pen(options, found)
+    pen, pen_file = _pen(options, calibration, found)
     files = tuple(file for place in found for file in place.files)
     files += tuple(centers)
     require_other_file(options.json, *files)
-    temperature_c: float | None = getattr(options, "pen_temperature", None)
+    recorded = next((each.recorded for each in found if each.recorded), None)
+    temperature_c = None if recorded is None else recorded.conditions.temperature_c
     bending = bending_of(calibration, getattr(options, "data", None))
     instrument = instrument_of(
         calibration, viewers, pen, pen_file, temperature_c, bending
@@ -253,6 +268,7 @@ def measure_runs(
         viewers=viewers,
         pen_file=pen_file,
         lamp_drift=lamp_drift,
+        recorded=recorded,
     )
 
 
@@ -319,10 +335,14 @@ def _runs_of(
 
 
 def _pen(
-    options: argparse.Namespace, places: Sequence[ImageLocation]
+    options: argparse.Namespace,
+    calibration: CalibrationFile,
+    places: Sequence[ImageLocation],
 ) -> tuple[Pen, Path]:
+    """Return the pen, with what its calibration states where its file does not."""
     if options.pen is not None:
-        pen = read_pen(options.pen, options.units, options.led_diameter, None)
+        stated = calibration.calibration.inputs
+        pen = read_pen(options.pen, stated.units, stated.led_diameter_mm, None)
         return pen, options.pen
     place = places[0] if places else None
     if place is None or place.pen is None or place.pen_file is None:

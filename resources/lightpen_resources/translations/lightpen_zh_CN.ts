@@ -1957,8 +1957,8 @@
         <translation>U (k = 2) / mm</translation>
     </message>
     <message>
-        <source>Verify the tip on reference artefacts within minutes.</source>
-        <translation>几分钟内用标准器验证测头。</translation>
+        <source>Half a minute: leave the tip in the cone and lean the pen to six sides.</source>
+        <translation>半分钟：测头留在锥孔里，将光笔向六个方向倾斜。</translation>
     </message>
     <message>
         <source>Verify tip</source>
@@ -4047,6 +4047,10 @@ needed</source>
         <translation>重新摆动</translation>
     </message>
     <message>
+        <source>Half a minute: leave the tip in the cone and lean the pen to six sides.</source>
+        <translation>半分钟：测头留在锥孔里，将光笔向六个方向倾斜。</translation>
+    </message>
+    <message>
         <source>This result needs checking. Enter the reason for accepting it.</source>
         <translation>该结果需检查。请填写接受理由。</translation>
     </message>
@@ -4065,10 +4069,6 @@ needed</source>
     <message>
         <source>Verify tip</source>
         <translation>验证测头</translation>
-    </message>
-    <message>
-        <source>Verify the tip on reference artefacts within minutes.</source>
-        <translation>几分钟内用标准器验证测头。</translation>
     </message>
     <message>
         <source>Revoke acceptance...</source>

@@ -313,9 +313,13 @@ def test_the_images_of_touches_say_which_touch_they_are_of(trace: Trace) -> None
     trace.workflow.undo()
     trace.touch(leant(4)[2])
     (run,) = (trace.folder / SIMULATED / VERIFICATIONS / TOUCHES).iterdir()
-    touches = touch_place((str(run),)).touches
+    place = touch_place((str(run),))
+    touches, recorded = place.touches, place.recorded
     trace.workflow.shut_down()
     assert touches is not None
+    assert recorded is not None
+    assert recorded.operator == trace.prepared.names.operator
+    assert recorded.conditions == trace.prepared.assumptions_today
 
     # A touch that is taken back counts no more; its number is not given again.
     assert [each.number for each in touches] == [1, 1, 1, 0, 0, 0, 3, 3, 3]

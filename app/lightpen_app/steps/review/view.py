@@ -153,7 +153,9 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.verify.setText(self.tr("Verify tip"))
         set_tooltip(
             self.verify,
-            self.tr("Verify the tip on reference artefacts within minutes."),
+            self.tr(
+                "Half a minute: leave the tip in the cone and lean the pen to six sides."
+            ),
         )
         self.take_back.setText(self.tr("Revoke acceptance..."))
         set_tooltip(

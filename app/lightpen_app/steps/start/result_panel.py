@@ -146,7 +146,9 @@ class LastResultPanel(Translated, QGroupBox):
 
     def set_why_unverified(self, why_not: str) -> None:
         """Disable verification with a reason, or enable it."""
-        tooltip = self.tr("Verify the tip on reference artefacts within minutes.")
+        tooltip = self.tr(
+            "Half a minute: leave the tip in the cone and lean the pen to six sides."
+        )
         self._verify.set_why_not(why_not, tooltip)
 
     def words(self) -> tuple[str, ...]:

@@ -14,10 +14,12 @@ from lightpen.formats.hashes import InputFile, all_hashed
 from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.messages import printable
+from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
+from lightpen.record.swings.assumed import recorded_assumptions
 from lightpen.record.swings.reading import (
     Record,
     is_record,
@@ -49,6 +51,14 @@ class RecordedTouch:
     approach_cam: FloatArray | None
 
 
+@dataclass(frozen=True)
+class RecordedConditions:
+    """Who took images of a record, and in what environment."""
+
+    operator: str
+    conditions: Assumptions
+
+
 @dataclass(frozen=True, eq=False)
 class ImageLocation:
     """Images of touches, and the files that they bring if they are a record's."""
@@ -61,6 +71,7 @@ class ImageLocation:
     pen_file: Path | None = None
     masks: tuple[FloatArray | None, ...] = (None,)  # (M, 3), stray light, px
     touches: tuple[RecordedTouch, ...] | None = None
+    recorded: RecordedConditions | None = None
 
     def of_bits(self, bits: int | None) -> "ImageLocation":
         """Return the place with images of so many bits; see `ImageSource.of_bits`."""
@@ -109,6 +120,9 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> ImageLocation
             pen_file=own.pen_file,
             masks=own.masks,
             touches=_recorded_touches(record),
+            recorded=RecordedConditions(
+                record.header.operator, recorded_assumptions(record.header.settings)
+            ),
         )
     is_simulated = is_simulated_recording(where[0])
     origin = Origin.SIMULATED if is_simulated else Origin.RECORDED
