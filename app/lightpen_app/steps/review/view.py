@@ -154,7 +154,8 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         set_tooltip(
             self.verify,
             self.tr(
-                "Half a minute: leave the tip in the cone and lean the pen to six sides."
+                "Half a minute: leave the tip in the cone and lean the pen to six "
+                "sides."
             ),
         )
         self.take_back.setText(self.tr("Revoke acceptance..."))
