@@ -26,7 +26,6 @@ from lightpen.intrinsics.changes import (
     rotated_message,
 )
 from lightpen.intrinsics.distortion import (
-    FEW,
     Choice,
     choose_distortion,
     fit_camera,
@@ -34,7 +33,7 @@ from lightpen.intrinsics.distortion import (
 )
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.effects import MixedFit, fit_effects
-from lightpen.intrinsics.start import start_board_poses, start_camera
+from lightpen.intrinsics.start import start_any_camera, start_board_poses
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
@@ -108,7 +107,7 @@ def calibrate_camera(
     """
     require_views(views)
     given = views
-    start = start_camera(views, FEW)
+    start = start_any_camera(views)
     views = _before(views, start)
     views = views.chosen(
         np.isfinite(start_board_poses(start, views).translations[:, 0])
@@ -139,7 +138,7 @@ def calibrate_camera(
         found = _calibrated(without_outliers(views, first), first, report)
     change = found.change
     if change is not None and change.is_clear:
-        if change.is_gradual or change.fewer.sum() >= FEWEST:
+        if change.fewer.sum() >= FEWEST:
             raise change_error(change, found.views.names)
         remarks.append(message_on_change(change, found.views.names))
         others = found.views.chosen(~change.fewer)

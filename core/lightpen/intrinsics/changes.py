@@ -1,7 +1,7 @@
 """Views of another setting of the camera, by what they say of views left out.
 
 Views are parted into two groups whose cameras differ by zoom and principal point: at
-some view in time, gradually, or in any order. Each view is predicted by the others,
+some view in time, or in any order. Each view is predicted by the others,
 once with one camera and once with two. A change counts as found where two cameras
 predict nearly all views better, by more than views without a change do by chance: the
 mean of the gains in the logarithm of the squares, over their root mean square, exceeds
@@ -43,27 +43,15 @@ class CameraChange:
     """A camera that changed while its views were taken."""
 
     ratio: float  # cross-validated error by one camera over that by two
-    # (V,), share of the change that each view has; 0 or 1 unless it is gradual.
-    share: FloatArray
+    is_second: BoolArray  # (V,), which views were taken after the change
     difference: FloatArray  # (4 + n,), of the intrinsics, after less before
     in_image: float  # difference of the projections of a point, px rms
     settings: tuple[Camera, Camera]
 
     @property
-    def is_gradual(self) -> bool:
-        """Whether the camera drifts."""
-        return not np.isin(self.share, (0.0, 1.0)).all()
-
-    @property
-    def is_step(self) -> bool:
-        """Whether all views of the second group come after those of the first."""
-        return not self.is_gradual and bool(np.all(np.diff(self.share) >= 0))
-
-    @property
     def fewer(self) -> BoolArray:
         """Mask of the views in the smaller group, (V,)."""
-        is_second = self.share > 0.5
-        return is_second if is_second.sum() <= len(self.share) / 2 else ~is_second
+        return min(self.is_second, ~self.is_second, key=np.count_nonzero)
 
     @property
     def is_clear(self) -> bool:
@@ -83,18 +71,16 @@ def find_change(fitted: BoardFit) -> CameraChange | None:
         return None
     order = np.arange(n_views)
     steps = [(order >= k).astype(np.float64) for k in range(LEAST_GROUP, n_views - 1)]
-    in_time = [min(steps, key=lambda share: views.fitted(share)[1])]
-    in_time.append(order / (n_views - 1) - 0.5)
-    in_groups = [_settled_groups(views, start) for start in views.starts()]
-    shares = in_time + in_groups
-    limits = [IN_TIME] * len(in_time) + [IN_GROUPS] * len(in_groups)
+    in_time = min(steps, key=lambda share: views.fitted(share)[1])
+    shares = [in_time, *(_settled_groups(views, start) for start in views.starts())]
+    limits = [IN_TIME] + [IN_GROUPS] * (len(shares) - 1)
     alone = views.held_out(np.zeros(n_views))
     errors = np.stack([views.held_out(share) for share in shares])
     gains = np.log(alone / errors)
     sizes = np.sqrt(np.mean(gains**2, axis=1))
     is_found = gains.mean(axis=1) > np.array(limits) * np.maximum(sizes, 1e-12)
     ratios = np.sqrt(alone.sum() / errors.sum(axis=1))
-    is_found[len(in_time) :] &= ratios[len(in_time) :] > MUCH
+    is_found[1:] &= ratios[1:] > MUCH
     if not is_found.any():
         return None
     best = int(np.argmin(np.where(is_found, errors.sum(axis=1), np.inf)))
@@ -108,7 +94,8 @@ def find_change(fitted: BoardFit) -> CameraChange | None:
         camera.with_intrinsics(before + change[:n]),
     )
     moved = moved_in_image(camera, change[:n])
-    return CameraChange(float(ratios[best]), shares[best], change[:n], moved, settings)
+    second = shares[best] > 0.5
+    return CameraChange(float(ratios[best]), second, change[:n], moved, settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,20 +243,20 @@ def _by_poses(views: Views, fitted: BoardFit) -> BoardFit:
 
 def change_error(change: CameraChange, names: tuple[str, ...]) -> CalibrationError:
     """Return the error of a change that no calibration can bridge."""
-    if change.is_gradual:
-        return CalibrationError(message_on_change(change, names))
-    is_second = change.share > 0.5
-    one, other = change.settings
-    before, after = (
-        _setting(names, which, camera)
-        for which, camera in ((~is_second, one), (is_second, other))
-    )
-    if change.is_step:
-        name = names[int(np.argmax(is_second))]
-        return CalibrationError(
-            "intrinsics.changed", name=name, before=before, after=after
+    one, other = (
+        message(
+            "intrinsics.setting",
+            fx=camera.fx,
+            cx=camera.cx,
+            cy=camera.cy,
+            n_views=int(which.sum()),
+            names=listed_names(_named(names, which)),
         )
-    return CalibrationError("intrinsics.two-settings", one=before, other=after)
+        for which, camera in zip(
+            (~change.is_second, change.is_second), change.settings, strict=True
+        )
+    )
+    return CalibrationError("intrinsics.two-settings", one=one, other=other)
 
 
 def rotated_message(names: tuple[str, ...], which: BoolArray) -> Message:
@@ -286,8 +273,6 @@ def rotated_message(names: tuple[str, ...], which: BoolArray) -> Message:
 def message_on_change(change: CameraChange, names: tuple[str, ...]) -> Message:
     """Return the message on a change that does not make the set useless."""
     fx, _, cx, cy, *_ = change.difference.tolist()
-    if change.is_gradual:
-        return message("intrinsics.drift", px=change.in_image, fx=fx, cx=cx, cy=cy)
     return message(
         "intrinsics.apart",
         names=listed_names(_named(names, change.fewer)),
@@ -310,19 +295,6 @@ def changed_camera(camera: Camera, change: CameraChange) -> Camera:
     if covariance is not None:
         covariance = covariance + added
     return replace(camera, covariance=covariance, lens_field=field)
-
-
-def _setting(names: tuple[str, ...], which: BoolArray, camera: Camera) -> Message:
-    """Return the intrinsics of some of the views, and the views' names."""
-    named = _named(names, which)
-    return message(
-        "intrinsics.setting",
-        fx=camera.fx,
-        cx=camera.cx,
-        cy=camera.cy,
-        n_views=len(named),
-        names=listed_names(named),
-    )
 
 
 def _named(names: tuple[str, ...], which: BoolArray) -> tuple[str, ...]:

@@ -16,8 +16,7 @@ from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import FINEST, adjust_board
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.effects import held_out_errors
-from lightpen.intrinsics.lens_conversion import convert_lens
-from lightpen.intrinsics.start import BoardPoses, start_board_poses
+from lightpen.intrinsics.start import BoardPoses, start_board_poses, start_camera
 from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
@@ -70,17 +69,19 @@ def choose_distortion(
     camera, errors = fitted.state.cameras[0], held_out_errors(views, fitted)
     n_first = n_best = len(camera.distortion)
     best, held_out = fitted, {n_first: rms_together(errors, views)}
-    others = []
-    if n_first == FISHEYE:
-        others += [FEW, MANY]
-    else:
-        others += [MANY] if _promises_more(views, fitted, errors) else []
-        others += [FISHEYE] if is_wide(camera, views.pixels[:, 0]) else []
+    models = (
+        (FEW, MANY, FISHEYE) if is_wide(camera, views.pixels[:, 0]) else (FEW, MANY)
+    )
+    others = [n for n in models if n != n_first]
     for done, n in enumerate(others, 1):
         report(0.4 + 0.4 * done / len(others))
         with suppress(CalibrationError):  # the views do not determine so many
-            trial = _trial(views, fitted, n)
-            if trial is None:
+            near = start_camera(views, n)
+            if (n_first, n) == (FEW, MANY):
+                more = np.append(camera.distortion, np.zeros(n - n_first))
+                near = replace(camera, distortion=more)
+            trial = fit_camera(views, near)
+            if trial.state.cameras[0].folded_share > camera.folded_share:
                 continue
             trial_errors = held_out_errors(views, trial)
             rms = held_out[n] = rms_together(trial_errors, views)
@@ -93,22 +94,6 @@ def choose_distortion(
                 n_best, best, errors = n, trial, trial_errors
     report(0.8)
     return Choice(n_best, held_out), best
-
-
-def _promises_more(views: Views, fitted: BoardFit, errors: FloatArray) -> bool:
-    """Return whether 3 more coefficients predict views better, to the first order."""
-    camera = _with_more(fitted.state.cameras[0])
-    n = len(fitted.prior)
-    at = np.r_[0 : 4 + FEW, 4 + MANY : n + MANY - FEW]
-    prior = np.zeros((n + MANY - FEW,) * 2)
-    prior[: 4 + MANY, : 4 + MANY] = usual_distortion(camera)
-    prior[np.ix_(at, at)] = fitted.prior
-    state = replace(fitted.state, cameras=(camera,))
-    try:
-        more = held_out_errors(views, replace(fitted, state=state, prior=prior))
-    except CalibrationError:  # the views do not determine so many
-        return False
-    return rms_together(more, views) < (1 - WORTH) * rms_together(errors, views)
 
 
 def is_significantly_less(
@@ -139,28 +124,6 @@ def is_wide(camera: Camera, pixels: FloatArray) -> bool:
     """
     off = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
     return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
-
-
-def _trial(views: Views, first: BoardFit, n_coefficients: int) -> BoardFit | None:
-    """Return the fit with another lens model, started from a fit.
-
-    None where there is no such lens, or it folds more of the image.
-    """
-    camera = first.state.cameras[0]
-    near: Camera | None = camera
-    if n_coefficients != MANY or camera.lens is not LensModel.BROWN:
-        near = convert_lens(camera, n_coefficients)
-    elif camera.lens is LensModel.BROWN:
-        near = _with_more(camera)
-    if near is None:
-        return None
-    trial = fit_camera(views, near)
-    return None if trial.state.cameras[0].folded_share > camera.folded_share else trial
-
-
-def _with_more(camera: Camera) -> Camera:
-    """Return a camera of Brown's model with 8 coefficients, the further ones 0."""
-    return replace(camera, distortion=np.append(camera.distortion, np.zeros(3)))
 
 
 def usual_distortion(camera: Camera) -> FloatArray:

@@ -3,8 +3,8 @@
 The residuals of a fit are linear in its unknowns, in the places of all points of the
 board (as in a calibration that releases the object [1]_), and in a smooth residual
 field of the lens over the image. The variances of noise, points and field follow from
-restricted maximum likelihood, by the fixed point of [2]_; fields of three lengths are
-averaged, weighted by the likelihood.
+restricted maximum likelihood, by the fixed point of [2]_, and so does which of five
+lengths the field has.
 
 What one view has to itself (blur, shadows, a board that gives way) makes its residuals
 depend on each other. The covariance therefore takes whole views as independent, and
@@ -38,7 +38,7 @@ from lightpen.intrinsics.board_fit import N_POSE, N_SHAPE, BoardFit
 from lightpen.intrinsics.views import Views
 from lightpen.model.lens_field import LensField
 
-LENGTHS = (0.3, 0.15, 0.6)  # of the field, in the image's longer side
+LENGTHS = (0.15, 0.21, 0.3, 0.42, 0.6)  # of the field, in the image's longer side
 LEAST = 1e-3  # of the noise: a component of no effect
 LEAST_FIELD = 0.3  # of the noise: an amplitude that may yet be
 FIRST = 0.2  # of the noise: start value of a component
@@ -46,8 +46,6 @@ MAX_ROUNDS = 20
 CONVERGED = 0.1  # of twice the logarithm of the likelihood
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
 LARGE = 4.0  # times the noise: a field beside which the fit is far off
-FINER = (2**0.5, 2**0.25)  # ratio of further lengths to one that is singled out
-SINGLED = 0.9  # of the likelihood, by one length
 SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
 
 
@@ -138,49 +136,28 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
 
 
 def _from(views: Views, fitted: BoardFit) -> MixedFit:
-    plain = _design_of(views, fitted)
-    found, weights, best = _by_lengths(plain, views, fitted)
+    plain, longer = _design_of(views, fitted), max(views.image_sizes[0])
+    found = (
+        _most_likely(_with_field(plain, views, fitted, share * longer))
+        for share in LENGTHS
+    )
+    best = min(found, key=lambda each: each.deviance)
     without = _solved(plain, best.components)
-    n, all_x = plain.n_fit, np.stack([each.x[: plain.n_plain] for each in found])
-    x = weights @ all_x
-    off = all_x[:, :n] - x[:n]
     held_out, robust = _robust(best)
     prior = best.design.prior(best.components)
-    total = best.covariance @ prior @ best.covariance + robust
+    total, n = best.covariance @ prior @ best.covariance + robust, plain.n_fit
     field = None
     if without.deviance - best.deviance > SIGNIFICANT:
         field = _field(best, total, fitted)
+    x = best.x[: plain.n_plain]
     adjustment = _moved(views, fitted, x, best.components.noise, field)
-    adjustment = replace(adjustment, covariance=total[:n, :n] + weights * off.T @ off)
-    squares = np.square(held_out).sum(axis=1) / views.seen.sum(axis=(1, 2))
     return MixedFit(
-        adjustment, best.components, robust[:n, :n], field, np.sqrt(squares)
+        replace(adjustment, covariance=total[:n, :n]),
+        best.components,
+        robust[:n, :n],
+        field,
+        _of_views(views, held_out),
     )
-
-
-def _by_lengths(
-    plain: _Design, views: Views, fitted: BoardFit
-) -> tuple[list[_Solution], FloatArray, _Solution]:
-    """Return solutions by lengths of the field, their weights, and the likeliest one.
-
-    Further ones lie about a length that the likelihood singles out.
-    """
-    found: list[_Solution] = []
-    longer, near = max(views.image_sizes[0]), None
-    lengths = [each * longer for each in LENGTHS]
-    for ratio in (*FINER, 1.0):
-        for length in lengths:
-            design = _with_field(plain, views, fitted, length)
-            found.append(_most_likely(design, near))
-        deviances = np.array([each.deviance for each in found])
-        weights = np.exp(-0.5 * (deviances - deviances.min()))
-        weights /= weights.sum()
-        best = found[int(np.argmin(deviances))]
-        if weights.max() < SINGLED or best.design.field is None:
-            break
-        near, length = best.components, best.design.field.length
-        lengths = [length * ratio, length / ratio]
-    return found, weights, best
 
 
 def held_out_errors(views: Views, fitted: BoardFit) -> FloatArray:
@@ -189,8 +166,12 @@ def held_out_errors(views: Views, fitted: BoardFit) -> FloatArray:
     The points of the board are free, as they add the same error to every lens model.
     """
     design = _design_of(views, fitted)
-    held_out, _ = _robust(_most_likely(design))
-    squares = np.square(held_out).sum(axis=1) / views.seen.sum(axis=(1, 2))
+    return _of_views(views, _robust(_most_likely(design))[0])
+
+
+def _of_views(views: Views, residuals: FloatArray) -> FloatArray:
+    """Return residuals (V, 2 N) as of each view, (V,), px rms."""
+    squares = np.square(residuals).sum(axis=1) / views.seen.sum(axis=(1, 2))
     return np.asarray(np.sqrt(squares))
 
 
@@ -258,11 +239,11 @@ def _without_poses(projector: FloatArray, columns: FloatArray) -> FloatArray:
     return np.asarray(columns - projector @ explained)
 
 
-def _most_likely(design: _Design, near: VarianceComponents | None = None) -> _Solution:
+def _most_likely(design: _Design) -> _Solution:
     """Return the solution by the most likely components."""
     noise = max(np.sqrt(design.squares / max(design.n, 1)), 1e-6)
     mm = FIRST * noise * design.mm
-    components = near or VarianceComponents(noise, mm, mm, FIRST * noise)
+    components = VarianceComponents(noise, mm, mm, FIRST * noise)
     before = np.inf
     for _ in range(MAX_ROUNDS):
         solution = _solved(design, components)

@@ -41,22 +41,25 @@ class BoardPoses(NamedTuple):
         return BoardPoses(self.rotations[which], self.translations[which])
 
 
-def start_camera(views: Views, n_coefficients: int) -> Camera:
-    """Return a camera that the views of one camera are near to.
+def start_any_camera(views: Views) -> Camera:
+    """Return a pinhole camera that the views of one camera are near to, or a fisheye.
 
-    It has no distortion, or the one of an equidistant fisheye if rows of points are
-    straighter with it.
+    That is taken if rows of points are straighter with it.
     """
-    pinhole = _start_pinhole(views, n_coefficients)
+    pinhole, fisheye = start_camera(views, 5), start_camera(views, N_COEFFICIENTS)
     bend = _bend(pinhole, views)
-    if bend < STRAIGHT * max(views.image_sizes[0]):
-        return pinhole
-    fisheye = _start_fisheye(views)
-    return fisheye if _bend(fisheye, views) < STRAIGHTER * bend else pinhole
+    is_straight = bend < STRAIGHT * max(views.image_sizes[0])
+    is_fisheye = not is_straight and _bend(fisheye, views) < STRAIGHTER * bend
+    return fisheye if is_fisheye else pinhole
 
 
-def _start_fisheye(views: Views) -> Camera:
-    """Return the equidistant camera in which the board is flattest."""
+def start_camera(views: Views, n_coefficients: int) -> Camera:
+    """Return a camera without distortion that the views are near to.
+
+    The equidistant camera in which the board is flattest, if it is to be a fisheye.
+    """
+    if n_coefficients != N_COEFFICIENTS:
+        return _start_pinhole(views, n_coefficients)
     width, height = views.image_sizes[0]
     cameras = [
         Camera(

@@ -21,9 +21,9 @@ from lightpen.intrinsics.distortion import (
     is_significantly_less,
     is_wide,
 )
-from lightpen.intrinsics.lens_conversion import convert_lens
 from lightpen.model.camera import Camera
 from lightpen.model.rig import rig_of
+from lightpen_extensions.discover.lens_conversion import convert_lens
 from lightpen_extensions.discover.starts import (
     CameraPrior,
     KnownLength,

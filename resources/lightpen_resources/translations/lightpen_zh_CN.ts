@@ -6306,6 +6306,10 @@ needed</source>
         <translation>改正以下一项后图像与文件相符：{causes}。</translation>
     </message>
     <message>
+        <source>The images are from two cameras, or were taken with two settings of zoom or focus: {one}; {other}. Use images of one camera, with zoom and focus locked.</source>
+        <translation>图像来自两台相机，或以两种变焦或对焦设置拍摄：{one}；{other}。请使用同一相机、锁定变焦和对焦后的图像。</translation>
+    </message>
+    <message>
         <source>The images are turned by 180 degrees against the intrinsics file: its principal point agrees with them only if they are turned back. Use images as the camera delivers them, or the intrinsics of the camera mounted like this.</source>
         <translation>图像相对于内参文件旋转了 180 度：只有转回来，文件中的主点才与图像相符。请使用相机原样输出的图像，或使用按此安装方式标定的相机内参。</translation>
     </message>
@@ -7244,14 +7248,6 @@ needed</source>
     <message>
         <source>Certified size / mm</source>
         <translation>证书尺寸 / mm</translation>
-    </message>
-    <message>
-        <source>The camera, zoom or focus changed at {name}: {before}; {after}. Lock zoom and focus, and take all views again.</source>
-        <translation>相机、变焦或对焦在 {name} 处改变：{before}；{after}。请锁定变焦和对焦，并重新拍摄所有视图。</translation>
-    </message>
-    <message>
-        <source>The images are from two cameras, or were taken with two settings of zoom or focus: {one}; {other}. Use images of one camera with one setting.</source>
-        <translation>图像来自两台相机，或以两种变焦或对焦设置拍摄：{one}；{other}。请使用同一相机、同一设置的图像。</translation>
     </message>
     <message>
         <source>The points of {run} are at more than two positions: point {number} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Probe only the two ends.</source>
@@ -8236,10 +8232,6 @@ needed</source>
     <message>
         <source>The camera changed during the swing: its focal length was {first:.0f} px first and {second:.0f} px later. Lock zoom, focus and image stabilisation, and repeat the swing.</source>
         <translation>相机在摆动期间发生了变化：焦距先为 {first:.0f} px，后为 {second:.0f} px。请锁定变焦、对焦和防抖，然后重新摆动。</translation>
-    </message>
-    <message>
-        <source>The camera drifts during the set: by {px:.2f} px over the image from the first view to the last (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px). Let the camera warm up, fix lens and mount, and take the views again.</source>
-        <translation>相机在拍摄期间漂移：从第一个视图到最后一个视图，图像上变化 {px:.2f} px（fx {fx:+.2f}，cx {cx:+.2f}，cy {cy:+.2f} px）。请让相机预热，固定镜头和支架，然后重新拍摄视图。</translation>
     </message>
     <message>
         <source>The intrinsics file belongs to camera {stated}; the camera in use is {used}. Give the file of this camera.</source>

@@ -95,7 +95,7 @@ def test_zoom_in_the_middle_of_a_set_is_refused_with_the_first_view_after_it(
     before = make_views(n_views=28)
     after = make_views(n_views=28, of=zoomed(camera, 1.01))
 
-    with pytest.raises(CalibrationError, match=r"changed at view_15\.png"):
+    with pytest.raises(CalibrationError, match=r"in 14 views \(view_15\.png"):
         calibrated(merged(before, after, np.arange(28) >= 14))
 
 
@@ -107,7 +107,7 @@ def test_a_small_change_is_a_finding_that_the_uncertainty_holds(
     after = make_views(n_views=24, of=replace(camera, cx=camera.cx + 3.0))
     found = calibrated(merged(before, after, np.arange(24) >= 12))
 
-    assert codes(found) & {"intrinsics.apart", "intrinsics.drift"}
+    assert "intrinsics.apart" in codes(found)
     # It may be as before or as after.
     assert expanded(found)[2] > 0.8 * 3.0
 
@@ -127,10 +127,7 @@ def test_two_cameras_in_one_set_are_named_as_such(
 
     with pytest.raises(CalibrationError) as caught:
         calibrated(mixed)
-    assert caught.value.message.code in (
-        "intrinsics.two-settings",
-        "intrinsics.changed",
-    )
+    assert caught.value.message.code == "intrinsics.two-settings"
     first = tuple(np.array(mixed.names)[which])[:3]
     assert ", ".join(first) in str(caught.value)
 
@@ -164,7 +161,7 @@ def test_a_drift_is_refused(make_views: MakeViews, camera: Camera) -> None:
     shots = [make_views(n_views=20, of=zoomed(camera, 1 + by)).pixels for by in SLOWLY]
     pixels = np.stack([shot[v] for v, shot in enumerate(shots)])
 
-    with pytest.raises(CalibrationError, match=r"drifts during the set|changed at"):
+    with pytest.raises(CalibrationError, match="two settings"):
         calibrated(replace(make_views(n_views=20), pixels=pixels))
 
 
@@ -216,4 +213,4 @@ def test_a_bowed_or_curled_board_is_calibrated_with(
 def test_no_set_as_photographed_is_said_to_be_of_two_settings() -> None:
     for seed in range(6):
         found = calibrated(board_trials.photographed(seed))
-        assert not codes(found) & {"intrinsics.apart", "intrinsics.drift"}
+        assert "intrinsics.apart" not in codes(found)

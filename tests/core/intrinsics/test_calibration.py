@@ -57,8 +57,8 @@ def test_eight_coefficients_are_taken_where_the_lens_needs_them(
     make_views: MakeViews,
 ) -> None:
     lens = Camera(
-        *(640, 480, 420.0, 420.0, 320.0, 240.0),
-        distortion=np.array([1.2, 0.6, 2e-3, -1e-3, 0.05, 1.6, 1.1, 0.35]),
+        *(640, 480, 300.0, 300.0, 320.0, 240.0),
+        distortion=np.array([3.0, 1.6, 2e-3, -1e-3, 0.05, 3.4, 2.4, 0.35]),
     )
     views = make_views(of=lens, n_views=24)
     fitted = fit_camera(views, start_camera(views, 5))

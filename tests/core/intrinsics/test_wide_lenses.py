@@ -20,12 +20,12 @@ from lightpen.intrinsics.distortion import (
     choose_distortion,
     fit_camera,
 )
-from lightpen.intrinsics.lens_conversion import convert_lens
-from lightpen.intrinsics.start import start_camera
+from lightpen.intrinsics.start import start_any_camera
 from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.rigid import rotation_from_vector, skew
+from lightpen_extensions.discover.lens_conversion import convert_lens
 
 NOISE = 0.04  # px
 WIDE = Camera(
@@ -129,7 +129,7 @@ def test_a_round_image_is_uncertain_only_where_it_shows_something() -> None:
 
 
 def test_a_fisheye_is_begun_with_where_rows_are_straighter_by_it() -> None:
-    start = start_camera(held_before(WIDE, 12, 3), 5)
+    start = start_any_camera(held_before(WIDE, 12, 3))
 
     assert start.lens is LensModel.KANNALA_BRANDT
     assert start.fx == pytest.approx(WIDE.fx, rel=0.3)
