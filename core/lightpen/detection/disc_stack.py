@@ -2,11 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import TypeAlias
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from cv2.typing import MatLike
 
 from lightpen.arrays import FloatArray, Image
@@ -19,7 +17,7 @@ from lightpen.detection.disc_moments import (
     window_levels,
     with_start,
 )
-from lightpen.detection.pixel_box import PixelBox
+from lightpen.detection.pixel_box import PixelBox, Reals, stacked
 from lightpen.detection.region_moments import HIGH, LOW, DiscMoments, moments_by_sums
 
 LOW_SIGMAS = 3.5  # the noise of the background stays below `low`
@@ -29,8 +27,6 @@ MIN_RAMP = 0.2  # least high - low, fraction of the contrast
 MIN_SIGMAS = 6.0  # least contrast in terms of the noise
 MARGIN = 5  # px around a box: the foot of the rim and some background
 ALIKE = 2  # times the smallest of a stack, at most, is its largest box
-
-Reals: TypeAlias = npt.NDArray[np.float32]
 
 
 def measure_discs(
@@ -92,8 +88,8 @@ def _measured(
 ) -> list[Disc | None]:
     """Measure the discs in boxes grown by a share of their size, one over a number."""
     frames = [box.grown(MARGIN + box.size // margin, image.shape) for box in boxes]
-    windows = [image[f.top : f.bottom, f.left : f.right] for f in frames]
-    light = _stack(windows)
+    windows = [frame.of(image) for frame in frames]
+    light = stacked(windows)
     levels = np.array([window_levels(window, level) for window in windows])
     background, plateau = levels[:, 0], levels[:, 1]
     contrast = np.maximum(plateau - background, 1)
@@ -145,16 +141,6 @@ def _measured(
             disc = with_start(disc, soft[k], frames[k], float(ramp[k]), noise)
         found[k] = disc
     return found
-
-
-def _stack(windows: Sequence[Image]) -> Reals:
-    """Return windows as one array, dark beside and below each, which parts them."""
-    height = 1 + max(window.shape[0] for window in windows)
-    width = 1 + max(window.shape[1] for window in windows)
-    stack = np.zeros((len(windows), height, width), np.float32)
-    for slot, window in zip(stack, windows, strict=True):
-        slot[: window.shape[0], : window.shape[1]] = window
-    return stack
 
 
 def _regions(

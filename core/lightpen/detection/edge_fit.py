@@ -26,9 +26,11 @@ References
 from collections.abc import Sequence
 from functools import lru_cache
 from math import ceil, log, pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+from numpy.lib.stride_tricks import as_strided
 
 from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.model.quantiles import normal_quantile
@@ -141,6 +143,8 @@ def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]
     blur. A disc that is not found from its fit in the previous image is searched
     without it.
     """
+    if image.strides[1] != image.itemsize or image.strides[0] < 0:
+        image = image.copy()
     found: list[EdgeFit | None] = [None] * len(starts)
     known = [i for i, start in enumerate(starts) if start.sigma is not None]
     if known:
@@ -311,10 +315,14 @@ def _profiles(image: Image, rays: _Rays, s: FloatArray) -> FloatArray:
     column, row = x.astype(np.int32), y.astype(np.int32)
     x -= column
     y -= row
-    flat, at = image.reshape(-1), row.astype(np.intp) * width + column
+    # A window of an image is not one piece of memory; to copy it takes as long as this.
+    pitch = image.strides[0] // image.itemsize
+    size = (height - 1) * pitch + width
+    flat: npt.NDArray[Any] = as_strided(image, (size,), (image.itemsize,))
+    at = row.astype(np.intp) * pitch + column
     above, right = flat.take(at).astype(np.float32), flat.take(at + 1)
     above += (right - above) * x
-    at += width
+    at += pitch
     below, right = flat.take(at).astype(np.float32), flat.take(at + 1)
     below += (right - below) * x
     above += (below - above) * y

@@ -1,9 +1,16 @@
 """Rectangles of pixels."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 import cv2
+import numpy as np
+import numpy.typing as npt
 from cv2.typing import MatLike
+
+from lightpen.arrays import Image
+
+Reals: TypeAlias = npt.NDArray[np.float32]
 
 
 class PixelBox(NamedTuple):
@@ -23,6 +30,10 @@ class PixelBox(NamedTuple):
     def area(self) -> int:
         """Number of pixels."""
         return (self.right - self.left) * (self.bottom - self.top)
+
+    def of(self, image: Image) -> Image:
+        """Return this part of an image."""
+        return image[self.top : self.bottom, self.left : self.right]
 
     def grown(self, margin: int, shape: tuple[int, ...]) -> "PixelBox":
         """Return the box with a margin, clipped to the image."""
@@ -64,3 +75,13 @@ def bounding_box(contour: MatLike, step: int = 1) -> PixelBox:
     return PixelBox(
         x * step, y * step, (x + width - 1) * step + 1, (y + height - 1) * step + 1
     )
+
+
+def stacked(windows: Sequence[Image]) -> Reals:
+    """Return windows as one array, dark beside and below each, which parts them."""
+    height = 1 + max(window.shape[0] for window in windows)
+    width = 1 + max(window.shape[1] for window in windows)
+    stack = np.zeros((len(windows), height, width), np.float32)
+    for slot, window in zip(stack, windows, strict=True):
+        slot[: window.shape[0], : window.shape[1]] = window
+    return stack
