@@ -16,11 +16,11 @@ from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.observing import observe_board
 from lightpen.intrinsics.report import intrinsics_record
-from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.intrinsics.views import Views
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
+from lightpen.model.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.record.folder.camera_calibrations import CameraTrial
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen_app.look.sentences import worded

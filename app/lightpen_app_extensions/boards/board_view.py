@@ -7,12 +7,11 @@ from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
 from typing_extensions import override
 
-from lightpen.arrays import FloatArray, IntArray
-from lightpen.intrinsics.uncertainty_map import UncertaintyMap
+from lightpen.arrays import FloatArray
+from lightpen.model.uncertainty_map import UncertaintyMap
 from lightpen_app.look.theme import DARK, TextSize, Tone, font
 from lightpen_app.widgets.image_view import ImageView
 
-EMPTY_OPACITY = 0.28  # of the parts in which nothing was seen yet
 POINT = 2.5  # px of the screen, radius
 FOOT = 1.5  # px of the screen, radius of an arrow's foot
 LONGEST_ARROW = 40.0  # px of the screen
@@ -27,8 +26,6 @@ class BoardOverlay:
     points: FloatArray | None = None  # (N, 2), of the board, px; NaN where not seen
     # (4, 2), where the board is wanted, px, from its first corner on
     outline: FloatArray | None = None
-    # (R, C), points seen in each part of the image; empty ones are filled
-    cells: IntArray | None = None
     # (M, 4), residuals: place and value, px; drawn enlarged
     arrows: FloatArray | None = None
     uncertainty: UncertaintyMap | None = None
@@ -59,25 +56,12 @@ class BoardView(ImageView):
         shown = self._overlay
         if shown.uncertainty is not None:
             self._draw_uncertainty(painter, shown.uncertainty)
-        if shown.cells is not None:
-            self._fill_empty(painter, shown.cells)
         if shown.outline is not None:
             self._draw_outline(painter, shown.outline)
         if shown.points is not None:
             self._draw_points(painter, shown.points)
         if shown.arrows is not None:
             self._draw_arrows(painter, shown.arrows)
-
-    def _fill_empty(self, painter: QPainter, cells: IntArray) -> None:
-        color = QColor(DARK.accent)
-        color.setAlphaF(EMPTY_OPACITY)
-        rows, columns = cells.shape
-        size = self.image_size()
-        width, height = size.width() / columns, size.height() / rows
-        for row, column in np.argwhere(cells == 0).tolist():
-            x, y = column * width - 0.5, row * height - 0.5
-            corners = self.place_of(x, y), self.place_of(x + width, y + height)
-            painter.fillRect(QRectF(*corners), color)
 
     def _draw_uncertainty(self, painter: QPainter, uncertainty: UncertaintyMap) -> None:
         """Colour the image by how uncertain a projection is, with numbers, px."""

@@ -12,7 +12,6 @@ from typing_extensions import override
 from lightpen.errors import UsageError
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS, CameraCalibration
-from lightpen.intrinsics.capture import cells_of
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
@@ -284,11 +283,11 @@ def _overlay(
     if state.capture is None:
         return BoardOverlay()
     points = state.capture.points if state.sought is not None else None
-    return BoardOverlay(points, state.outline, state.capture.cells)
+    return BoardOverlay(points, state.outline)
 
 
 def _residuals(found: CameraCalibration) -> BoardOverlay:
     seen = found.views.seen[:, 0]
     pixels, residuals = found.views.pixels[:, 0][seen], found.adjustment.residuals[:, 0]
     arrows = np.concatenate([pixels, residuals[seen]], axis=1)
-    return BoardOverlay(cells=cells_of(found.views), arrows=arrows)
+    return BoardOverlay(arrows=arrows)

@@ -6,8 +6,8 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.model.pen import DISC_DIAMETER
+from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_app.look.layouts import (
     fill,
     grid_layout,

@@ -18,10 +18,9 @@ MESSAGES = {
     "intrinsics.two-settings": "The images are from two cameras, or were taken with two settings of zoom or focus: {one}; {other}. Use images of one camera, with zoom and focus locked.",
     "intrinsics.apart": "{n_named} of {n_views} views ({names}) differ from the others by {px:.2f} px over the image (fx {fx:+.2f}, cx {cx:+.2f}, cy {cy:+.2f} px), more than by chance. Check whether zoom, focus or mount changed.",
     "intrinsics.folds": "The estimated distortion folds the image in its corners, where no view shows the board. Add views with the board in each corner of the image.",
-    "intrinsics.alike": "The views are too similar: the board tilt differs by at most {apart:.0f} degrees between views, and the focal length is uncertain by {share:.1%}. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.",
     "intrinsics.brown": "Brown's lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.",
     "intrinsics.fisheye": "Fisheye model (Kannala-Brandt); cross-validated error {held_out:.4f} px.",
-    "intrinsics.uncertain": "The projection is uncertain by {px:.1f} px over the image: the views do not determine the lens there. Add views with the board in each corner of the image.",
+    "intrinsics.uncertain": "The projection is uncertain by {px:.1f} px over the image: the views do not determine the camera. Add views with the board tilted by 20° to 40° to each side, and in each corner of the image.",
     "intrinsics.mirrored": "The images show the board {board} mirrored. Turn off mirroring of the camera, or print the board again.",
     "intrinsics.across": "No image shows the board {board}; the images show {other}, with columns and rows swapped. Specify that board.",
     "intrinsics.other-count": "No image shows a chessboard of {columns} x {rows} inner corners; the images show {seen_columns} x {seen_rows}. Count the inner corners of the whole board again.",
@@ -30,5 +29,4 @@ MESSAGES = {
     "pair.few": "Both cameras see the board in {n_pairs} views; at least {least} are needed. Add views in which both cameras see the whole board.",
     "pair.contradicting": "The views disagree on the pose of the second camera: {n_agree} of {n_pairs} agree. A camera was moved, or image pairs are not simultaneous. Check the names and order of the images.",
     "pair.other-lens": "The intrinsics file of {camera} contradicts the images of the board: residuals of {rms:.1f} px (RMS). The file is of another camera or zoom, or has a lens model that does not fit this lens, such as a plain one for a fisheye. Check it, or calibrate the cameras from these images.",
-    "pair.moved": "In {n_views} of {n_pairs} views the board positions seen by the two cameras differ by up to {rms:.2f} px. The board or a camera moved between the exposures. Hold the board still, or trigger both cameras by one signal.",
 }

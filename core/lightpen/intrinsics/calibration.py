@@ -34,11 +34,11 @@ from lightpen.intrinsics.distortion import (
 from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplicates
 from lightpen.intrinsics.effects import MixedFit, fit_effects
 from lightpen.intrinsics.start import start_any_camera, start_board_poses
-from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import Views
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
+from lightpen.model.uncertainty_map import map_uncertainty
 
 MIN_VIEWS = 5
 ENOUGH_VIEWS = 15
@@ -50,8 +50,6 @@ WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
 UNCERTAIN = 0.005  # of the image's longer side, of projections over the image
 FARTHEST = np.tan(np.radians(84.0))  # in the normalised plane
 MIN_POINTS = 6  # of a view
-LARGEST_FOCAL_SIGMA = 0.02  # relative
-LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,12 +153,12 @@ def _calibrated(
     fitted = fit_camera(views, near.state.cameras[0])
     report(0.2)
     choice, fitted = choose_distortion(views, fitted, report)
-    remarks = [*_message_on_alike(fitted)]
     effects = fit_effects(views, fitted)
     report(0.9)
     fit = effects.adjustment
-    remarks += [*_messages_on_lens(fit)]
-    return _Found(views, choice, effects, find_change(fit), tuple(remarks))
+    return _Found(
+        views, choice, effects, find_change(fit), tuple(_messages_on_lens(fit))
+    )
 
 
 def _result(
@@ -251,16 +249,3 @@ def _messages_on_lens(fitted: BoardFit) -> Iterator[Message]:
     px = map_uncertainty(camera, fitted.covariance[at, at]).typical
     if px > UNCERTAIN * max(camera.image_size):
         yield message("intrinsics.uncertain", px=px)
-
-
-def _message_on_alike(fitted: BoardFit) -> tuple[Message, ...]:
-    """Return the message on views that hardly determine the focal length."""
-    at = fitted.of_intrinsics(0).start
-    share = float(np.sqrt(fitted.covariance[at, at])) / fitted.state.cameras[0].fx
-    normals = fitted.state.poses.rotations[..., 2]
-    apart = float(np.arccos(np.clip(normals @ normals.T, -1, 1)).max())
-    if share < LARGEST_FOCAL_SIGMA and apart > LEAST_TILT:
-        return ()
-    return (
-        message("intrinsics.alike", apart=float(np.degrees(apart)), share=2 * share),
-    )

@@ -21,10 +21,10 @@ from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.distortion import fit_camera
 from lightpen.intrinsics.effects import held_out_errors
 from lightpen.intrinsics.start import start_board_poses
-from lightpen.intrinsics.uncertainty_map import moved_in_image
 from lightpen.intrinsics.views import Views, listed_names
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
+from lightpen.model.uncertainty_map import moved_in_image
 
 FEWEST = 4  # views of a group that a set is refused for
 LEAST_GROUP = 2

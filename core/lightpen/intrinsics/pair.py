@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
 from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
@@ -25,16 +25,14 @@ from lightpen.intrinsics.duplicates import message_on_duplicates, without_duplic
 from lightpen.intrinsics.effects import views_without_field
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.views import Views
-from lightpen.messages import Message, message
+from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig, of_camera
 from lightpen.model.rigid import vector_from_rotation
 
 MIN_PAIRS = 3
-MAX_VOTED = 60  # views that are compared with all
 ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view
 ALIKE_SHIFT = 0.15  # of its distance
-APART = 3.0  # times the noise of each camera alone
 SCALE_SIGMA = 1e-4  # of a board that was not measured, relative; no view tells it
 HELD = 1e20  # information of intrinsics that are not fitted again
 
@@ -115,8 +113,6 @@ def calibrate_pair(
     )
     held = tuple(HELD * np.eye(len(camera.intrinsics)) for camera in cameras)
     fitted = adjust_board(views, state, held)
-    usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
-    moved = _message_on_moved(fitted, usual)
     kept = without_outliers(views, fitted)
     if int(kept.seen.sum()) < int(views.seen.sum()):
         which = np.isin(views.names, kept.names)
@@ -142,7 +138,7 @@ def calibrate_pair(
         left_out=tuple(
             name for name in names_of_all if name not in (*views.names, *duplicates)
         ),
-        remarks=(*remarks, *moved),
+        remarks=tuple(remarks),
     )
 
 
@@ -222,9 +218,7 @@ def _ordered(
     ]
     rotations = np.stack([each.rotations[both] for each in places])
     translations = np.stack([each.translations[both] for each in places])
-    n_places = rotations.shape[1]
-    some = np.linspace(0, n_places - 1, min(n_places, MAX_VOTED)).astype(np.int64)
-    alike = _alike(rotations, translations, some)
+    alike = _alike(rotations, translations)
     votes = alike.any(axis=2).sum(axis=-1)
     order, view = divmod(int(np.argmax(votes)), votes.shape[1])
     if votes[order, view] <= both.sum() / 2:
@@ -233,10 +227,7 @@ def _ordered(
             n_agree=int(votes[order, view]),
             n_pairs=int(both.sum()),
         )
-    chosen = some[view]
-    found = BoardPoses(
-        rotations[order, chosen][None], translations[order, chosen][None]
-    )
+    found = BoardPoses(rotations[order, view][None], translations[order, view][None])
     choice = np.zeros(views.n_views, dtype=np.int64)
     choice[both] = np.argmax(alike[order, view], axis=0)
     pixels = np.stack([turned[k].pixels[v] for v, k in enumerate(choice.tolist())])
@@ -245,26 +236,11 @@ def _ordered(
     return replace(views, pixels=pixels).chosen(agree), found
 
 
-def _alike(
-    rotations: FloatArray, translations: FloatArray, some: IntArray
-) -> BoolArray:
-    """Tell which relative poses (K, V) agree with some (S,): (K, S, K, V)."""
-    between = np.einsum("kvij,lwmj->kvlwim", rotations[:, some], rotations)
+def _alike(rotations: FloatArray, translations: FloatArray) -> BoolArray:
+    """Tell which relative poses (K, V) agree with each: (K, V, K, V)."""
+    between = np.einsum("kvij,lwmj->kvlwim", rotations, rotations)
     turns = np.linalg.norm(vector_from_rotation(between), axis=-1)
-    ours = translations[:, some, None, None]
+    ours = translations[:, :, None, None]
     apart = np.linalg.norm(ours - translations, axis=-1)
     far = np.linalg.norm(ours, axis=-1)
     return np.asarray((turns < ALIKE_TURN) & (apart < ALIKE_SHIFT * far))
-
-
-def _message_on_moved(fitted: BoardFit, usual: float) -> tuple[Message, ...]:
-    """Return the message on views in which the cameras disagree.
-
-    ``usual`` are the residuals of a camera alone, px rms.
-    """
-    rms = np.nanmax(fitted.view_rms, axis=1)
-    n_apart = int(np.sum(rms > APART * usual))
-    if n_apart == 0:
-        return ()
-    largest = float(rms.max())
-    return (message("pair.moved", n_views=n_apart, n_pairs=len(rms), rms=largest),)

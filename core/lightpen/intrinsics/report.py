@@ -1,22 +1,22 @@
 """The calibration of one camera, or of two, as text and as a record."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, IntArray
+from lightpen.arrays import FloatArray
 from lightpen.intrinsics.board_fit import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.distortion import choice_record
 from lightpen.intrinsics.observing import ObservedBoard
 from lightpen.intrinsics.pair import PairCalibration
-from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.views import Views
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
+from lightpen.model.uncertainty_map import map_uncertainty
 
 COLUMNS, ROWS = 4, 3
 PINHOLE = ("fx", "fy", "cx", "cy")
@@ -30,35 +30,27 @@ SHAPE_NAMES = (
 TITLE = 13  # characters
 
 
-@dataclass(frozen=True, eq=False)
-class Regions:
-    """Residuals of one camera in 3 rows and 4 columns."""
+def residuals_by_region(views: Views, residuals: FloatArray) -> dict[str, Any]:
+    """Return points, rms and mean residuals of one camera in 3 rows and 4 columns, px.
 
-    n_points: IntArray  # (3, 4)
-    rms: FloatArray  # (3, 4), px; NaN without points
-    # (3, 4, 2), px; a lens that the model does not fit pulls its regions to some side.
-    means: FloatArray
+    NaN without points. A lens that the model does not fit pulls its regions to some
+    side. ``residuals`` (V, 1, N, 2) are NaN where a point was not seen.
+    """
+    seen = views.seen
+    share = views.pixels[seen] / np.array(views.image_sizes[0])
+    x, y = np.floor(share * np.array([COLUMNS, ROWS])).astype(np.int64).T
+    at = np.clip(y, 0, ROWS - 1) * COLUMNS + np.clip(x, 0, COLUMNS - 1)
+    left = residuals[seen]
 
+    def total(weights: FloatArray) -> FloatArray:
+        sums = np.bincount(at, weights, ROWS * COLUMNS).reshape(ROWS, COLUMNS)
+        return np.asarray(sums, dtype=np.float64)
 
-def measure_regions(fitted: BoardFit, camera: Camera) -> Regions:
-    """Return the residuals of a single camera by region."""
-    residuals = fitted.residuals[:, 0]
-    seen = np.isfinite(residuals[..., 0])
-    poses = fitted.state.poses
-    board = fitted.board_points
-    points = board @ np.swapaxes(poses.rotations, 1, 2) + poses.translations[:, None]
-    at = camera.project(points[seen]) / np.array(camera.image_size)
-    at = np.floor(at * np.array([COLUMNS, ROWS])).astype(np.int64)
-    column = np.clip(at[:, 0], 0, COLUMNS - 1)
-    row = np.clip(at[:, 1], 0, ROWS - 1)
-    n_points = np.zeros((ROWS, COLUMNS), dtype=np.int64)
-    sums = np.zeros((ROWS, COLUMNS, 2))
-    squares = np.zeros((ROWS, COLUMNS))
-    np.add.at(n_points, (row, column), 1)
-    np.add.at(sums, (row, column), residuals[seen])
-    np.add.at(squares, (row, column), np.square(residuals[seen]).sum(axis=-1))
-    counts = np.where(n_points > 0, n_points, np.nan)
-    return Regions(n_points, np.sqrt(squares / counts), sums / counts[..., None])
+    count = total(np.ones(len(at)))
+    with np.errstate(invalid="ignore"):
+        rms = np.sqrt(total(np.square(left).sum(axis=-1)) / count)
+        mean = np.stack([total(each) / count for each in left.T], axis=-1)
+    return {"points": count.astype(np.int64), "rms_px": rms, "mean_px": mean}
 
 
 def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> str:
@@ -103,7 +95,6 @@ def intrinsics_record(
     views, found = calibration.views, calibration.effects.components
     assert camera.covariance is not None
     uncertain = map_uncertainty(camera, camera.covariance)
-    regions = measure_regions(fitted, camera)
     field = calibration.effects.field
     return {
         "kind": "intrinsics",
@@ -124,11 +115,7 @@ def intrinsics_record(
             "pixels": uncertain.pixels,
             "standard_uncertainty_px": uncertain.sigmas,
         },
-        "residuals_by_region": {
-            "points": regions.n_points,
-            "rms_px": regions.rms,
-            "mean_px": regions.means,
-        },
+        "residuals_by_region": residuals_by_region(views, fitted.residuals),
         "board_found": _board_record(fitted),
         "views": [
             {

@@ -6354,6 +6354,10 @@ needed</source>
         <translation>程序处理该图像时出错（{kind}: {problem}）。请保留该图像并反馈此问题。</translation>
     </message>
     <message>
+        <source>The projection is uncertain by {px:.1f} px over the image: the views do not determine the camera. Add views with the board tilted by 20° to 40° to each side, and in each corner of the image.</source>
+        <translation>整幅图像的投影不确定度为 {px:.1f} px：各视图不足以确定相机。请补拍标定板向各侧倾斜 20° 至 40° 以及位于图像各角的视图。</translation>
+    </message>
+    <message>
         <source>The record of {entry} is missing.</source>
         <translation>{entry}的标定数据缺失。</translation>
     </message>
@@ -7048,10 +7052,6 @@ needed</source>
     <message>
         <source>The video {path} has more than {most} frames. Cut out the swing, or save its frames as images.</source>
         <translation>视频 {path} 超过 {most} 帧。请截取摆动部分，或将各帧另存为图像。</translation>
-    </message>
-    <message>
-        <source>The views are too similar: the board tilt differs by at most {apart:.0f} degrees between views, and the focal length is uncertain by {share:.1%}. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
-        <translation>视图过于相似：各视图间标定板倾斜最多相差 {apart:.0f} 度，焦距不确定度为 {share:.1%}。请增加标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
     </message>
     <message>
         <source>The views do not determine the camera: they are too similar. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
@@ -7800,10 +7800,6 @@ needed</source>
     <message>
         <source>Images rejected: {n_dropped}. Press the tip into the cone again.</source>
         <translation>已舍去 {n_dropped} 幅图像。请将测头重新压入锥孔。</translation>
-    </message>
-    <message>
-        <source>In {n_views} of {n_pairs} views the board positions seen by the two cameras differ by up to {rms:.2f} px. The board or a camera moved between the exposures. Hold the board still, or trigger both cameras by one signal.</source>
-        <translation>{n_pairs} 组视图中有 {n_views} 组，两台相机所见标定板位置最大相差 {rms:.2f} px。两次曝光之间标定板或相机移动了。请保持静止，或用同一信号触发两台相机。</translation>
     </message>
     <message>
         <source>LED disc diameter {diameter:g} mm is not valid. Give a diameter of up to {most:g} mm.</source>
@@ -8624,10 +8620,6 @@ needed</source>
     <message>
         <source>The postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed to verify a tip. Tilt the pen to all sides.</source>
         <translation>各姿态相差 {found:.1f}°（均方根），验证测头需要 {needed:.0f}°。请向各个方向倾斜光笔。</translation>
-    </message>
-    <message>
-        <source>The projection is uncertain by {px:.1f} px over the image: the views do not determine the lens there. Add views with the board in each corner of the image.</source>
-        <translation>图像上投影的不确定度为 {px:.1f} px：视图在该处不能确定镜头。请增加标定板位于图像各角的视图。</translation>
     </message>
     <message>
         <source>The record of {entry} is missing or was modified. Import the entries from their station again.</source>

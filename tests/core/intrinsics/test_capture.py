@@ -9,12 +9,12 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import calibrate_camera
-from lightpen.intrinsics.capture import STILL_TIME, BoardVisibility, Capture
-from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import Views
-from lightpen.intrinsics.wanted_views import VIEWS, wanted_outline
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.uncertainty_map import map_uncertainty
+from lightpen_extensions.boards.capture import STILL_TIME, BoardVisibility, Capture
+from lightpen_extensions.boards.wanted_views import VIEWS, wanted_outline
 
 MakeViews = Callable[..., Views]
 SIZE = (640, 480)

@@ -21,10 +21,10 @@ from lightpen.intrinsics.distortion import (
     fit_camera,
 )
 from lightpen.intrinsics.start import start_any_camera
-from lightpen.intrinsics.uncertainty_map import map_uncertainty
 from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.rigid import rotation_from_vector, skew
+from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.discover.lens_conversion import convert_lens
 
 NOISE = 0.04  # px

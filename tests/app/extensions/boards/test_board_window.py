@@ -199,9 +199,8 @@ def test_a_board_held_still_is_kept_by_itself(
             qtbot.waitUntil(lambda: not window.is_searching)
 
     overlay = view.overlay()
-    assert overlay.cells is not None
-    assert overlay.cells.sum() == 2 * 35
     assert overlay.outline is not None
+    assert "Views captured: 2" in [each.text() for each in window.findChildren(QLabel)]
     assert "View captured." in remark(window)
     press(window, "Stop")
 

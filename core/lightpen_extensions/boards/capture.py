@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, IntArray
+from lightpen.arrays import FloatArray
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.views import Views
 
@@ -13,7 +13,6 @@ STILL = 0.0015  # of the image's longer side, between detections, rms
 STILL_TIME = 0.4  # s
 NEW = 0.05  # of the image's longer side, from each captured view, rms
 MAX_VIEWS = 60
-COLUMNS, ROWS = 8, 6  # of cells that the image is divided into
 
 
 class BoardVisibility(StrEnum):
@@ -64,21 +63,6 @@ class Capture:
         for v, points in enumerate(self.kept):
             pixels[v, 0] = points
         return Views(self.board, names, pixels, (self.image_size,))
-
-    @property
-    def cells(self) -> IntArray:
-        """Points seen in each part of the image, (6, 8)."""
-        return cells_of(self.views)
-
-
-def cells_of(views: Views) -> IntArray:
-    """Return the number of points of one camera in each cell of the image, (6, 8)."""
-    places = views.pixels[views.seen] / np.array(views.image_sizes[0])
-    at = np.floor(places * np.array([COLUMNS, ROWS])).astype(np.int64)
-    at = np.clip(at, 0, [COLUMNS - 1, ROWS - 1])
-    cells = np.zeros((ROWS, COLUMNS), dtype=np.int64)
-    np.add.at(cells, (at[:, 1], at[:, 0]), 1)
-    return cells
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:
