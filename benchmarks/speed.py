@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from benchmarks.labelling import CAMERA, PEN, RandomView, random_view
+from benchmarks.live_load import live_loads
 from benchmarks.peers import (
     DEFAULT_BLOB_STEP,
     blob_centers,
@@ -56,6 +57,7 @@ SCENE = Scene()
 
 # Times that cv2.minMaxLoc takes for the same images, in the same process.
 MOST_PASSES = {"tracking": 25.0, "tracking look": 40.0, "start": 90.0}
+MOST_LIVE = 0.12  # of a core, for images
 SLOWEST_LOOK = 2.0  # times as long from nothing as even LEDs
 LIMITS_MS = {
     "start labels": 20.0,
@@ -113,6 +115,7 @@ def speed_rows(workers: Workers) -> list[Row]:
     labels = workers.call(_label_times)
     fits = workers.call(_fit_times)
     looks = workers.call(_look_times)
+    with_images, without = workers.call(live_loads)
     even = looks["even"].start
     peer = (
         f"cv2.SimpleBlobDetector and cv2.solvePnP {images.blobs:.1f}, at its default "
@@ -142,6 +145,13 @@ def speed_rows(workers: Workers) -> list[Row]:
                 met=times.start <= SLOWEST_LOOK * even,
             )
             for look, times in looks.items()
+        ),
+        Row(
+            "live pipeline, 20 images/s of 5 MP of a moving pen: share of a core",
+            f"{with_images - without:.1%}: {with_images:.1%} with images, "
+            f"{without:.1%} without",
+            f"<= {MOST_LIVE:.0%}",
+            met=with_images - without <= MOST_LIVE,
         ),
         _row(
             "labels from nothing, 4 LEDs missing and 5 foreign lamps",
