@@ -270,7 +270,7 @@ def _binding(name: str, sha256: str, entered: EntryPlace | None) -> Iterable[Blo
         rows += [
             (translate("paper", "Entry in the archive"), f"{entered.number}"),
             (translate("paper", "Its SHA-256"), entered.sha256),
-            (translate("paper", "SHA-256 of the previous entry"), entered.previous),
+            (translate("paper", "Chain of entries"), entered.chain),
         ]
     yield from facts(rows, n_columns=1)
     yield paragraph(

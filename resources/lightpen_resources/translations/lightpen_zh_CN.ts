@@ -10070,10 +10070,6 @@ needed</source>
         <translation>本报告所依据的文件</translation>
     </message>
     <message>
-        <source>SHA-256 of the previous entry</source>
-        <translation>前一条目的 SHA-256</translation>
-    </message>
-    <message>
         <source>practice</source>
         <translation>练习</translation>
     </message>
@@ -10412,6 +10408,10 @@ needed</source>
     <message>
         <source>Calibrated by</source>
         <translation>标定人</translation>
+    </message>
+    <message>
+        <source>Chain of entries</source>
+        <translation>条目链</translation>
     </message>
     <message>
         <source>All figures are taken from this file, which is the complete original. They relate only to the items named, in their condition at the time. This is a report, not a certificate of an accredited laboratory. It must not be reproduced except in full.</source>

@@ -144,7 +144,7 @@ def test_what_an_auditor_asks_for_is_there(
         as_found_expanded_uncertainty_mm=(0.001, 0.002, 0.003),
         limit_mm=0.02,
     )
-    entered = EntryPlace(number=41, sha256=64 * "a", previous=64 * "b")
+    entered = EntryPlace(chain=32 * "b", number=41, sha256=64 * "a")
 
     reported = " ".join(
         " ".join(page)
@@ -167,7 +167,7 @@ def test_what_an_auditor_asks_for_is_there(
         "3.0005 mm",
         stated["inputs"]["camera"]["sha256"],
         64 * "a",
-        64 * "b",
+        32 * "b",
         "58 of 60",
         "1 tip slipped",
         "1 too few LEDs",

@@ -12,7 +12,7 @@ from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.logbook.result_entry import entry_of_file
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.library.entered_files import ARCHIVE, NOTHING_BEFORE
+from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
@@ -52,13 +52,14 @@ def results(tmp_path: Path) -> list[Path]:
     return sorted(archive.folder.glob("*.json"))
 
 
-def test_an_entry_is_reported_with_the_one_before(results: list[Path]) -> None:
+def test_an_entry_is_reported_with_its_chain(results: list[Path]) -> None:
     first, second = (entry_of_file(file, digest(file)) for file in results)
 
     assert first is not None
     assert second is not None
-    assert (first.number, first.previous) == (1, NOTHING_BEFORE)
-    assert (second.number, second.previous) == (2, first.sha256)
+    chain = known_station_name(results[0].parents[1])
+    assert (first.chain, first.number) == (chain, 1)
+    assert (second.chain, second.number) == (chain, 2)
 
 
 def test_a_result_that_was_changed_since_is_reported(results: list[Path]) -> None:

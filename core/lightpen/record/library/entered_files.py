@@ -70,11 +70,11 @@ class _Entry(Struct, frozen=True):
 
 @dataclass(frozen=True)
 class EntryPlace:
-    """Entry of a file: its number in the chain, from 1, and hashes."""
+    """Entry of a file: its chain, its number in it, from 1, and its hash."""
 
+    chain: str
     number: int
     sha256: str
-    previous: str
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ class _Reading:
         if event.result is not None:
             self.found.files[event.result.place] = EnteredFile(
                 event.result.sha256,
-                EntryPlace(number, digest, previous),
+                EntryPlace(entry.chain, number, digest),
                 event.approval,
                 supervisor,
             )
