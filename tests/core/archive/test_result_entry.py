@@ -13,6 +13,7 @@ from lightpen.archive.logbook.result_entry import entry_of_file
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.library.entered_files import ARCHIVE
+from lightpen.record.library.signing.station import known_station_name
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
