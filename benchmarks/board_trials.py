@@ -29,27 +29,27 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.board_fit import BoardFit, board_points
-from lightpen.intrinsics.boards import Board, parse_board
-from lightpen.intrinsics.calibration import (
+from lightpen.model.camera import Camera
+from lightpen.model.lens_field import LensField
+from lightpen_extensions.boards.board_fit import BoardFit, board_points
+from lightpen_extensions.boards.boards import Board, parse_board
+from lightpen_extensions.boards.calibration import (
     CameraCalibration,
     calibrate_camera,
     without_outliers,
 )
-from lightpen.intrinsics.changes import find_change
-from lightpen.intrinsics.distortion import FEW, fit_camera
-from lightpen.intrinsics.effects import MixedFit, fit_effects
-from lightpen.intrinsics.sightings import find_points
-from lightpen.intrinsics.start import BoardPoses, start_camera
-from lightpen.intrinsics.views import Views
-from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
-from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.boards.changes import find_change
+from lightpen_extensions.boards.distortion import FEW, fit_camera
+from lightpen_extensions.boards.effects import MixedFit, fit_effects
+from lightpen_extensions.boards.sightings import find_points
 from lightpen_extensions.boards.simulated_boards import (
     expose_board,
     render_board,
     simulate_board_poses,
 )
+from lightpen_extensions.boards.start import BoardPoses, start_camera
+from lightpen_extensions.boards.views import Views
+from lightpen_extensions.simulator.sensor import Sensor
 
 STREAM = 27  # of the seeds
 BOARD = "chessboard:9x6:20"

@@ -17,7 +17,7 @@ from lightpen.estimation.contact.joint import ContactModel, reduce
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

@@ -28,14 +28,14 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
-from lightpen.simulator.image_plans import plan_scene
-from lightpen.simulator.scenes import CLEAN, HARD, LEDS, Scene
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.numbering import number_by_sketch
 from lightpen_extensions.discover.request import Request
 from lightpen_extensions.discover.scale import MeasuredLength
 from lightpen_extensions.discover.sightings import find_spots
+from lightpen_extensions.simulator.image_plans import plan_scene
+from lightpen_extensions.simulator.scenes import CLEAN, HARD, LEDS, Scene
 
 N_STATIONS = 600  # so that true 95 % are within the limits in 97 of 100 cases
 N_AGAIN = 300  # of them, whose files calibrate the tip again

@@ -20,8 +20,10 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture, angles_between, rotations_of
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.swings import (
+from lightpen.swing.capture.rules import advance_swing
+from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     paper_camera,
@@ -29,8 +31,6 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.capture.rules import advance_swing
-from lightpen.swing.capture.state import Phase, SwingSetup, SwingState, start_swing
 
 SEEDS = tuple(range(20))
 N_ROUND = 8  # of these for the hand that goes round

@@ -16,10 +16,10 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.images import ImageSource
 from lightpen.model.ellipse import disc_images
-from lightpen.simulator.image_plans import ScenePlan, plan_scene, render_plan
-from lightpen.simulator.scene_files import scene_truth
-from lightpen.simulator.scenes import HARD, Scene
-from lightpen.simulator.swings import leds_in_camera
+from lightpen_extensions.simulator.image_plans import ScenePlan, plan_scene, render_plan
+from lightpen_extensions.simulator.scene_files import scene_truth
+from lightpen_extensions.simulator.scenes import HARD, Scene
+from lightpen_extensions.simulator.swings import leds_in_camera
 
 SEEDS = (101, 102, 103)
 N_IMAGES = 300

@@ -35,7 +35,7 @@ from lightpen.formats.decoding import read_image
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
 from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
-from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 N_FILES = 20_000
 SEED = 1

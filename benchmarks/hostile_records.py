@@ -40,18 +40,18 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import OPENER, open_record, record_files
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import (
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
 
 SEED = 11
 N_FLIPS, N_MUTATIONS = 2000, 5000

@@ -27,7 +27,7 @@ from benchmarks.rows import Row, table
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import Record, open_record
 from lightpen.record.swings.solving import solve_record
-from lightpen.simulator.swings import PAPER_TIP
+from lightpen_extensions.simulator.swings import PAPER_TIP
 
 N_KILLS = 20
 SEED = 7

@@ -12,7 +12,7 @@ from lightpen.detection.labelling.labels import Labels, LabelStatus, label_image
 from lightpen.detection.spots import Spots
 from lightpen.model.ellipse import disc_images
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 CAMERA = paper_camera()
 PEN = paper_pen()

@@ -17,8 +17,8 @@ from tests.gige_simulator import GigeSimulator
 
 from lightpen.arrays import Image
 from lightpen.cameras.clock import SkippingClock
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.hand import Operator
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.hand import Operator
 
 N_RENDERED = 24  # a second of a swing, shown forward and backward
 SEATING = 6.0  # s until the pen is in its cone

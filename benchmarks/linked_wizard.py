@@ -28,14 +28,14 @@ from lightpen.cameras.protocol import CameraSettings, Region
 from lightpen.cameras.worker_events import Connection
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.names import Names
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.application import Wizard, ended, make_application
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, Station, StoredCamera
 from lightpen_app_program import FACES
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
 
 CAMERA = Path(__file__).with_name("linked_camera.py")
 ADDRESS, SERIAL = "127.0.0.1", "LP01"

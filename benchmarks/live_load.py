@@ -15,12 +15,12 @@ from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.live.pipeline import Live, LiveImage
 from lightpen.messages import Message
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.image_plans import render_plan
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.capture.state import SwingEvent
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.image_plans import render_plan
+from lightpen_extensions.simulator.scenes import Scene
 
 N_IMAGES = 40  # of a swing, there and back
 FRAME_RATE = 20.0  # images/s

@@ -44,8 +44,10 @@ PROVED_BY = {
     "estimation": (
         "core/estimation", "core/record", "test_command_line.py", "test_rig_command.py",
     ),
-    "verification": ("core/verification", "core/archive", "test_verify_command.py"),
-    "intrinsics": ("core/intrinsics", "test_camera_commands.py"),
+    "measure": (
+        "core/extensions/measure", "core/archive", "test_verify_command.py",
+    ),
+    "boards": ("core/extensions/boards", "test_camera_commands.py"),
     "detection": ("core/detection", "core/live"),
 }  # fmt: skip
 # Imported once, in the process that all tests are run in children of.
@@ -465,7 +467,8 @@ def main() -> None:
     files = sorted(
         str(path.relative_to(CORE))
         for package in options.packages
-        for path in (CORE / "lightpen" / package).rglob("*.py")
+        for root in ("lightpen", "lightpen_extensions")
+        for path in (CORE / root / package).rglob("*.py")
     )
     mutants = [mutant for file in files for mutant in mutants_in(file)]
     n_all = len(mutants)

@@ -22,13 +22,13 @@ from benchmarks.board_trials import (
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.boards import parse_board
-from lightpen.intrinsics.pair import calibrate_pair
-from lightpen.intrinsics.start import BoardPoses
-from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
+from lightpen_extensions.boards.boards import parse_board
+from lightpen_extensions.boards.pair import calibrate_pair
 from lightpen_extensions.boards.simulated_boards import simulate_board_poses
+from lightpen_extensions.boards.start import BoardPoses
+from lightpen_extensions.boards.views import Views
 
 OTHER = Camera(
     *(400, 300, 575.0, 574.2, 197.3, 152.1),

@@ -20,19 +20,22 @@ from msgspec import structs
 from skspatial.objects import Cylinder, Line, Plane, Sphere
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.features import fit_feature
-from lightpen.measuring.part import measure_part
-from lightpen.measuring.plan import CharacteristicKind, PlannedCharacteristic
-from lightpen.measuring.plan import Plan as MeasuringPlan
-from lightpen.measuring.starts import frame_about
-from lightpen.measuring.surfaces import SURFACES, FeatureKind
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import PAPER_CONE
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.probed_point import measure_touches
-from lightpen.verification.tasks.task import Conditions
+from lightpen_extensions.measure.measuring.features import fit_feature
+from lightpen_extensions.measure.measuring.part import measure_part
+from lightpen_extensions.measure.measuring.plan import (
+    CharacteristicKind,
+    PlannedCharacteristic,
+)
+from lightpen_extensions.measure.measuring.plan import Plan as MeasuringPlan
+from lightpen_extensions.measure.measuring.starts import frame_about
+from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.verification.tasks.probed_point import measure_touches
+from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.simulator.swings import PAPER_CONE
 
 CAMERAS = 1, 2
 N_PARTS, N_CHUNKS = 1000, 50

@@ -39,10 +39,14 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.image_plans import ImagePlan, render_plan
-from lightpen.simulator.scenes import LEDS, Scene
-from lightpen.simulator.swings import leds_in_camera, simulate_centers, swing_poses
 from lightpen.swing.capture.kept_images import AcceptedImages, keep, kept_before
+from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
+from lightpen_extensions.simulator.scenes import LEDS, Scene
+from lightpen_extensions.simulator.swings import (
+    leds_in_camera,
+    simulate_centers,
+    swing_poses,
+)
 
 N_IMAGES = 50  # of the camera, at 20 a second
 FRAME_RATE = 20.0

@@ -25,8 +25,8 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first, rig_of
 from lightpen.model.rigid import fit_rigid, rotation_from_vector
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Swing,
     paper_camera,

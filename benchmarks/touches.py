@@ -17,8 +17,14 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen_extensions.measure.verification.tasks.probed_point import (
+    SEATING,
+    ProbingFrame,
+    StillFrames,
+    measure_touches,
+)
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     paper_camera,
@@ -27,12 +33,6 @@ from lightpen.simulator.swings import (
     seen_from,
     simulate_centers,
     swing_poses,
-)
-from lightpen.verification.tasks.probed_point import (
-    SEATING,
-    ProbingFrame,
-    StillFrames,
-    measure_touches,
 )
 
 N_IMAGES, N_FRAMES = 60, 5

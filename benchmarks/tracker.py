@@ -12,7 +12,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import PoseTable, read_poses
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 # scikit-surgerycalibration, algebraic one-step, in its tests
 PUBLISHED_TIP = np.array([-14.476, 395.143, -7.558])  # mm

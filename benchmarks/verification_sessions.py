@@ -17,14 +17,14 @@ from tests.simulated_sessions import (
     swings_of_pen,
 )
 
+from lightpen.comparisons.pen_health import examine_pen
+from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits
-from lightpen.simulator.swings import paper_camera
-from lightpen.verification.history.pen_health import examine_pen
-from lightpen.verification.tasks.drift import Drift
-from lightpen.verification.tasks.repeatability import TipEstimate, measure_repeatability
-from lightpen.verification.tasks.task import Found
-from lightpen.verification.tasks.tip_evidence import TipEvidence
+from lightpen_extensions.measure.verification.tasks.drift import Drift
+from lightpen_extensions.measure.verification.tasks.task import Found
+from lightpen_extensions.measure.verification.tasks.tip_evidence import TipEvidence
+from lightpen_extensions.simulator.swings import paper_camera
 
 N_STATIONS = 300
 MIN_PASSED, MIN_FOUND = 0.95, 0.95

@@ -11,17 +11,21 @@ from lightpen.detection.pen_detection import detect_pen
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
-from lightpen.measuring.artefacts import Artefact, ArtefactKind, artefact_plan
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import simulate_centers, swing_poses
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.session.session import advance_session
-from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.fixed_point import FIXED_POINT
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions
+from lightpen.model.artefacts import Artefact, ArtefactKind
+from lightpen_extensions.measure.measuring.artefacts import artefact_plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.session.session import advance_session
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+)
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
 
 N_IMAGES = 60  # of the swing that the tip is by
 SIGMA = 0.03  # px

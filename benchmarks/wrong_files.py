@@ -33,8 +33,8 @@ from lightpen.model.pen import Pen
 from lightpen.model.posture import directions_of
 from lightpen.model.rig import Rig, from_first, rig_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Swing,
     paper_camera,

@@ -15,11 +15,16 @@ import grimp
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = Path(__file__).with_name("architecture.md")
 BEGIN, END = "<!-- diagrams:begin -->", "<!-- diagrams:end -->"
-SOURCES = {"lightpen": "core", "lightpen_app": "app"}
+SOURCES = {
+    "lightpen": "core",
+    "lightpen_extensions": "core",
+    "lightpen_app": "app",
+    "lightpen_app_extensions": "app",
+}
 MEASURED = (
     "lightpen",
     "lightpen.estimation",
-    "lightpen.verification",
+    "lightpen_extensions.measure.verification",
     "lightpen.record",
     "lightpen.swing",
     "lightpen.archive",

@@ -19,7 +19,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -53,26 +53,12 @@ from lightpen.record.results.result_folder import RECORDS, SIMULATED, FolderArch
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import GuidedOperator
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.image_plans import plan_scene, render_plan
-from lightpen.simulator.motion import lean_vectors, postures_of
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import simulate_centers
 from lightpen.swing.capture.rules import advance_swing
 from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_resumable
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.session.session import advance_session
-from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.task import HandGoal
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import GRID, Appearance
@@ -83,6 +69,26 @@ from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_app_program import FACES
 from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.session.session import advance_session
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+)
+from lightpen_extensions.measure.verification.tasks.fixed_point import (
+    FIXED_POINT,
+    FixedPointOptions,
+)
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.verification.tasks.task import HandGoal
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.follower import GuidedOperator
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.motion import lean_vectors, postures_of
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import simulate_centers
 from lightpen_resources import languages
 
 Seen = TypeVar("Seen")

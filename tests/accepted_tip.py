@@ -26,14 +26,14 @@ from lightpen.model.posture import rotations_of
 from lightpen.model.rig import Rig, rig_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.simulator.swings import (
+from lightpen.swing.preparation import Preparation
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     perturbed_pen,
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.preparation import Preparation
 
 N_IMAGES = 40
 SIGMA = 0.01  # px

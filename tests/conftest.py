@@ -454,7 +454,7 @@ def stated() -> dict[str, Any]:
     from lightpen.formats.observation_files import Centers
     from lightpen.model.limits import SwingLimits
     from lightpen.model.origin import Origin
-    from lightpen.simulator import swings
+    from lightpen_extensions.simulator import swings
 
     camera, pen = swings.paper_camera(), swings.paper_pen()
     rng = np.random.default_rng(1)
@@ -559,16 +559,16 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     from lightpen.model.limits import SwingLimits
     from lightpen.record.swings.names import Names
     from lightpen.record.swings.writing import RecordWriter, SecondaryView
-    from lightpen.simulator.camera import SimulatedCamera
-    from lightpen.simulator.follower import GuidedOperator
-    from lightpen.simulator.scene_files import write_sample_files
-    from lightpen.simulator.scenes import Scene
-    from lightpen.simulator.swings import paper_camera
     from lightpen.swing.capture.state import start_swing
     from lightpen.swing.image_sources import SecondCamera
     from lightpen.swing.preparation import Preparation
     from lightpen.swing.record_header import record_header
     from lightpen.swing.swing_recorder import capture_image
+    from lightpen_extensions.simulator.camera import SimulatedCamera
+    from lightpen_extensions.simulator.follower import GuidedOperator
+    from lightpen_extensions.simulator.scene_files import write_sample_files
+    from lightpen_extensions.simulator.scenes import Scene
+    from lightpen_extensions.simulator.swings import paper_camera
 
     scene = Scene(camera=paper_camera(binning=2))
     files = write_sample_files(scene, folder.parent / "files")

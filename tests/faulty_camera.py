@@ -9,7 +9,7 @@ from typing_extensions import override
 from lightpen.cameras.device_errors import busy, lost, not_found
 from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.messages import message
-from lightpen.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera
 
 
 class FaultyCamera(SimulatedCamera):

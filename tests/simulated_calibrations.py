@@ -23,9 +23,9 @@ from lightpen.model.lens_field import LensField
 from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import from_first
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     Swing,

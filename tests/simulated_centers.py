@@ -5,7 +5,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
-from lightpen.simulator.swings import Swing, seen_from, simulate_centers
+from lightpen_extensions.simulator.swings import Swing, seen_from, simulate_centers
 
 
 def correlated_noise(

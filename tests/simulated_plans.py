@@ -5,10 +5,10 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import vector_from_rotation
-from lightpen.simulator.image_plans import ImagePlan, plan_in_motion
-from lightpen.simulator.postures import operator_postures
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.view import View
+from lightpen_extensions.simulator.image_plans import ImagePlan, plan_in_motion
+from lightpen_extensions.simulator.postures import operator_postures
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.view import View
 
 
 def live_plan(

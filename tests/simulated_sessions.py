@@ -22,13 +22,29 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.json_records import record_bytes
 from lightpen.formats.observation_files import Centers
-from lightpen.measuring.artefacts import Artefact, ArtefactKind
+from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import (
+from lightpen_extensions.measure.verification.tasks.artefact import measure_artefacts
+from lightpen_extensions.measure.verification.tasks.drift import measure_drift
+from lightpen_extensions.measure.verification.tasks.fixed_point import (
+    FIXED_POINT,
+    USUAL_FRAMES,
+    USUAL_TOUCHES,
+    FixedPointOptions,
+    measure_fixed_point,
+)
+from lightpen_extensions.measure.verification.tasks.probed_point import (
+    ProbedPoint,
+    ProbingFrame,
+    StillFrames,
+    measure_touches,
+)
+from lightpen_extensions.measure.verification.tasks.task import Conditions, Found
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     paper_camera,
@@ -37,22 +53,6 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.tasks.artefact import measure_artefacts
-from lightpen.verification.tasks.drift import measure_drift
-from lightpen.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    USUAL_FRAMES,
-    USUAL_TOUCHES,
-    FixedPointOptions,
-    measure_fixed_point,
-)
-from lightpen.verification.tasks.probed_point import (
-    ProbedPoint,
-    ProbingFrame,
-    StillFrames,
-    measure_touches,
-)
-from lightpen.verification.tasks.task import Conditions, Found
 
 LED_SIGMA = SEAT_SIGMA = 0.002  # mm
 SIGMA = 0.03  # px

@@ -8,14 +8,22 @@ from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
-from lightpen.simulator.postures import FRAME_RATE, Postures, operator_postures
-from lightpen.simulator.swings import Swing, simulate_centers, swing_from_postures
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.numbering import number_by_sketch
 from lightpen_extensions.discover.request import Request
 from lightpen_extensions.discover.scale import MeasuredLength
 from lightpen_extensions.discover.sightings import Sightings, sightings_of_centers
+from lightpen_extensions.simulator.postures import (
+    FRAME_RATE,
+    Postures,
+    operator_postures,
+)
+from lightpen_extensions.simulator.swings import (
+    Swing,
+    simulate_centers,
+    swing_from_postures,
+)
 
 WIDTH, HEIGHT = 2448, 2048
 FOCAL_LENGTHS = (0.8, 4.0)  # image widths

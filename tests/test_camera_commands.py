@@ -10,16 +10,16 @@ import pytest
 
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.rig_files import read_rig
-from lightpen.intrinsics.boards import parse_board
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.simulated_boards import (
     expose_board,
     render_board,
     simulate_board_poses,
 )
+from lightpen_extensions.simulator.sensor import Sensor
 from lightpen_program import main
 
 BOARD = "chessboard:7x5:20"

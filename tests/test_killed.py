@@ -17,7 +17,7 @@ import pytest
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import Record, is_record, open_record
 from lightpen.record.swings.solving import solve_record
-from lightpen.simulator.swings import PAPER_TIP
+from lightpen_extensions.simulator.swings import PAPER_TIP
 
 N_KILLS = 6  # `benchmarks` has more
 STARTING = 0.6  # s in which a swing is begun or resumed
@@ -31,23 +31,23 @@ import os, sys, time
 from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QCoreApplication
-import lightpen.simulator.camera
-from lightpen.simulator.hand import Operator
+import lightpen_extensions.simulator.camera
+from lightpen_extensions.simulator.hand import Operator
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen.record.swings.interrupted import (find_unfinished,)
 from lightpen.swing.resuming import read_resumable
 from lightpen.record.swings.names import Names
 from lightpen.live.sources import SourceEnvironment, sample_files
 from lightpen.swing.capture.state import (SwingEventKind,)
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_app.work.workbench import Workbench
 from lightpen_app.work.settings import Settings
 
 SPEED = 8
-lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
+lightpen_extensions.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking takes long
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1")
 ENDLESS = SwingLimits(min_images=100_000, max_images=100_000)
 

@@ -16,7 +16,7 @@ from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.pen_files import write_pen
 from lightpen.model.posture import rotations_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     paper_camera,

@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
+from lightpen.comparisons.assessment import (
+    USE_TIP,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+)
+from lightpen.comparisons.records import verification_record
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import record_bytes, record_heading
 from lightpen.local_time import local_now
 from lightpen.record.folder.verifications import read_verification
-from lightpen.verification.reports.records import verification_record
-from lightpen.verification.tasks.assessment import (
-    USE_TIP,
-    VERIFY_AGAIN,
-    VerificationAssessment,
-)
 from lightpen_app.print_report.verification import verification_print_report
 from lightpen_app.reporting import write_report
 

@@ -15,7 +15,11 @@ from lightpen.arrays import FloatArray
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import PAPER_CONE, simulate_centers, swing_poses
+from lightpen_extensions.simulator.swings import (
+    PAPER_CONE,
+    simulate_centers,
+    swing_poses,
+)
 
 Run = Callable[..., CompletedProcess[str]]
 N_RUNS = 8

@@ -24,8 +24,12 @@ from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.swings.names import Names
-from lightpen.simulator.swings import PAPER_TIP, simulate_centers, swing_poses
 from lightpen.swing.preparation import Preparation
+from lightpen_extensions.simulator.swings import (
+    PAPER_TIP,
+    simulate_centers,
+    swing_poses,
+)
 
 Run: TypeAlias = Callable[..., CompletedProcess[str]]
 Verify: TypeAlias = Callable[..., CompletedProcess[str]]

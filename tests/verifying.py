@@ -15,26 +15,34 @@ from tests.accepted_tip import Hold, Holder
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.region_of_interest import RegionOfInterest
-from lightpen.measuring.artefacts import Artefact, ArtefactKind, artefact_plan
-from lightpen.measuring.surfaces import FeatureKind
 from lightpen.messages import Message
+from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.model.rig import rig_of
 from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.probing.probing import ProbingPhase
-from lightpen.verification.runner import VerificationRunner
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.session.session_state import SessionState
-from lightpen.verification.session.status import (
+from lightpen_extensions.measure.measuring.artefacts import artefact_plan
+from lightpen_extensions.measure.measuring.surfaces import FeatureKind
+from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
+from lightpen_extensions.measure.verification.runner import VerificationRunner
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.session.session_state import SessionState
+from lightpen_extensions.measure.verification.session.status import (
     ReadingState,
     SessionEventKind,
     VerificationStatus,
 )
-from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions
-from lightpen.verification.tasks.task import FoundT, OptionsT, VerificationTask
+from lightpen_extensions.measure.verification.tasks.fixed_point import (
+    FIXED_POINT,
+    FixedPointOptions,
+)
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.verification.tasks.task import (
+    FoundT,
+    OptionsT,
+    VerificationTask,
+)
 
 TIMEOUT = 60.0  # s until a test gives up
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)

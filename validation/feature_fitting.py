@@ -19,8 +19,8 @@ from math import cos, pi, sin, tan
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.features import Feature, fit_feature
-from lightpen.measuring.surfaces import FeatureKind
+from lightpen_extensions.measure.measuring.features import Feature, fit_feature
+from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 
 N_SETS, SEED = 20, 10360
 MAX_PERMISSIBLE_LENGTH = 1e-6  # mm, of locations and sizes

@@ -27,7 +27,6 @@ from lightpen.live.sources import SourceEnvironment
 from lightpen.logs import end_log, write_log_to
 from lightpen.messages import printable
 from lightpen.record.library.signing.keys import KEYS
-from lightpen.simulator.camera import SERIAL
 from lightpen_app.crash import CrashHook, versions
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.face import Face
@@ -42,6 +41,7 @@ from lightpen_app.work.job import Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.camera import SERIAL
 
 # s after which a thread that computes lets the window continue. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.

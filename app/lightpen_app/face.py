@@ -7,6 +7,7 @@ from typing import TypeAlias
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
+from lightpen.archive.chains.entries import Event
 from lightpen.record.swings.names import Names
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
@@ -141,6 +142,10 @@ class Service(QObject):
         """Return its preconditions of a swing."""
         return ()
 
+    def event_text(self, event: Event) -> str:
+        """Return the kind of its entry in the archive; empty for an entry of others."""
+        return ""
+
     def find_interrupted(self) -> tuple[InterruptedWork, ...]:
         """Return interrupted work, in a job."""
         return ()
@@ -156,6 +161,11 @@ Services: TypeAlias = Sequence[Service]
 def verify_step(services: Services) -> str:
     """Return the key of the page where a tip is verified; empty for none."""
     return next(filter(None, (each.verify_step for each in services)), "")
+
+
+def event_text(services: Services, event: Event) -> str:
+    """Return the kind of an entry of an extension; empty for an entry of main."""
+    return next(filter(None, (each.event_text(event) for each in services)), "")
 
 
 def can_discover(services: Services) -> bool:

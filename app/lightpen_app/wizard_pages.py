@@ -34,7 +34,7 @@ def make_pages(
         yield from each.pages(sounds)
     from lightpen_app.steps.history.page import HistoryPage
 
-    yield HistoryPage(workbench)
+    yield HistoryPage(workbench, services)
 
 
 def page_titles(services: Sequence[Service] = ()) -> tuple[str, ...]:

@@ -54,9 +54,6 @@ from lightpen.live.sources import SourceEnvironment, sample_files
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import Record
 from lightpen.record.swings.solving import solve_record
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
@@ -66,6 +63,9 @@ from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_program import FACES
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 
 
 class PatientBot(QtBot):
@@ -137,7 +137,7 @@ def look(dressed: QApplication) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Images come, and plots are drawn, less often than usual: each takes long."""
-    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
+    monkeypatch.setattr("lightpen_extensions.simulator.camera.USUAL_FRAME_RATE", 7.0)
     monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 1000)
     # Nobody in a test presses a key twice by accident, unless it says so.
     monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 0)

@@ -22,12 +22,12 @@ from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import Record, open_record
 from lightpen.record.swings.solving import Solution, solve_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.hand import Operator
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.end_signals import END_SIGNALS, EndSignals
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.hand import Operator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard

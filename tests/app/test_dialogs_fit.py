@@ -9,7 +9,6 @@ from pytestqt.qtbot import QtBot
 from tests.app.room import clipped_words, scrolled_sideways
 
 from lightpen.record.library.tip_library import ItemKind
-from lightpen.simulator.swings import paper_camera
 from lightpen_app.shell.about import About
 from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.steps.camera.part_dialog import PartDialog
@@ -23,6 +22,7 @@ from lightpen_app.widgets.fitted_window import FRAME, fitted_place
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.boards.board_window import BoardWindow
 from lightpen_app_extensions.stream.stream_dialog import StreamDialog
+from lightpen_extensions.simulator.swings import paper_camera
 
 SMALL = QSize(853, 533)  # 1280 x 800 at 150 %
 Made = Callable[[Workbench], QWidget]

@@ -29,18 +29,18 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QLocale, QTimer
-import lightpen.simulator.camera
+import lightpen_extensions.simulator.camera
 from lightpen.cameras.clock import SkippingClock
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.demo import Demo
 from lightpen_app_program import FACES
 from lightpen_app.work.settings import Settings
 
-lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
+lightpen_extensions.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking takes long
 folder = Path(sys.argv[1])
 application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")

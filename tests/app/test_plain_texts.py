@@ -23,12 +23,12 @@ from lightpen.model.limits import SwingLimits
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedCone, ListedPen, ListedTip
 from lightpen.record.swings.names import Names
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import Preparation
 from lightpen_app.look.tooltips import plain_tooltip
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

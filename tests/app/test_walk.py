@@ -33,11 +33,11 @@ from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.widgets.page import step_titles
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_extensions.simulator.scenes import Scene
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -30,7 +30,9 @@ SAVE = "Save both files and calibrate the tip"
 def test_a_pen_without_a_file_becomes_an_accepted_tip(
     walker: "Walker", monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
-    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", FRAME_RATE)
+    monkeypatch.setattr(
+        "lightpen_extensions.simulator.camera.USUAL_FRAME_RATE", FRAME_RATE
+    )
     find_and_accept(walker, step)
 
     assert result_on_disk(walker).names.pen == NAMES["Pen serial number"]

@@ -18,13 +18,13 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import GuidedOperator
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, Station, StoredCamera
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.follower import GuidedOperator
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard

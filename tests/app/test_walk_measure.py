@@ -13,13 +13,13 @@ from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
 from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -9,10 +9,10 @@ from tests.accepted_tip import accept_tip
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.fixed_point import FixedPointOptions
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.tasks.fixed_point import FixedPointOptions
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

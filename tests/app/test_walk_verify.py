@@ -18,12 +18,15 @@ from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.tasks.fixed_point import FIXED_POINT, FixedPointOptions
-from lightpen.verification.tasks.registry import TASKS
 from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.tasks.fixed_point import (
+    FIXED_POINT,
+    FixedPointOptions,
+)
+from lightpen_extensions.measure.verification.tasks.registry import TASKS
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -23,17 +23,17 @@ from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.follower import GuidedOperator
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
 from lightpen.swing.capture.state import Phase, SwingEvent, SwingEventKind, SwingState
 from lightpen.swing.image_sources import SecondCamera
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
+from lightpen_extensions.simulator.follower import GuidedOperator
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 
 TIMEOUT = 60.0  # s until a test gives up, on a machine that does other things besides
 MANY = 600  # images, in which all that is to be seen is seen

@@ -4,8 +4,8 @@ import numpy as np
 from validation.feature_fitting import MADE, FittingResult, run_fitting_test
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.features import Feature, fit_feature
-from lightpen.measuring.surfaces import FeatureKind
+from lightpen_extensions.measure.measuring.features import Feature, fit_feature
+from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 
 N_SETS = 3  # the dossier fits more
 

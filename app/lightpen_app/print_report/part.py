@@ -8,8 +8,7 @@ from PySide6.QtCore import QCoreApplication, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from lightpen.arrays import FloatArray
-from lightpen.measuring.compensation import Evidence
-from lightpen.measuring.touches import at_position
+from lightpen.record.folder.verifications import BALL_CENTRE, at_position
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.print_report.blocks import (
@@ -131,7 +130,7 @@ def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
 def _kind(feature: Mapping[str, Any]) -> str:
     """Return the kind of a feature, with the side of the ball and its evidence."""
     kind, by = feature["kind"], feature["side_by"]
-    if by == Evidence.NONE:
+    if by == BALL_CENTRE:
         return str(kind)
     return f"{kind}, {feature['side']} ({by})"
 

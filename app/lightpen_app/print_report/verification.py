@@ -16,9 +16,8 @@ from lightpen.formats.hashes import InputFile
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.traceability import TracedItem
-from lightpen.record.folder.verifications import StoredVerification
+from lightpen.record.folder.verifications import MEASURED_PART, StoredVerification
 from lightpen.record.library.entered_files import EntryPlace
-from lightpen.verification.tasks.part import PART
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
@@ -73,7 +72,7 @@ def verification_print_report(
     ``traced`` is what was verified and measured with, the laboratory where.
     """
     record: dict[str, Any] = json.loads(file.content or b"{}")
-    is_part = done.verification == PART.kind
+    is_part = done.verification == MEASURED_PART
     title = translate("paper", "Verification report")
     by = translate("paper", "Verified by")
     if is_part:
@@ -117,7 +116,7 @@ def _badges(done: StoredVerification) -> tuple[str, ...]:
 
 
 def _items(done: StoredVerification) -> Iterator[Block]:
-    is_part = done.verification == PART.kind
+    is_part = done.verification == MEASURED_PART
     under_verification = translate("paper", "Item under verification")
     yield heading(translate("paper", "Station") if is_part else under_verification)
     yield from facts(

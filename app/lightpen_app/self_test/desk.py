@@ -21,10 +21,6 @@ from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.image_plans import plan_scene, render_plan
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen_app.application import Wizard, has_display, make_application
@@ -33,6 +29,10 @@ from lightpen_app.face import Face
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
 from lightpen_app.self_test.report import SelfTestError, Tip
 from lightpen_app.work.settings import Settings
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 
 TICK_MS = 50
 # The classes to which a platform gives fonts of its own.

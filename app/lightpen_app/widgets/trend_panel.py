@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.verification.history.trend import Trend
+from lightpen.comparisons.trend import Trend
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.quantities import AXES
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label

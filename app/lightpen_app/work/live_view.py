@@ -29,13 +29,13 @@ from lightpen.cameras.worker_events import (
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError
 from lightpen.live.pipeline import ImageCapture, ImageListener, Live, Sink
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.follower import GuidedOperator
-from lightpen.simulator.hand import Operator
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.live_images import QueuedListener
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.follower import GuidedOperator
+from lightpen_extensions.simulator.hand import Operator
 
 WITHOUT_IMAGES = "without-images"  # cause of a notification
 CLOSING_TIME = 10.0  # s for everything in progress; a dead camera may take 8

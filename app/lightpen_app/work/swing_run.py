@@ -11,12 +11,12 @@ from typing_extensions import override
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook, server_address
 from lightpen.errors import FileError
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
-from lightpen.simulator.follower import GuidedOperator
 from lightpen.swing.capture.state import SwingEvent
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView
+from lightpen_extensions.simulator.follower import GuidedOperator
 
 
 class SwingRun(RunView[SwingStatus, SwingEvent]):

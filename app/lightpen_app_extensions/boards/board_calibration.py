@@ -12,11 +12,6 @@ from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.json_records import plain
-from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
-from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.report import intrinsics_record
-from lightpen.intrinsics.views import Views
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
@@ -30,6 +25,11 @@ from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.live_view import LiveView
 from lightpen_app_extensions.boards.board_capture import BoardCapture
+from lightpen_extensions.boards.boards import Board
+from lightpen_extensions.boards.calibration import CameraCalibration, calibrate_camera
+from lightpen_extensions.boards.observing import observe_board
+from lightpen_extensions.boards.report import intrinsics_record
+from lightpen_extensions.boards.views import Views
 
 
 @dataclass(frozen=True, eq=False)

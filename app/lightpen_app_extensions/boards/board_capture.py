@@ -9,16 +9,16 @@ from PySide6.QtCore import QCoreApplication, QObject, Signal
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.protocol import Frame
-from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.observing import why_unseen
-from lightpen.intrinsics.sightings import find_points
 from lightpen.messages import Message
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.job import LatestJob, Report
+from lightpen_extensions.boards.boards import Board
 from lightpen_extensions.boards.capture import BoardVisibility, Capture
+from lightpen_extensions.boards.observing import why_unseen
+from lightpen_extensions.boards.sightings import find_points
 from lightpen_extensions.boards.wanted_views import wanted_outline
 
 LONGEST_UNSEEN = 3.0  # s, after which the cause is sought

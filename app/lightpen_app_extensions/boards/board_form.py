@@ -7,7 +7,13 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.errors import UsageError
-from lightpen.intrinsics.boards import (
+from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.labelled import add_labelled, field_label
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.translated import Translated
+from lightpen_extensions.boards.boards import (
     MAX_LENGTH,
     MAX_SIDE,
     MIN_SIDE,
@@ -15,12 +21,6 @@ from lightpen.intrinsics.boards import (
     BoardKind,
     parse_board,
 )
-from lightpen_app.look.layouts import grid_layout
-from lightpen_app.look.theme import GRID
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.labelled import add_labelled, field_label
-from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.translated import Translated
 
 DICTIONARIES = (
     "DICT_4X4_50",

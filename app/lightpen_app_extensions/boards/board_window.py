@@ -10,8 +10,6 @@ from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QWidget
 from typing_extensions import override
 
 from lightpen.errors import UsageError
-from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.calibration import MIN_VIEWS, CameraCalibration
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
@@ -38,6 +36,8 @@ from lightpen_app_extensions.boards.board_capture import (
 )
 from lightpen_app_extensions.boards.board_form import BoardForm
 from lightpen_app_extensions.boards.board_view import BoardOverlay, BoardView
+from lightpen_extensions.boards.boards import Board
+from lightpen_extensions.boards.calibration import MIN_VIEWS, CameraCalibration
 from lightpen_extensions.boards.simulated_boards import HeldBoard
 
 SIDE_WIDTH = 48 * GRID

@@ -8,12 +8,12 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen.verification.tasks.task import Band
 from lightpen_app.look.grades import DECISION_MARKS
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import draw_sign
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
+from lightpen_extensions.measure.verification.tasks.task import Band
 
 LEAST_ROW, TALL_ROW, TALLEST_ROW = 3 * GRID, 5 * GRID, 7 * GRID  # px
 NAME_SHARE, BAR_SHARE = 0.3, 0.33  # of the width; the rest is for the value

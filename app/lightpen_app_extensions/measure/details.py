@@ -4,14 +4,20 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.messages import Message
-from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.task import ResultTable, points_table
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.translated import Translated
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+)
+from lightpen_extensions.measure.verification.tasks.task import (
+    ResultTable,
+    points_table,
+)
 
 MOST_TABLES = 3  # of a task
 

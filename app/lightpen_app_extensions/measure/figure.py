@@ -8,8 +8,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.model.posture import Posture, posture_of
-from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.task import Band
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize
 from lightpen_app.widgets.fitted_text import FittedText
@@ -17,6 +15,11 @@ from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app_extensions.measure.band_chart import BandChart
 from lightpen_app_extensions.measure.part_view import PartValue, PartView
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+)
+from lightpen_extensions.measure.verification.tasks.task import Band
 
 PICTURE_HEIGHT = 18 * GRID  # px, at least
 

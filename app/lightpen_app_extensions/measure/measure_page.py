@@ -5,26 +5,9 @@ from dataclasses import replace
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.measuring.report import DECISIONS
-from lightpen.measuring.surfaces import NAMES
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.verification.session.session_state import (
-    SessionSetup,
-    SessionState,
-    bands_so_far,
-)
-from lightpen.verification.tasks.assessment import VerificationAssessment
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import (
-    FeatureSoFar,
-    base_name,
-    course,
-    feature_so_far,
-    planned_at,
-)
-from lightpen.verification.tasks.probed_point import StillFrames, measure_touches
-from lightpen.verification.tasks.task import Band
 from lightpen_app.look.grades import DECISION_MARKS
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
@@ -44,6 +27,26 @@ from lightpen_app_extensions.measure.presenter import VerifyPresenter
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.view_state import VerifyView
+from lightpen_extensions.measure.measuring.report import DECISIONS
+from lightpen_extensions.measure.measuring.surfaces import NAMES
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    bands_so_far,
+)
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import (
+    FeatureSoFar,
+    base_name,
+    course,
+    feature_so_far,
+    planned_at,
+)
+from lightpen_extensions.measure.verification.tasks.probed_point import (
+    StillFrames,
+    measure_touches,
+)
+from lightpen_extensions.measure.verification.tasks.task import Band
 
 FEW = 4  # values that leave room for the picture
 NEAR = 10.0  # mm, from which the deviation of the tip at present is shown

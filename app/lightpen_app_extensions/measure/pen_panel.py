@@ -7,9 +7,9 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.verification.history.pen_health import PenHealth
-from lightpen.verification.history.pen_over_time import PenOverTime, read_pen_over_time
-from lightpen.verification.reports.records import BY_SIMPLE_ACCEPTANCE
+from lightpen.comparisons.pen_health import PenHealth
+from lightpen.comparisons.pen_over_time import PenOverTime, read_pen_over_time
+from lightpen.comparisons.records import BY_SIMPLE_ACCEPTANCE
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.quantities import MICROMETRES, number_text

@@ -10,17 +10,9 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.file_format import FileFormat
-from lightpen.measuring.artefacts import Artefact, artefact_plan
-from lightpen.measuring.exports import EXPORTS
-from lightpen.measuring.part import MeasuredPart, taught_plan
-from lightpen.measuring.plan import Plan, PlannedFeature, free_plan
-from lightpen.measuring.plan_checks import read_plan, write_plan
-from lightpen.measuring.surfaces import NAMES, FeatureKind
+from lightpen.model.artefacts import Artefact
 from lightpen.record.exports.exports import save_new
 from lightpen.record.library.tip_library import Library
-from lightpen.verification.session.status import VerificationStatus
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions, base_name, planned_at
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, text_label
@@ -31,7 +23,20 @@ from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job, Report
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.measure.measuring.artefacts import artefact_plan
+from lightpen_extensions.measure.measuring.exports import EXPORTS
+from lightpen_extensions.measure.measuring.part import MeasuredPart, taught_plan
+from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature, free_plan
+from lightpen_extensions.measure.measuring.plan_checks import read_plan, write_plan
+from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.verification.session.status import VerificationStatus
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import (
+    PartOptions,
+    base_name,
+    planned_at,
+)
 
 SUFFIXES = "*.yaml *.yml"
 BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least

@@ -5,27 +5,11 @@ from dataclasses import dataclass
 from PySide6.QtCore import QObject
 
 from lightpen.cameras.worker_events import Connection
+from lightpen.comparisons.assessment import CALIBRATE_AGAIN, VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.library.calibration_status import TipStatus
-from lightpen.verification.probing.probing import ProbingPhase
-from lightpen.verification.session.session import BROKEN_OFF, rules_of
-from lightpen.verification.session.session_state import (
-    SessionSetup,
-    SessionState,
-    bands_so_far,
-    fraction_done,
-    instruction,
-    is_at_rest,
-)
-from lightpen.verification.session.status import ReadingState, VerificationStatus
-from lightpen.verification.tasks.assessment import (
-    CALIBRATE_AGAIN,
-    VerificationAssessment,
-)
-from lightpen.verification.tasks.registry import TASKS, AnyTask
-from lightpen.verification.tasks.task import Band
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import Instruction, grade_text
 from lightpen_app.look.sentences import worded
@@ -47,6 +31,25 @@ from lightpen_app_extensions.measure.view_state import (
     is_held,
     lamps_message,
 )
+from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
+from lightpen_extensions.measure.verification.session.session import (
+    BROKEN_OFF,
+    rules_of,
+)
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    bands_so_far,
+    fraction_done,
+    instruction,
+    is_at_rest,
+)
+from lightpen_extensions.measure.verification.session.status import (
+    ReadingState,
+    VerificationStatus,
+)
+from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
+from lightpen_extensions.measure.verification.tasks.task import Band
 
 
 @dataclass(frozen=True, eq=False)

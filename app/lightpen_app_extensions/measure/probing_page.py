@@ -4,7 +4,6 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QStackedWidget, QTabWidget, QWidget
 from typing_extensions import override
 
-from lightpen.verification.session.status import SessionEventKind
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
@@ -24,6 +23,7 @@ from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.simulator_controls import ProbingSimulatorControls
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_app_extensions.measure.view_state import VerifyView
+from lightpen_extensions.measure.verification.session.status import SessionEventKind
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped
 

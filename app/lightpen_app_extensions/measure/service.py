@@ -6,15 +6,9 @@ from functools import partial
 from PySide6.QtCore import QCoreApplication
 from typing_extensions import override
 
+from lightpen.archive.chains.entries import Event
+from lightpen.comparisons.trend import VERIFIED
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.verification.session.choices import VerificationChoices
-from lightpen.verification.storage.checkpoint import (
-    InterruptedVerification,
-    find_interrupted,
-)
-from lightpen.verification.storage.resuming import abandon_interrupted
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import PartOptions
 from lightpen_app.face import (
     DemoStep,
     InterruptedWork,
@@ -31,6 +25,17 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.storage.checkpoint import (
+    InterruptedVerification,
+    find_interrupted,
+)
+from lightpen_extensions.measure.verification.storage.resuming import (
+    abandon_interrupted,
+)
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.verification.tasks.registry import ALL_TASKS
 
 KEY = "measure"
 LONGEST = 16  # characters of a name
@@ -96,6 +101,11 @@ class MeasureService(Service):
         name = translate("DayView", "Drift reference")
         action = translate("DayControl", "Verify the tip")
         return (ReadinessItem("verify", name, self._reference_message(), action),)
+
+    @override
+    def event_text(self, event: Event) -> str:
+        kind = event.settings.get(VERIFIED)
+        return next((worded(task.title) for task in ALL_TASKS if task.kind == kind), "")
 
     @override
     def find_interrupted(self) -> tuple[InterruptedWork, ...]:

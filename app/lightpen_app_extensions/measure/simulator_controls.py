@@ -3,12 +3,12 @@
 from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
-from lightpen.simulator.hand import Operator
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.simulator.hand import Operator
 
 
 class ProbingSimulatorControls(SimulatorControls):

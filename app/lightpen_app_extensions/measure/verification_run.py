@@ -8,11 +8,14 @@ from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.verification.runner import VerificationRunner
-from lightpen.verification.session.status import SessionEventKind, VerificationStatus
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView
 from lightpen_extensions.measure.probing_operator import ProbingOperator
+from lightpen_extensions.measure.verification.runner import VerificationRunner
+from lightpen_extensions.measure.verification.session.status import (
+    SessionEventKind,
+    VerificationStatus,
+)
 
 
 class VerificationRun(RunView[VerificationStatus, SessionEventKind]):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from typing_extensions import override
 
-from lightpen.measuring.artefacts import Artefact, artefact_plan
+from lightpen.model.artefacts import Artefact
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
@@ -15,6 +15,7 @@ from lightpen_app_extensions.measure.plan_panel import choose_plan, listed_artef
 from lightpen_app_extensions.measure.presenter import VerifyPresenter
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_extensions.measure.measuring.artefacts import artefact_plan
 
 
 class ChecksPresenter(VerifyPresenter):

@@ -2,10 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from lightpen.verification.probing.probing import SETTLING, ProbingPhase
-from lightpen.verification.session.session_state import SessionState
-from lightpen.verification.session.status import VerificationStatus
-from lightpen.verification.tasks.registry import AnyTask
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
@@ -13,6 +9,13 @@ from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app_extensions.measure.check_list import CheckRow
+from lightpen_extensions.measure.verification.probing.probing import (
+    SETTLING,
+    ProbingPhase,
+)
+from lightpen_extensions.measure.verification.session.session_state import SessionState
+from lightpen_extensions.measure.verification.session.status import VerificationStatus
+from lightpen_extensions.measure.verification.tasks.registry import AnyTask
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,12 @@ from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import StationLimits, VerificationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
-from lightpen.record.folder.verifications import attributed
+from lightpen.record.folder.verifications import attributed, keep_verification
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import read_library
 from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.names import Names
-from lightpen.verification.storage.verification_files import keep_verification
 
 
 def add_entering(parser: argparse.ArgumentParser) -> None:

@@ -18,6 +18,16 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.entering import add_entering, keep_record
 from lightpen.commands.supervisor import supervisor_signature
+from lightpen.comparisons.led_file import improve_pen
+from lightpen.comparisons.pen_health import GROWN, MOVED, examine_pen, require_one_pen
+from lightpen.comparisons.press_test import PRESS_TEST, PressTest, press_test
+from lightpen.comparisons.recorded_tasks import read_scale
+from lightpen.comparisons.records import pen_health_entries, verification_record
+from lightpen.comparisons.summaries import (
+    improved_pen_text,
+    pen_health_text,
+    press_test_text,
+)
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
@@ -33,24 +43,6 @@ from lightpen.record.calibrations.recomputing import recompute
 from lightpen.record.calibrations.tip_bending import keep_bending
 from lightpen.record.library.library_changes import Author
 from lightpen.record.results.opening import data_folder_of
-from lightpen.verification.history.led_file import improve_pen
-from lightpen.verification.history.pen_health import (
-    GROWN,
-    MOVED,
-    examine_pen,
-    require_one_pen,
-)
-from lightpen.verification.history.press_test import PRESS_TEST, PressTest, press_test
-from lightpen.verification.history.recorded_tasks import read_scale
-from lightpen.verification.reports.records import (
-    pen_health_entries,
-    verification_record,
-)
-from lightpen.verification.reports.summaries import (
-    improved_pen_text,
-    pen_health_text,
-    press_test_text,
-)
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:

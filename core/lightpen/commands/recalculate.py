@@ -17,6 +17,7 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
+from lightpen.comparisons.led_file import calibrate_again
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
 from lightpen.estimation.statistics.workers import Map, cluster_workers, local_workers
@@ -27,7 +28,6 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.verification.history.led_file import calibrate_again
 
 TITLE, COLUMN = 30, 13  # characters
 

@@ -24,6 +24,11 @@ from lightpen.commands.console import (
     verdict_status,
 )
 from lightpen.commands.entering import add_entering, keep_record, limits_in_force
+from lightpen.comparisons.pen_health import require_one_pen
+from lightpen.comparisons.recorded_tasks import read_fixed_point
+from lightpen.comparisons.records import repeatability_entries, verification_record
+from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
+from lightpen.comparisons.summaries import repeatability_text
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
@@ -35,14 +40,6 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.messages import printable
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.verification.history.pen_health import require_one_pen
-from lightpen.verification.history.recorded_tasks import read_fixed_point
-from lightpen.verification.reports.records import (
-    repeatability_entries,
-    verification_record,
-)
-from lightpen.verification.reports.summaries import repeatability_text
-from lightpen.verification.tasks.repeatability import TipEstimate, measure_repeatability
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:

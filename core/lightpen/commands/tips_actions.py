@@ -16,8 +16,7 @@ from lightpen.commands.console import Command, printing, shown
 from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import ArchiveError, UsageError
 from lightpen.local_time import local_now
-from lightpen.measuring.artefacts import ArtefactKind
-from lightpen.measuring.plan import Side
+from lightpen.model.artefacts import ArtefactKind, Side
 from lightpen.model.limits import DueRule
 from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.library_changes import (

@@ -12,11 +12,11 @@ from lightpen.cameras.sources import found_cameras
 from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
 from lightpen.formats.rig_files import read_rig
 from lightpen.local_time import local_now
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.samples import beside
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.image_sources import SourceChoice
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
 
 SECOND_SERIAL = "SIM-2"
 

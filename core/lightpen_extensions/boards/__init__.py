@@ -1,1 +1,1 @@
-"""Camera calibration with boards."""
+"""Calibration of one camera, or of two together, with views of a board."""

@@ -6,8 +6,8 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.views import Views
+from lightpen_extensions.boards.boards import Board
+from lightpen_extensions.boards.views import Views
 
 STILL = 0.0015  # of the image's longer side, between detections, rms
 STILL_TIME = 0.4  # s

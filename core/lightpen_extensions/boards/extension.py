@@ -6,13 +6,13 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_intrinsics(parser: ArgumentParser) -> None:
-    from lightpen.commands.intrinsics import add_intrinsics
+    from lightpen_extensions.boards.command import add_intrinsics
 
     add_intrinsics(parser)
 
 
 def _add_extrinsics(parser: ArgumentParser) -> None:
-    from lightpen.commands.intrinsics import add_extrinsics
+    from lightpen_extensions.boards.command import add_extrinsics
 
     add_extrinsics(parser)
 

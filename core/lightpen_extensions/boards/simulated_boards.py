@@ -7,12 +7,12 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.boards import Board, BoardKind, marker_dictionary
-from lightpen.intrinsics.start import BoardPoses
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.boards.boards import Board, BoardKind, marker_dictionary
+from lightpen_extensions.boards.start import BoardPoses
+from lightpen_extensions.simulator.sensor import Sensor
 
 SAMPLES = (
     3  # for measurements, per pixel and axis; blurred before they are taken together

@@ -8,10 +8,10 @@ after another by the uncertainty that they would leave.
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.start import USUAL_FOCAL_LENGTH
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.boards.boards import Board
+from lightpen_extensions.boards.start import USUAL_FOCAL_LENGTH
 
 NEAR, FAR = 0.8, 0.6  # of the image's shorter side, filled by the board
 TILT = np.radians(32.0)

@@ -24,7 +24,6 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.commands.touched import touches_at
 from lightpen.errors import UsageError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
@@ -52,6 +51,7 @@ from lightpen_extensions.discover.sightings import (
     sightings_of_centers,
 )
 from lightpen_extensions.discover.together import discover_together
+from lightpen_extensions.measure.commands.touched import touches_at
 
 LONGEST = "longest"
 CALIPER = 0.02  # mm, standard uncertainty of a length unless given

@@ -22,13 +22,11 @@ from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
-from lightpen.intrinsics.distortion import Choice
-from lightpen.measuring.artefacts import Artefact, ArtefactKind
+from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import fit_rigid
-from lightpen.verification.tasks.artefact import measure_artefacts
-from lightpen.verification.tasks.task import Conditions
+from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.found import Discovery, discovery_of
 from lightpen_extensions.discover.hypotheses import (
     Hypothesis,
@@ -70,6 +68,8 @@ from lightpen_extensions.discover.tracks import (
     follow,
     without_lamps,
 )
+from lightpen_extensions.measure.verification.tasks.artefact import measure_artefacts
+from lightpen_extensions.measure.verification.tasks.task import Conditions
 
 NOT_SETTLED = (
     "bundle.not-settled",

@@ -12,12 +12,12 @@ from lightpen.estimation.uncertainty.disc_normals import (
 )
 from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
-from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.information import inverse
 from lightpen.model.pen import Pen, moved, order_of_paper
 from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
+from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.hypotheses import Hypothesis
 from lightpen_extensions.discover.normals import FACING
 from lightpen_extensions.discover.numbering import frame_by, framed

@@ -12,7 +12,9 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.intrinsics.distortion import (
+from lightpen.model.camera import Camera
+from lightpen.model.rig import rig_of
+from lightpen_extensions.boards.distortion import (
     FEW,
     FISHEYE,
     MANY,
@@ -21,8 +23,6 @@ from lightpen.intrinsics.distortion import (
     is_significantly_less,
     is_wide,
 )
-from lightpen.model.camera import Camera
-from lightpen.model.rig import rig_of
 from lightpen_extensions.discover.lens_conversion import convert_lens
 from lightpen_extensions.discover.starts import (
     CameraPrior,

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 
 from lightpen.formats.json_records import plain, record_heading
-from lightpen.intrinsics.distortion import choice_record
-from lightpen.intrinsics.report import PINHOLE
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
 from lightpen.model.assumptions import USUAL
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen_extensions.boards.distortion import choice_record
+from lightpen_extensions.boards.report import PINHOLE
 from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.together import Together
 

@@ -8,9 +8,9 @@ from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.verification.tasks.probed_point import ProbedPoint
 from lightpen_extensions.discover.scale import MeasuredLength
 from lightpen_extensions.discover.sightings import Sightings
+from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.intrinsics.distortion import Choice
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
+from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.hypotheses import camera_prior
 from lightpen_extensions.discover.labelling import Labelled
 from lightpen_extensions.discover.lens_choice import choose_lens

@@ -21,11 +21,11 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.uncertainty.disc_normals import turned_normals, with_normal
-from lightpen.intrinsics.distortion import usual_distortion
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
 from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.boards.distortion import usual_distortion
 from lightpen_extensions.discover.factorisation import WeakShape
 from lightpen_extensions.discover.normals import FACING, off_sight
 

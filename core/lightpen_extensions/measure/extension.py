@@ -6,13 +6,13 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_verify(parser: ArgumentParser) -> None:
-    from lightpen.commands.verify import add_verify
+    from lightpen_extensions.measure.commands.verify import add_verify
 
     add_verify(parser)
 
 
 def _add_measure(parser: ArgumentParser) -> None:
-    from lightpen.commands.measure import add_measure
+    from lightpen_extensions.measure.commands.measure import add_measure
 
     add_measure(parser)
 

@@ -6,8 +6,8 @@ the camera and z up. `verification.tasks.part` states where it lies.
 
 from functools import cache
 
-from lightpen.measuring.plan import Plan
-from lightpen.measuring.plan_checks import parse_plan
+from lightpen_extensions.measure.measuring.plan import Plan
+from lightpen_extensions.measure.measuring.plan_checks import parse_plan
 
 PLATE = """
 name: Simulated plate

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.simulator.hand import HandActivity, Operator
-from lightpen.verification.probing.probing import ProbingPhase
-from lightpen.verification.session.session_state import (
+from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
+from lightpen_extensions.measure.verification.session.session_state import (
     SessionSetup,
     SessionState,
     is_at_rest,
 )
-from lightpen.verification.tasks.registry import AnyTask
-from lightpen.verification.tasks.task import HandGoal, TaskOptions
+from lightpen_extensions.measure.verification.tasks.registry import AnyTask
+from lightpen_extensions.measure.verification.tasks.task import HandGoal, TaskOptions
+from lightpen_extensions.simulator.hand import HandActivity, Operator
 
 
 @dataclass(frozen=True)

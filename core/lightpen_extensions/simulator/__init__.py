@@ -1,1 +1,1 @@
-"""Simulated swings."""
+"""Simulation of pen, scene and images, for the demo and the tests."""

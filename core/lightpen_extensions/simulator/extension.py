@@ -6,7 +6,7 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_simulate(parser: ArgumentParser) -> None:
-    from lightpen.commands.simulate import add_simulate
+    from lightpen_extensions.simulator.command import add_simulate
 
     add_simulate(parser)
 

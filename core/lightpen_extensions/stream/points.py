@@ -3,9 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightpen.verification.session.session_state import SessionSetup, SessionState
-from lightpen.verification.tasks.part import PART
-from lightpen.verification.tasks.part_course import planned_at
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+)
+from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.part_course import planned_at
 
 POINTS = "Points"
 

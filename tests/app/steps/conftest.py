@@ -9,11 +9,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from lightpen.simulator.motion import TrackingMotion
 from lightpen_app.look.words import unbroken
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_extensions.simulator.motion import TrackingMotion
 
 W = TypeVar("W", bound=QWidget)
 
@@ -23,7 +23,7 @@ QUICK_ARM = TrackingMotion(gain=12.0, lag=0.0325, top_speed=3000.0)
 @pytest.fixture(autouse=True)
 def quick_arm(monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulated pen comes within a few images; a person needs 2.5 s for it."""
-    monkeypatch.setattr("lightpen.simulator.hand.ARM", QUICK_ARM)
+    monkeypatch.setattr("lightpen_extensions.simulator.hand.ARM", QUICK_ARM)
 
 
 class Seen:

@@ -7,12 +7,12 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from lightpen.model.posture import Posture
-from lightpen.simulator.swings import paper_pen
 from lightpen_app.widgets.pen_in_space import (
     DisplayedPosture,
     PenInSpace,
     seen_from_behind,
 )
+from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()
 TIP = np.array([0.0, -90.0, -25.0])

@@ -7,9 +7,9 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from lightpen.simulator.samples import fanned_pen
-from lightpen.simulator.swings import paper_pen
 from lightpen_app.widgets.pen_view import PenPicture, PenView
+from lightpen_extensions.simulator.samples import fanned_pen
+from lightpen_extensions.simulator.swings import paper_pen
 
 LEFT = Qt.MouseButton.LeftButton
 PEN = paper_pen()

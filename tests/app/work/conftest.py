@@ -10,12 +10,12 @@ from PySide6.QtWidgets import QApplication
 
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.record.swings.names import Names
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 

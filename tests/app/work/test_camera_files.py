@@ -12,9 +12,9 @@ from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.opened_files import CameraFile
 from lightpen.formats.rig_files import read_rig, write_rig
 from lightpen.model.rig import Rig
-from lightpen.simulator.swings import paper_camera
 from lightpen.swing.image_sources import CameraInUse, SourceChoice
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.swings import paper_camera
 
 SPOT = np.array([[100.0, 200.0, 20.0]])
 WEBCAM = SourceChoice("webcam", "0")

@@ -19,7 +19,6 @@ from lightpen.cameras.worker_events import Connection, FaultRaised, ProcessingKe
 from lightpen.formats.decoding import encode_png
 from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.reading import open_record
-from lightpen.simulator.hand import Operator
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.live_images import DisplayedImage
@@ -27,6 +26,7 @@ from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app_extensions.measure.verification_run import VerificationRun
+from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.stream.server import PoseStream
 
 TIMEOUT = 60.0  # s until a test gives up

@@ -14,6 +14,8 @@ from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import look_into
+from lightpen.comparisons.assessment import VerificationAssessment
+from lightpen.comparisons.records import verification_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import record_bytes
@@ -22,7 +24,11 @@ from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_trial
 from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
+from lightpen.record.folder.verifications import (
+    CONCLUSION,
+    VERIFICATIONS,
+    keep_verification,
+)
 from lightpen.record.library.entered_files import ARCHIVE, add_numbered
 from lightpen.record.library.supervision import (
     Signature,
@@ -32,9 +38,6 @@ from lightpen.record.library.supervision import (
 from lightpen.record.library.supervision_changes import save_limits, set_password
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
-from lightpen.verification.reports.records import verification_record
-from lightpen.verification.storage.verification_files import keep_verification
-from lightpen.verification.tasks.assessment import VerificationAssessment
 
 NAMES = Names("Hall 2", "Ann")
 EVE = Signature("Eve", "correct horse")

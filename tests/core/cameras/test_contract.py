@@ -29,8 +29,8 @@ from lightpen.cameras.worker import CameraWorker
 from lightpen.cameras.worker_events import Connection, ConnectionChanged, WorkerEvent
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.scenes import Scene
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.scenes import Scene
 
 SMALL = Camera(width=306, height=256, fx=580, fy=580, cx=152, cy=129)
 N_RECORDED = 12

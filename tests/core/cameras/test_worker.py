@@ -42,8 +42,8 @@ from lightpen.cameras.worker_events import (
 )
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.scenes import Scene
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.scenes import Scene
 
 SCENE = Scene(camera=Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43))
 TIMEOUT = 60.0  # s until a test gives up

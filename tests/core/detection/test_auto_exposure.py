@@ -17,9 +17,9 @@ from lightpen.detection.auto_exposure import (
 from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US
 from lightpen.detection.inspection import inspect
 from lightpen.detection.pen_detection import detect_pen
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 
 SCENE = Scene(camera=paper_camera(binning=2))
 

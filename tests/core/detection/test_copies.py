@@ -10,7 +10,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.formats.observation_files import Centers
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -11,13 +11,13 @@ from lightpen.detection.edge_fit import EdgeFit, fit_edge
 from lightpen.detection.labelling.spot_arrays import UNWHOLE
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.model.ellipse import Ellipses, disc_images
-from lightpen.simulator.faces import Dome, Ring
-from lightpen.simulator.image_plans import ImagePlan, plan_scene
-from lightpen.simulator.render import render_view
-from lightpen.simulator.scenes import LEDS, Scene
-from lightpen.simulator.sensor import expose
-from lightpen.simulator.swings import leds_in_camera
-from lightpen.simulator.view import Finger
+from lightpen_extensions.simulator.faces import Dome, Ring
+from lightpen_extensions.simulator.image_plans import ImagePlan, plan_scene
+from lightpen_extensions.simulator.render import render_view
+from lightpen_extensions.simulator.scenes import LEDS, Scene
+from lightpen_extensions.simulator.sensor import expose
+from lightpen_extensions.simulator.swings import leds_in_camera
+from lightpen_extensions.simulator.view import Finger
 
 N_IMAGES = 3
 BESIDE = 15.0  # px, of a spot that is still that of a disc

@@ -8,9 +8,9 @@ from lightpen.detection.labelling.labels import Labels, label_images
 from lightpen.detection.pen_detection import PenDetection, detections_of
 from lightpen.detection.spots import detect_spots
 from lightpen.model.camera import Camera
-from lightpen.simulator.image_plans import plan_scene, render_plan
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_pen
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_pen
 
 SMALL = Camera(320, 240, 600.0, 600.0, 160.0, 120.0)
 PEN = paper_pen()

@@ -9,8 +9,8 @@ from tests.simulated_plans import live_plan
 from lightpen.detection.following import Followed, follow_spots
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
-from lightpen.simulator.image_plans import render_plan
-from lightpen.simulator.scenes import LEDS, Scene
+from lightpen_extensions.simulator.image_plans import render_plan
+from lightpen_extensions.simulator.scenes import LEDS, Scene
 
 SCENE = Scene()
 

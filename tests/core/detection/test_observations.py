@@ -21,9 +21,9 @@ from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import message
 from lightpen.model.ellipse import ellipse_centers
-from lightpen.simulator.image_plans import ScenePlan, plan_scene, render_plan
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import leds_in_camera, paper_camera, paper_pen
+from lightpen_extensions.simulator.image_plans import ScenePlan, plan_scene, render_plan
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import leds_in_camera, paper_camera, paper_pen
 
 CAMERA = paper_camera()
 PEN = paper_pen()

@@ -12,8 +12,8 @@ from lightpen.detection.pen_detection import detect_from_centers, detect_pen
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import SpotFlaw
-from lightpen.simulator.image_plans import ImagePlan, render_plan
-from lightpen.simulator.scenes import Scene
+from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
+from lightpen_extensions.simulator.scenes import Scene
 
 SCENE = Scene()
 

@@ -9,7 +9,7 @@ from lightpen.detection.pose import fit_paper_poses, fit_poses, start_poses
 from lightpen.detection.robust_residuals import disc_residuals
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

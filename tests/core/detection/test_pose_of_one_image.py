@@ -5,7 +5,7 @@ import pytest
 
 from lightpen.detection.pose import fit_pose, fit_poses
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -10,8 +10,8 @@ from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_pose import fit_rig_poses, see_together
 from lightpen.model.rig import from_first, rig_of
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import paper_pen, swing_poses
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 RIG = replace(from_first(row_of_cameras(2, 800.0)), names=("left", "right"))
 PEN = paper_pen()

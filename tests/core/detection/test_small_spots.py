@@ -12,8 +12,8 @@ from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
 from lightpen.detection.small_spots import measure_small
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, detect_spots
-from lightpen.simulator.image_plans import plan_scene, render_plan
-from lightpen.simulator.scenes import Scene
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.scenes import Scene
 
 EASY = Panel(6.0)
 HARD = Panel(

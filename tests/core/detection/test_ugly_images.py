@@ -18,9 +18,9 @@ from lightpen.detection.spots import Spots
 from lightpen.formats.images import ImageSource
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.image_plans import render_plan
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.sensor import Sensor
+from lightpen_extensions.simulator.image_plans import render_plan
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.sensor import Sensor
 
 N_IMAGES = 600
 N_FILES = 60

@@ -13,8 +13,8 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen.simulator.postures import SwingKind
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.postures import SwingKind
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

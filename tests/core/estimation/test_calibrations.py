@@ -18,8 +18,8 @@ from lightpen.estimation.uncertainty.prediction import predict_uncertainty
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.swings import paper_pen
 from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.swings import paper_pen
 
 FILE = InputFile(Path("file"), 64 * "0")
 INPUTS = Inputs(FILE, FILE, (FILE,), paper_pen().nominal_tip)

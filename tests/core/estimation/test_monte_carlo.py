@@ -21,7 +21,7 @@ from lightpen.estimation.monte_carlo import (
 )
 from lightpen.estimation.uncertainty.budget import center_errors
 from lightpen.formats.observation_files import Centers
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -11,7 +11,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import read_poses
 from lightpen.messages import message
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 N_POSES = 200
 

@@ -34,16 +34,16 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.postures import operator_postures
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.postures import operator_postures
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_pen,
     seen_from,
     swing_from_postures,
     swing_poses,
 )
-from lightpen.swing_messages import Code
 
 PEN = replace(paper_pen(), led_sigma=0.002)
 ROW = row_of_cameras(2, 1000.0)

@@ -10,7 +10,11 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import paper_pen, simulate_centers, swing_poses
+from lightpen_extensions.simulator.swings import (
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
 
 FISHEYE = Camera(
     *(2448, 2048, 1300.0, 1299.0, 1219.6, 1031.3),

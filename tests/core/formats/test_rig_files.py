@@ -15,7 +15,7 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.rig_files import RigFile, read_rig, write_rig
 from lightpen.model.rig import from_first
-from lightpen.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.samples import row_of_cameras
 
 RIG = from_first(row_of_cameras(3, 900.0))
 FILES = tuple(f"{name}.yaml" for name in RIG.names)

@@ -28,8 +28,8 @@ from lightpen.formats.decoding import encode_png
 from lightpen.live.pipeline import UNHURRIED, ImageListener, Live, LiveImage
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
-from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.swing.capture.state import Phase, SwingEventKind
+from lightpen_extensions.simulator.samples import SAMPLE_PENS
 from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
 
 if TYPE_CHECKING:

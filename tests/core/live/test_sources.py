@@ -12,10 +12,10 @@ from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.live.sources import SourceEnvironment, camera_of, cameras_of
 from lightpen.record.swings.reading import open_record
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.samples import beside
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.scenes import Scene
 
 
 @pytest.fixture

@@ -35,8 +35,8 @@ from lightpen.formats.decoding import encode_png
 from lightpen.live.pipeline import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.simulator.samples import beside
-from lightpen.simulator.scenes import Scene
+from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.scenes import Scene
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -13,7 +13,7 @@ from lightpen.model.coverage import (
     require_spread,
 )
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 UPRIGHT = np.diag([1.0, -1.0, -1.0])  # pen's y up in the image, z to the camera
 

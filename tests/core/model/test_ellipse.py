@@ -14,7 +14,7 @@ from lightpen.model.ellipse import (
     disc_images,
     ellipse_centers,
 )
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     leds_in_camera,
     paper_camera,
     paper_pen,

@@ -7,8 +7,8 @@ import numpy as np
 from lightpen.model.coverage import measure_coverage
 from lightpen.model.posture import Posture, angles_between, posture_of, rotations_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.postures import random_postures
-from lightpen.simulator.swings import paper_pen
+from lightpen_extensions.simulator.postures import random_postures
+from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()
 POSTURES = random_postures(50, np.random.default_rng(0))

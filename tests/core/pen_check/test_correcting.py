@@ -11,7 +11,7 @@ from lightpen.pen_check.draft import (
     leds_to_exchange,
 )
 from lightpen.pen_check.match import Finding, MatchFinding
-from lightpen.simulator.swings import paper_pen
+from lightpen_extensions.simulator.swings import paper_pen
 
 DRAFT = PenDraft.of(paper_pen())
 

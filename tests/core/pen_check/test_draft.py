@@ -6,8 +6,8 @@ import pytest
 from lightpen.errors import FileError
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.draft import FACING, PenDraft, check_draft
-from lightpen.simulator.samples import fanned_pen
-from lightpen.simulator.swings import paper_pen
+from lightpen_extensions.simulator.samples import fanned_pen
+from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()
 DRAFT = PenDraft.of(PEN)

@@ -15,8 +15,8 @@ from lightpen.pen_check.frame import (
     examine_frame,
     moved_into_frame,
 )
-from lightpen.simulator.samples import SAMPLE_PENS, six_led_pen
-from lightpen.simulator.swings import paper_pen
+from lightpen_extensions.simulator.samples import SAMPLE_PENS, six_led_pen
+from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()
 R = rotation_from_vector(np.array([0.3, 1.0, 0.2]))

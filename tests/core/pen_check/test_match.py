@@ -21,8 +21,8 @@ from lightpen.pen_check.match import (
     add_view,
     match_pen,
 )
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     leds_in_camera,

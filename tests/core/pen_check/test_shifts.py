@@ -5,8 +5,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.pen_check.shifts import find_shifts
-from lightpen.simulator.samples import six_led_pen
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.samples import six_led_pen
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

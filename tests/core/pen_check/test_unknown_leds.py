@@ -5,7 +5,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import Poses, fit_poses
 from lightpen.pen_check.unknown_leds import find_unknown_leds
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

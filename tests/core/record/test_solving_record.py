@@ -28,7 +28,7 @@ from lightpen.record.swings.solving import (
     solve_record,
 )
 from lightpen.record.swings.writing import RecordWriter, note_excluded
-from lightpen.simulator.swings import PAPER_TIP
+from lightpen_extensions.simulator.swings import PAPER_TIP
 
 N_IMAGES = 20
 

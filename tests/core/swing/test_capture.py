@@ -21,9 +21,6 @@ from lightpen.messages import message
 from lightpen.record.swings.header import FileCopy, Header
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
 from lightpen.swing.capture.state import (
     Phase,
     SwingEvent,
@@ -35,6 +32,9 @@ from lightpen.swing.capture.state import (
 )
 from lightpen.swing.resuming import resume_swing
 from lightpen.swing.swing_recorder import capture_image
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 
 FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
 

@@ -9,16 +9,16 @@ from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.messages import message
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
-from lightpen.simulator.swings import (
+from lightpen.swing.capture.kept_images import keep, none_kept
+from lightpen.swing.capture.state import SwingSetup
+from lightpen.swing.failed_swing import FailedSwing, failed_swing
+from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing.capture.kept_images import keep, none_kept
-from lightpen.swing.capture.state import SwingSetup
-from lightpen.swing.failed_swing import FailedSwing, failed_swing
-from lightpen.swing_messages import Code
 
 CAMERA, PEN = paper_camera(), paper_pen()
 WHY = message("joint.not-settled", n_steps=100)

@@ -14,12 +14,12 @@ from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import Record, open_record, recorded_names
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
 from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import recorded_setup
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
 
 NAMES = Names("Hall 2", "Zoë", "LP-04", "T-10", "C-1", 3.0005)
 ODD = 'Ä/\\ 王 "%" ' + 200 * "w"

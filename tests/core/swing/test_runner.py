@@ -22,11 +22,11 @@ from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import IMAGES, open_record
 from lightpen.record.swings.solving import solve_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.samples import SAMPLE_PENS
 from lightpen.swing.capture.state import Phase, SwingEventKind
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.samples import SAMPLE_PENS
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

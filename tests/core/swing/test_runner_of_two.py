@@ -18,11 +18,11 @@ from lightpen.formats.own_json import with_checksum
 from lightpen.formats.rig_files import read_rig
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.recorded_source import source
-from lightpen.simulator.camera import SimulatedCamera
-from lightpen.simulator.scene_files import write_sample_files
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput
 from lightpen.swing.resuming import read_resumable
+from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.scene_files import write_sample_files
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -5,12 +5,12 @@ from PySide6.QtCore import QObject
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.inspection import clicked, with_circle
-from lightpen.simulator.hand import Operator
 from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.widgets.live_markers import mask_markers, stray_markers
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.selection import Selection
+from lightpen_extensions.simulator.hand import Operator
 
 
 class MaskControl(QObject):

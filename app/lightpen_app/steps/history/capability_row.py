@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QCheckBox, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.verification.tasks.repeatability import CAPABLE, STUDY, Capability
+from lightpen.comparisons.repeatability import CAPABLE, STUDY, Capability
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, number_text
 from lightpen_app.look.theme import GRID, TextSize, text_label

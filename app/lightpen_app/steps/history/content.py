@@ -13,10 +13,10 @@ from lightpen.archive.chains.entries import Kind, StoredEntry
 from lightpen.archive.checks.check import ArchiveCheckResult
 from lightpen.archive.history.history import Line
 from lightpen.archive.history.queries import EntryFilter
+from lightpen.comparisons.pen_over_time import NewLedFile, adjust_together
+from lightpen.comparisons.trend import Trend
 from lightpen.model.limits import DueRule
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.verification.history.pen_over_time import NewLedFile, adjust_together
-from lightpen.verification.history.trend import Trend
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.signs import Sign
@@ -31,6 +31,7 @@ from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.steps.history.kept_study import keep_study
 from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
 from lightpen_app.steps.history.selection_panel import SelectionPanel
+from lightpen_app.steps.history.texts import EventText
 from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -48,7 +49,7 @@ class HistoryContent(Translated, QWidget):
 
     checked = Signal()  # the archive was checked
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workbench: Workbench, kind_of: EventText) -> None:
         super().__init__()
         self._chosen, self._tips = workbench.selection, workbench.library
         self._notices = workbench.notifications
@@ -61,9 +62,9 @@ class HistoryContent(Translated, QWidget):
 
         # Widgets: the order of making them is the order of the Tab key
         self._filter = FilterBar()
-        self.table = HistoryTable()
+        self.table = HistoryTable(kind_of)
         self._tabs = QTabWidget()
-        self._entry = EntryPanel()
+        self._entry = EntryPanel(kind_of)
         self._trend_panel = TrendPanel()
         self._selection = SelectionPanel()
         self._due = DuePanel(workbench.around.now)

@@ -7,13 +7,14 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.chains.entries import BESIDE_SWINGS, Event, Kind, StoredEntry
 from lightpen.archive.history.history import Line
+from lightpen.comparisons.trend import VERIFIED
 from lightpen.record.library.supervision import Signature
-from lightpen.verification.history.trend import VERIFIED
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text
 from lightpen_app.steps.history.texts import (
+    EventText,
     item_text,
     kind_text,
     setting_text,
@@ -34,8 +35,9 @@ class EntryPanel(Translated, QWidget):
     note_given = Signal(object, str)  # Written, str: a note on an entry
     report_requested = Signal(object)  # Written: entry whose printed report to show
 
-    def __init__(self) -> None:
+    def __init__(self, kind_of: EventText) -> None:
         super().__init__()
+        self._kind_of = kind_of
         self._line: Line | None = None
         self._asked: StoredEntry | None = None
         self._messages: tuple[StoredEntry, ...] = ()
@@ -154,7 +156,8 @@ class EntryPanel(Translated, QWidget):
         kept = self.tr("Entry {0}, {1}, SHA-256 {2}").format(
             entry.number, event.program, line.entry.sha256[:SHORT]
         )
-        what = PARTED.join(filter(None, (type_and_state_text(line), when)))
+        kind = type_and_state_text(line, self._kind_of)
+        what = PARTED.join(filter(None, (kind, when)))
         return what, self._who_of(event), _why_of(event), self._notes_text(), kept
 
     def _who_of(self, event: Event) -> str:

@@ -19,6 +19,7 @@ from lightpen_app.look.tooltips import plain_tooltip
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.reader import BLOCK
 from lightpen_app.steps.history.texts import (
+    EventText,
     line_tone,
     rare_words,
     type_and_state_text,
@@ -57,8 +58,9 @@ class HistoryModel(TitledModel):
     n_columns = WORDS + 1
     block_wanted = Signal(int)  # number of the first line of a block to read
 
-    def __init__(self) -> None:
+    def __init__(self, kind_of: EventText) -> None:
         super().__init__()
+        self._kind_of = kind_of
         self._n_lines = 0
         self._blocks: OrderedDict[int, tuple[Line, ...]] = OrderedDict()
         self._asked: set[int] = set()
@@ -112,7 +114,7 @@ class HistoryModel(TitledModel):
             return RIGHT
         if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
             line = self.line(index.row())
-            text = UNREAD if line is None else _text(line, column)
+            text = UNREAD if line is None else _text(line, column, self._kind_of)
             is_tip = role == Qt.ItemDataRole.ToolTipRole
             return plain_tooltip(text) if is_tip else text
         if role == Qt.ItemDataRole.ForegroundRole and column in (WHAT, VERDICT):
@@ -156,8 +158,8 @@ class HistoryTable(Translated, RowTable):
     # Other lines are current or selected, or were read by now.
     selection_changed = Signal()
 
-    def __init__(self) -> None:
-        self._model = HistoryModel()
+    def __init__(self, kind_of: EventText) -> None:
+        self._model = HistoryModel(kind_of)
         super().__init__(self._model)
         self._model.setParent(self)
         self._is_of_one_station = False
@@ -293,9 +295,9 @@ class HistoryTable(Translated, RowTable):
         self.setAccessibleName(self.tr("Archive entries (newest first)"))
 
 
-def _text(line: Line, column: int) -> str:
+def _text(line: Line, column: int, kind_of: EventText) -> str:
     if column == WHAT:
-        return type_and_state_text(line)
+        return type_and_state_text(line, kind_of)
     if line.entry is None:
         return ""
     event = line.entry.entry.event

@@ -5,17 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from lightpen.archive.chains.entries import StoredEntry
+from lightpen.comparisons.records import repeatability_entries, verification_record
+from lightpen.comparisons.repeatability import Repeatability
 from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import file_entry
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.model.origin import Origin
-from lightpen.record.folder.verifications import attributed
-from lightpen.verification.reports.records import (
-    repeatability_entries,
-    verification_record,
-)
-from lightpen.verification.storage.verification_files import keep_verification
-from lightpen.verification.tasks.repeatability import Repeatability
+from lightpen.record.folder.verifications import attributed, keep_verification
 
 
 def keep_study(

@@ -1,10 +1,12 @@
 """The step History: the complete history of pens and tips."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen_app.face import Services, event_text
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.widgets.page import MainAction, Page
@@ -21,9 +23,9 @@ class HistoryPage(Page):
 
     key = "history"
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workbench: Workbench, services: Services = ()) -> None:
         super().__init__()
-        self._workbench = workbench
+        self._workbench, self._services = workbench, services
         self._run = workbench.run
 
         # Widgets
@@ -80,7 +82,7 @@ class HistoryPage(Page):
         # Imported here: with the archive it takes 0.25 s.
         from lightpen_app.steps.history.content import HistoryContent
 
-        content = HistoryContent(self._workbench)
+        content = HistoryContent(self._workbench, partial(event_text, self._services))
 
         # Connections
         content.checked.connect(self.changed)

@@ -19,9 +19,9 @@ from lightpen.archive.history.history import (
 from lightpen.archive.history.queries import EntryFilter, n_wanted
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.archive.logbook.logbook import ReplicationState
+from lightpen.comparisons.trend import trend_of
 from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library
-from lightpen.verification.history.trend import trend_of
 from lightpen_app.work.job import Job, Report
 
 T = TypeVar("T")

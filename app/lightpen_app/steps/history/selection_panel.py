@@ -6,17 +6,17 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.chains.entries import StoredEntry
-from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen.verification.history.led_file import MIN_JOINT
-from lightpen.verification.history.trend import (
+from lightpen.comparisons.led_file import MIN_JOINT
+from lightpen.comparisons.repeatability import Repeatability, RepeatedPoint
+from lightpen.comparisons.trend import (
     Comparison,
     Trend,
     compare,
     has_tip,
     repeatability_of,
 )
-from lightpen.verification.tasks.repeatability import Repeatability, RepeatedPoint
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.quantities import AXES, mm_text

@@ -1,5 +1,8 @@
 """Texts for entries of the archive."""
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.archive.chains.entries import Event, Kind
@@ -15,13 +18,14 @@ from lightpen.record.library.signing.chain_keys import (
     SUPERVISOR_KEY,
     SUPERVISOR_SIGNATURE,
 )
-from lightpen.verification.tasks.registry import ALL_TASKS
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 from lightpen_app.look.words import PARTED, listed
+
+EventText: TypeAlias = Callable[[Event], str]
 
 CONTEXT = "history"
 MARKED = (Origin.SIMULATED, Origin.RECORDED)
@@ -84,8 +88,11 @@ def kind_text(kind: Kind, grade: str = "") -> str:
     return _translated(_KINDS[kind])
 
 
-def type_and_state_text(line: Line) -> str:
-    """Return the kind of an entry and its later state."""
+def type_and_state_text(line: Line, kind_of: EventText) -> str:
+    """Return the kind of an entry and its later state.
+
+    ``kind_of`` returns the words of an extension; empty without any.
+    """
     if line.entry is None:
         return _translated(_CHANGED)
     event = line.entry.entry.event
@@ -93,7 +100,7 @@ def type_and_state_text(line: Line) -> str:
     if event.origin in MARKED:
         words.append(origin_text(event.origin))
     if not words or event.kind is not Kind.ACCEPTED:
-        words.append(task_text(event) or kind_text(event.kind, event.grade))
+        words.append(kind_of(event) or kind_text(event.kind, event.grade))
     if line.state is TipState.IN_FORCE and event.is_simulated:
         words.append(_translated(_KEPT))
     elif line.state is not TipState.NONE:
@@ -148,12 +155,6 @@ def setting_text(name: str, value: Plain) -> str:
     if limit.choices:
         return f"{worded(limit.label)}: {worded(limit.choices[int(value)])}"
     return f"{worded(limit.label)}: {value:g}\xa0{limit.unit}".rstrip()
-
-
-def task_text(event: Event) -> str:
-    """Return the name of the task that was verified; empty for all of them."""
-    kind = event.settings.get("verified")
-    return next((worded(task.title) for task in ALL_TASKS if task.kind == kind), "")
 
 
 def verdict_text(grade: str) -> str:

@@ -3,11 +3,11 @@
 from PySide6.QtCore import Qt
 from typing_extensions import override
 
-from lightpen.simulator.hand import Operator
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.work.live_view import LiveView
+from lightpen_extensions.simulator.hand import Operator
 
 COVERED = (1, 2, 3)  # LEDs
 COVER_S = 3.0

@@ -21,7 +21,7 @@ from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
-    from lightpen.verification.history.press_test import PressTest
+    from lightpen.comparisons.press_test import PressTest
 
 
 class PressTestControl(QObject):
@@ -68,7 +68,7 @@ class PressTestControl(QObject):
         one, other = light.calibration, firm.calibration
 
         def compared(_: Report) -> "PressTest":
-            from lightpen.verification.history.press_test import press_test
+            from lightpen.comparisons.press_test import press_test
 
             return press_test(one, other)
 

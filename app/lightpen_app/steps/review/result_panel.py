@@ -31,7 +31,7 @@ from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 if TYPE_CHECKING:
-    from lightpen.verification.history.press_test import PressTest
+    from lightpen.comparisons.press_test import PressTest
 
 DIAL_HEIGHT = 18 * GRID  # px
 

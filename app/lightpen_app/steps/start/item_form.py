@@ -9,9 +9,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QLabel, QLineEdit, QWidget
 
 from lightpen.local_time import local_now
-from lightpen.measuring.artefacts import KIND_WORDS, ArtefactKind
-from lightpen.measuring.plan import Side
-from lightpen.measuring.report import SIDES
+from lightpen.model.artefacts import KIND_WORDS, SIDES, ArtefactKind, Side
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
 from lightpen.record.library.library_changes import read_kept_picture, read_picture
 from lightpen.record.library.tip_library import (

@@ -10,7 +10,7 @@ from lightpen_app.widgets.lazy import LazyWidget
 from lightpen_app.work.job import LatestJob, Report
 
 if TYPE_CHECKING:
-    from lightpen.verification.history.trend import Trend
+    from lightpen.comparisons.trend import Trend
     from lightpen_app.widgets.trend_panel import TrendPanel
 
 LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
@@ -42,7 +42,7 @@ class LargeScreenPanel(QWidget):
         def read(_: Report) -> "Trend":
             # Imported here: with the archive it takes 0.25 s.
             from lightpen.archive.history.queries import EntryFilter
-            from lightpen.verification.history.trend import trend_of
+            from lightpen.comparisons.trend import trend_of
 
             wanted = EntryFilter(pen=pen, tip=tip, is_simulated=is_simulated)
             return trend_of(logbook.opened().database, wanted)

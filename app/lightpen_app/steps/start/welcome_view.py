@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.model.posture import Posture
-from lightpen.simulator.swings import PAPER_TIP, paper_pen
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, text_label
 from lightpen_app.widgets.pen_in_space import (
@@ -22,6 +21,7 @@ from lightpen_app.widgets.pen_in_space import (
 )
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
+from lightpen_extensions.simulator.swings import PAPER_TIP, paper_pen
 
 LEAST_HEIGHT, LARGEST_HEIGHT = 10 * GRID, 22 * GRID  # px, of a picture
 WORDS_HEIGHT = 21 * GRID  # px, with the margins

@@ -5,7 +5,6 @@ from PySide6.QtWidgets import QMenu, QWidget
 from typing_extensions import override
 
 from lightpen.model.posture import Posture
-from lightpen.simulator.hand import Operator
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.tooltips import set_tooltip
@@ -13,6 +12,7 @@ from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.work.live_view import LiveView
+from lightpen_extensions.simulator.hand import Operator
 
 SLIP_MM, SLIP_S = 0.5, 1.5
 COVER_S = 2.0

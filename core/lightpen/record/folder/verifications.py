@@ -1,4 +1,4 @@
-"""Reading the files of verifications."""
+"""The files of verifications: kept, and read."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 from msgspec import Struct, field
 
 from lightpen.errors import FileError
-from lightpen.formats.json_records import ProgramName
+from lightpen.formats.json_records import ProgramName, record_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     ZonedTime,
@@ -18,7 +18,8 @@ from lightpen.formats.own_json import (
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.model.origin import Origin
 from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.library.entered_files import entered_files
+from lightpen.record.library.entered_files import add_numbered, entered_files
+from lightpen.record.library.signing.keys import SigningKey
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
@@ -27,6 +28,8 @@ VERIFICATIONS = "verifications"
 TOUCHES = "touches"  # in that folder: the images of live touches, run by run
 UNDER_WAY = "under way"  # likewise: what is not concluded yet
 CONCLUSION = "conclusion"
+MEASURED_PART = "part"  # kind of the task that measures a part
+BALL_CENTRE = "ball centre"  # of a measured feature: no surface was touched
 
 
 class _Verdict(StoredMessage, frozen=True, kw_only=True):
@@ -132,3 +135,36 @@ def data_folder_of_verification(file: Path) -> Path | None:
     if folder.name != VERIFICATIONS:
         return None
     return folder.parents[folder.parent.name == SIMULATED]
+
+
+def keep_verification(
+    data: Path,
+    record: Mapping[str, Any],
+    supervisor: SigningKey | None = None,
+    *,
+    is_simulated: bool,
+) -> Path:
+    """Keep the record of a verification in a data folder, and return its file.
+
+    The supervisor whom it names approves it.
+    """
+    folder = verifications_folder(data, is_simulated=is_simulated)
+    return add_numbered(data, folder, record_bytes(record), supervisor)
+
+
+def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
+    """Return the verifications folder of a data folder."""
+    return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
+
+
+def conditions_entries(
+    temperature_c: float | None, humidity_percent: float | None
+) -> dict[str, float]:
+    """Return the measured environment as entries of a record."""
+    conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
+    return {name: each for name, each in conditions.items() if each is not None}
+
+
+def at_position(name: str, position: int) -> str:
+    """Return the owner of touches after part or camera were moved to a position."""
+    return name if position == 1 else f"{name}@{position}"

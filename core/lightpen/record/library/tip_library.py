@@ -29,9 +29,8 @@ from lightpen.formats.own_json import (
     require_usual,
 )
 from lightpen.formats.stored_format import LaterFormatError, parse_stored
-from lightpen.measuring.artefacts import Artefact, ArtefactKind
-from lightpen.measuring.plan import Side
 from lightpen.messages import Message, message
+from lightpen.model.artefacts import Artefact, ArtefactKind, Side
 from lightpen.model.bending import Bending, MeasuredBending, bending_on
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen.model.names import same_name

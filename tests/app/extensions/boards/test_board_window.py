@@ -19,24 +19,24 @@ from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
-from lightpen.intrinsics.boards import Board, BoardKind, parse_board
 from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
 from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
 from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.simulator.sensor import Sensor
 from lightpen_app.look.pooling import pooled
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.boards.board_view import BoardView
 from lightpen_app_extensions.boards.board_window import BoardWindow
+from lightpen_extensions.boards.boards import Board, BoardKind, parse_board
 from lightpen_extensions.boards.simulated_boards import (
     HeldBoard,
     expose_board,
     render_board,
     simulate_board_poses,
 )
+from lightpen_extensions.simulator.sensor import Sensor
 
 if TYPE_CHECKING:
     from tests.app.conftest import HoldBack

@@ -36,10 +36,6 @@ from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_file_writing import write_camera
 from lightpen.live.pipeline import LiveImage
 from lightpen.record.swings.names import Names
-from lightpen.simulator.hand import HandActivity
-from lightpen.simulator.scene_files import write_scene
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.view import Lamp
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.look.theme import Tone
@@ -57,6 +53,10 @@ from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.hand import HandActivity
+from lightpen_extensions.simulator.scene_files import write_scene
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.view import Lamp
 
 if TYPE_CHECKING:
     from tests.app.steps.conftest import See, Seen

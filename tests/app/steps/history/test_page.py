@@ -34,12 +34,19 @@ from lightpen.archive.chains.growth import append
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.archive.store.database import Database
+from lightpen.comparisons.assessment import (
+    USE_TIP,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+)
+from lightpen.comparisons.records import verification_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import DueRule, StationLimits
 from lightpen.model.origin import Origin
+from lightpen.record.folder.verifications import keep_verification
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.supervision import Signature
@@ -48,17 +55,7 @@ from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_camera
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.reports.records import verification_record
-from lightpen.verification.storage.verification_files import keep_verification
-from lightpen.verification.tasks.assessment import (
-    USE_TIP,
-    VERIFY_AGAIN,
-    VerificationAssessment,
-)
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.look.words import unbroken
@@ -88,6 +85,9 @@ from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_resources import languages
 
 W = TypeVar("W", bound=QWidget)

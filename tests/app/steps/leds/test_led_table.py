@@ -5,8 +5,8 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from lightpen.pen_check.draft import PenDraft
-from lightpen.simulator.swings import paper_pen
 from lightpen_app.steps.leds.led_table import MISFIT, LedTable
+from lightpen_extensions.simulator.swings import paper_pen
 
 DRAFT = PenDraft.of(paper_pen())
 

@@ -26,10 +26,6 @@ from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import LedFile, ListedPen, read_library
 from lightpen.record.swings.names import Names
-from lightpen.simulator.hand import HandActivity
-from lightpen.simulator.samples import fanned_pen, six_led_pen
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import paper_pen
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.languages import LanguageSwitch
@@ -45,6 +41,10 @@ from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.hand import HandActivity
+from lightpen_extensions.simulator.samples import fanned_pen, six_led_pen
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import paper_pen
 
 if TYPE_CHECKING:
     from tests.app.conftest import HoldBack

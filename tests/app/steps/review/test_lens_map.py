@@ -12,14 +12,14 @@ from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.record.swings.recorded_source import RecordSource
 from lightpen.record.swings.solving import Solution
-from lightpen.simulator.swings import (
+from lightpen_app.steps.review.plots_panel import ResidualsPanel
+from lightpen_app.steps.review.residual_plots import ArrowPlot
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
     swing_poses,
 )
-from lightpen_app.steps.review.plots_panel import ResidualsPanel
-from lightpen_app.steps.review.residual_plots import ArrowPlot
 
 N_IMAGES = 32
 

@@ -56,11 +56,6 @@ from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.solving import Solution, solve_again, solve_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.image_plans import ImagePlan, render_plan
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import PAPER_TIP, swing_from_postures
 from lightpen.swing.capture.state import SwingState
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
@@ -93,6 +88,11 @@ from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import PAPER_TIP, swing_from_postures
 
 if TYPE_CHECKING:
     from tests.app.conftest import SolvingOn

@@ -38,7 +38,6 @@ from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
 from lightpen.swing.record_header import record_header
 from lightpen_app.look.theme import TextSize, Tone
@@ -54,6 +53,7 @@ from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
 
 Key = Qt.Key
 LEFT = Qt.MouseButton.LeftButton

@@ -24,7 +24,6 @@ from lightpen.model.posture import Posture
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
-from lightpen.simulator.hand import Operator
 from lightpen.swing.capture.state import Pause, Phase, SwingState
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.look.phrases import grade_text, phrase
@@ -37,6 +36,7 @@ from lightpen_app.widgets.plots import TracePlot
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.hand import Operator
 
 if TYPE_CHECKING:
     from tests.app.conftest import SolvingOn

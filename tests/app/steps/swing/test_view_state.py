@@ -10,7 +10,6 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.reports.verdict import Grade, Verdict
 from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.swing.capture.shortfall import measure_shortfall
 from lightpen.swing.capture.state import (
     Pause,
@@ -25,6 +24,7 @@ from lightpen_app.steps.swing.remaining_images import RemainingImages, in_true_s
 from lightpen_app.steps.swing.view_state import SwingViewState
 from lightpen_app.steps.swing.words import SwingWords
 from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
 PASSED = Verdict(Grade.PASS, message(Code.GOOD, uncertainty=0.001))

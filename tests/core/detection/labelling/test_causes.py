@@ -16,7 +16,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

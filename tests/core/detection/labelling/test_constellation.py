@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.detection.labelling.constellation import constellation_of
-from lightpen.simulator.swings import flat_pen, paper_pen
+from lightpen_extensions.simulator.swings import flat_pen, paper_pen
 
 
 def test_six_leds_are_needed_where_the_pen_has_more() -> None:

@@ -25,8 +25,8 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.samples import SAMPLE_PENS
-from lightpen.simulator.swings import flat_pen, paper_camera, paper_pen
+from lightpen_extensions.simulator.samples import SAMPLE_PENS
+from lightpen_extensions.simulator.swings import flat_pen, paper_camera, paper_pen
 
 CAMERA = paper_camera()
 PEN = paper_pen()

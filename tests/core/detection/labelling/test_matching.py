@@ -8,7 +8,7 @@ from lightpen.detection.labelling.matching import log_false_alarms, match, settl
 from lightpen.detection.labelling.spot_arrays import SpotArrays, spot_arrays
 from lightpen.model.ellipse import disc_images
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 CAMERA = paper_camera()
 PEN = paper_pen()

@@ -18,7 +18,7 @@ from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.uncertainty.budget import ContributionName, contributions_of
 from lightpen.model.assumptions import USUAL
 from lightpen.model.rig import rig_of
-from lightpen.simulator.swings import paper_camera, paper_pen, swing_poses
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA = replace(paper_camera(), covariance=None)
 PEN = replace(paper_pen(), led_sigma=0.002)

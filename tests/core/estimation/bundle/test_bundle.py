@@ -28,7 +28,7 @@ from lightpen.model.effective_tip import effective_tip
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import fit_rigid, rotation_from_vector
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

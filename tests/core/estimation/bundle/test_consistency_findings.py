@@ -20,15 +20,15 @@ from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing_messages import Code
 
 CAMERA = paper_camera()
 PEN = replace(paper_pen(), led_sigma=0.002)

@@ -23,8 +23,8 @@ from lightpen.model.ellipse import disc_images
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
-from lightpen.simulator.samples import fanned_pen
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.samples import fanned_pen
+from lightpen_extensions.simulator.swings import (
     leds_in_camera,
     paper_camera,
     paper_pen,

@@ -15,8 +15,13 @@ from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.model.assumptions import USUAL
 from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import paper_camera, paper_pen, seen_from, swing_poses
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    seen_from,
+    swing_poses,
+)
 
 PEN = replace(paper_pen(), led_sigma=0.002)
 ROW = row_of_cameras(2, 1000.0)

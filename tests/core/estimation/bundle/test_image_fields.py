@@ -20,8 +20,8 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
 from lightpen.model.rig import from_first
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

@@ -15,7 +15,7 @@ from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
 from lightpen.record.calibrations.calibrations import shown_images
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -16,7 +16,7 @@ from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

@@ -11,8 +11,8 @@ from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.lens_field import LensField
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 CAMERA = paper_camera()
 UNKNOWN = replace(CAMERA, covariance=None)

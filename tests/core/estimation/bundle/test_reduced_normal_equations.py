@@ -17,8 +17,8 @@ from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.model.assumptions import USUAL
 from lightpen.model.rig import from_first
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import paper_pen, seen_from, swing_poses
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import paper_pen, seen_from, swing_poses
 
 N_IMAGES, N_ROWS, N_COMMON = 7, 8, 4
 COEFFICIENTS = np.array([0.0, 0.5, 0.9])

@@ -11,7 +11,7 @@ from lightpen.estimation.bundle.seat_modes import (
 )
 from lightpen.model.posture import rotations_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import paper_pen, swing_poses
+from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 PEN = paper_pen()
 ANGLES = np.linspace(0, 2 * np.pi, 60, endpoint=False)

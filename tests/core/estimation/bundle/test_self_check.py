@@ -19,8 +19,8 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rig import from_first
 from lightpen.model.rigid import nearest_rotation, vector_from_rotation
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

@@ -22,7 +22,7 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rig import rig_of
 from lightpen.model.rigid import fit_rigid
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -17,7 +17,7 @@ from lightpen.estimation.uncertainty.budget import ContributionName, contributio
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

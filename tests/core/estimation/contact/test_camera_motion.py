@@ -23,13 +23,13 @@ from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import (
+from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
     swing_poses,
 )
-from lightpen.swing_messages import Code
 
 CAMERA, PEN = paper_camera(), paper_pen()
 N_IMAGES = 80

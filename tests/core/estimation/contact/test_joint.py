@@ -14,7 +14,7 @@ from lightpen.estimation.contact.joint import (
     reduce,
 )
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

@@ -15,7 +15,7 @@ from lightpen.estimation.contact.led_quality import LedQuality, measure_leds
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,

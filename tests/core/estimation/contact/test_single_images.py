@@ -19,7 +19,7 @@ from lightpen.estimation.contact.single_images import (
 )
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import Message, message
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -16,7 +16,7 @@ from lightpen.estimation.pivot.pivot import (
 from lightpen.formats.observation_files import PoseTable, read_poses
 from lightpen.model.coverage import require_spread
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 TIP_PEN = np.array([2.0, -1.0, 150.0])
 PIVOT_CAM = np.array([10.0, 20.0, 800.0])

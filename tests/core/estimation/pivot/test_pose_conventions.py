@@ -10,7 +10,7 @@ from lightpen.estimation.pivot.pose_conventions import (
     require_usual_reading,
 )
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 SWING = swing_poses(60, np.random.default_rng(0), "operator")
 R = SWING.rotations

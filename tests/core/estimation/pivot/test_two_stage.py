@@ -8,8 +8,8 @@ from lightpen.detection.pose import fit_paper_poses
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot.two_stage import fit_two_stage, projection_bias
-from lightpen.simulator.postures import SwingKind
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.postures import SwingKind
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

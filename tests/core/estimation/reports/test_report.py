@@ -34,8 +34,8 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.method import Method
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

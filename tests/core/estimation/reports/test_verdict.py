@@ -37,8 +37,9 @@ from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import (
+from lightpen.swing_messages import NO_TEMPERATURE, Code, too_little_tilt
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,
@@ -46,7 +47,6 @@ from lightpen.simulator.swings import (
     swing_from_postures,
     swing_poses,
 )
-from lightpen.swing_messages import NO_TEMPERATURE, Code, too_little_tilt
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

@@ -12,8 +12,8 @@ from lightpen.estimation.rigs.rig_conventions import require_usual_rig
 from lightpen.messages import Message
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import paper_pen
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import paper_pen
 
 RIG = from_first(row_of_cameras(3, 1000.0))
 NOTHING = np.zeros((0, 3, 10, 2))

@@ -7,7 +7,7 @@ from tests.simulated_centers import correlated_noise
 from lightpen.arrays import FloatArray
 from lightpen.estimation.pivot.pivot import contact_matrix
 from lightpen.estimation.statistics.correlation import correlated_covariance
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 SWING = swing_poses(150, np.random.default_rng(0), "operator")
 DESIGN = contact_matrix(SWING.rotations)

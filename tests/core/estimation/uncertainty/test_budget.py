@@ -26,7 +26,7 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

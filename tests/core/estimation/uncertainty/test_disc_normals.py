@@ -11,7 +11,7 @@ from lightpen.estimation.uncertainty.disc_normals import (
     turned_normals,
 )
 from lightpen.formats.observation_files import Centers
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

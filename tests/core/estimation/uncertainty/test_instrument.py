@@ -19,8 +19,13 @@ from lightpen.estimation.uncertainty.instrument import (
 )
 from lightpen.model.assumptions import USUAL
 from lightpen.model.rig import rig_of
-from lightpen.simulator.samples import row_of_cameras
-from lightpen.simulator.swings import PAPER_TIP, paper_camera, paper_pen, swing_poses
+from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.swings import (
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    swing_poses,
+)
 
 RIG = rig_of(paper_camera())
 PEN = replace(paper_pen(), led_sigma=0.002)

@@ -13,7 +13,7 @@ from lightpen.estimation.uncertainty.prediction import (
 )
 from lightpen.model.assumptions import USUAL
 from lightpen.model.rig import rig_of
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,

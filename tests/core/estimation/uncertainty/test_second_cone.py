@@ -14,7 +14,7 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen, grown
-from lightpen.simulator.swings import (
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     paper_camera,

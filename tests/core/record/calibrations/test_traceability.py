@@ -5,7 +5,7 @@ from pathlib import Path
 
 from msgspec import structs
 
-from lightpen.measuring.artefacts import Artefact, ArtefactKind
+from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.record.calibrations.traceability import certified_values, traced_items
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.tip_library import (

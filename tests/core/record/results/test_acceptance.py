@@ -46,8 +46,8 @@ from lightpen.record.swings.solving import (
     solve_record,
 )
 from lightpen.record.swings.writing import RecordWriter, note_excluded
-from lightpen.simulator.swings import swing_poses
 from lightpen.swing_messages import Code
+from lightpen_extensions.simulator.swings import swing_poses
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 LATER = NOON + timedelta(hours=1)

@@ -24,12 +24,12 @@ from lightpen.record.swings.journal import JOURNAL, VerdictLine, line_bytes
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.simulator.scenes import Scene
-from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import read_for_more, read_resumable
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 BLACK = np.zeros((8, 8), np.uint8)

@@ -27,7 +27,7 @@ from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import open_record, record_files
 from lightpen.record.swings.recorded_source import source
 from lightpen.record.swings.writing import RecordWriter, note_excluded
-from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 N_KILLS = 20
 WRITER = """

@@ -12,14 +12,6 @@ from lightpen.model.coverage import TILT_RINGS
 from lightpen.model.posture import Posture, angles_between, rotations_of
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
-from lightpen.simulator.swings import (
-    PAPER_CONE,
-    PAPER_TIP,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
 from lightpen.swing.capture.guidance import (
     TILTS,
     TURNS,
@@ -28,6 +20,14 @@ from lightpen.swing.capture.guidance import (
     next_posture,
     usable_leds,
     visible_fields,
+)
+from lightpen_extensions.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
 )
 
 CAMERA, PEN = paper_camera(), paper_pen()

@@ -14,13 +14,6 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
-from lightpen.simulator.swings import (
-    Swing,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
 from lightpen.swing.capture.kept_images import (
     AcceptedImages,
     distance_unit,
@@ -28,6 +21,13 @@ from lightpen.swing.capture.kept_images import (
     kept_before,
     none_kept,
     without_slipped,
+)
+from lightpen_extensions.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
 )
 
 CAMERA, PEN = paper_camera(), paper_pen()

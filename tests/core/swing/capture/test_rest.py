@@ -7,14 +7,6 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_from_centers
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import (
-    PAPER_CONE,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_from_postures,
-)
 from lightpen.swing.capture.rest import (
     in_place,
     offset,
@@ -27,6 +19,14 @@ from lightpen.swing.capture.state import (
     SwingSetup,
     SwingState,
     start_swing,
+)
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.swings import (
+    PAPER_CONE,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_from_postures,
 )
 
 CAMERA, PEN = paper_camera(), paper_pen()

@@ -14,16 +14,6 @@ from lightpen.messages import message
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import angles_between
-from lightpen.simulator.hand import Operator
-from lightpen.simulator.swings import (
-    PAPER_CONE,
-    PAPER_TIP,
-    Swing,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_poses,
-)
 from lightpen.swing.capture.kept_images import kept_before
 from lightpen.swing.capture.rules import (
     advance_swing,
@@ -56,6 +46,16 @@ from lightpen.swing_messages import (
     SWING_TO_SEAT,
     Code,
     too_little_tilt,
+)
+from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
 )
 
 PERIOD = 0.15  # s, thrice the usual one: what is decided takes longer than either

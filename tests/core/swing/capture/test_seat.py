@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from lightpen.detection.pose import Poses, fit_poses
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import (
+from lightpen.swing.capture.seat import fit_seat, tip_distances, tip_offsets
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
     paper_camera,
@@ -15,7 +16,6 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_from_postures,
 )
-from lightpen.swing.capture.seat import fit_seat, tip_distances, tip_offsets
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

@@ -11,15 +11,6 @@ from lightpen.estimation.uncertainty.prediction import PredictedUncertainty
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture, rotations_of
-from lightpen.simulator.postures import Postures
-from lightpen.simulator.swings import (
-    Swing,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-    swing_from_postures,
-    swing_poses,
-)
 from lightpen.swing.capture.kept_images import kept_before
 from lightpen.swing.capture.shortfall import (
     N_MORE,
@@ -34,6 +25,15 @@ from lightpen.swing.capture.shortfall import (
 )
 from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
 from lightpen.swing_messages import SIDES, Code
+from lightpen_extensions.simulator.postures import Postures
+from lightpen_extensions.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_from_postures,
+    swing_poses,
+)
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

@@ -5,7 +5,7 @@ import pytest
 
 from lightpen.model.coverage import dial_counts, measure_coverage
 from lightpen.model.limits import SwingLimits
-from lightpen.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import swing_poses
 
 
 def test_the_dial_counts_every_posture_once_where_the_coverage_has_it() -> None:

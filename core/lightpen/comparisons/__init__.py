@@ -1,0 +1,1 @@
+"""Calibrations compared: trend and repeatability of a tip, health of a pen."""

@@ -1,1 +1,0 @@
-"""Simulation of pen, scene and images, for the demo and the tests."""

@@ -1,0 +1,166 @@
+"""Choice of the lens model by cross-validation: 5 or 8 coefficients, or a fisheye.
+
+The gain by more coefficients is that in views which they were not fitted to. Where no
+view reaches the corners of the image, the coefficients of the highest orders would be
+left open and fold it there; each has a prior of what it usually does in a corner.
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.messages import Message, message
+from lightpen.model.camera import Camera, LensModel
+from lightpen_extensions.boards.adjustment import FINEST, adjust_board
+from lightpen_extensions.boards.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen_extensions.boards.effects import held_out_errors
+from lightpen_extensions.boards.start import BoardPoses, start_board_poses, start_camera
+from lightpen_extensions.boards.views import Views
+
+FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
+WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
+# Standard deviations of what k3, and k4 k5 k6, do to the distance of a corner.
+OF_K3, OF_RATIONAL = 0.1, 1.0
+WORTH = 0.01  # by which other coefficients must lessen the held-out error
+SIGMAS = 2.0  # of the gain of all views
+MUCH = 1.0  # gain of all views together, of the logarithm of their errors
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Choice of the lens model."""
+
+    n_coefficients: int  # 5 or 8, or 4 of a fisheye
+    # Cross-validated residual, px rms, by number of coefficients.
+    held_out: dict[int, float]
+
+    @property
+    def message(self) -> Message:
+        """The lens model and its cross-validated error as text."""
+        own = self.held_out[self.n_coefficients]
+        if self.n_coefficients == FISHEYE:
+            return message("intrinsics.fisheye", held_out=own)
+        n = self.n_coefficients
+        return message("intrinsics.brown", n_coefficients=n, held_out=own)
+
+
+def choice_record(choice: Choice) -> dict[str, object]:
+    """Return the record of a choice; without an error where nothing was held out."""
+    return {
+        "coefficients": choice.n_coefficients,
+        "held_out_rms_px_5": choice.held_out.get(FEW),
+        "held_out_rms_px_8": choice.held_out.get(MANY),
+        "held_out_rms_px_fisheye": choice.held_out.get(FISHEYE),
+        "reason": choice.message if choice.held_out else None,
+    }
+
+
+def choose_distortion(
+    views: Views, fitted: BoardFit, report: Callable[[float], None]
+) -> tuple[Choice, BoardFit]:
+    """Return the lens model and its fit.
+
+    A model with another number than 5 coefficients must be better.
+    """
+    camera, errors = fitted.state.cameras[0], held_out_errors(views, fitted)
+    n_first = n_best = len(camera.distortion)
+    best, held_out = fitted, {n_first: rms_together(errors, views)}
+    models = (
+        (FEW, MANY, FISHEYE) if is_wide(camera, views.pixels[:, 0]) else (FEW, MANY)
+    )
+    others = [n for n in models if n != n_first]
+    for done, n in enumerate(others, 1):
+        report(0.4 + 0.4 * done / len(others))
+        with suppress(CalibrationError):  # the views do not determine so many
+            near = start_camera(views, n)
+            if (n_first, n) == (FEW, MANY):
+                more = np.append(camera.distortion, np.zeros(n - n_first))
+                near = replace(camera, distortion=more)
+            trial = fit_camera(views, near)
+            if trial.state.cameras[0].folded_share > camera.folded_share:
+                continue
+            trial_errors = held_out_errors(views, trial)
+            rms = held_out[n] = rms_together(trial_errors, views)
+            before = held_out[n_best]
+            if n == FEW:  # the plain lens, unless contradicted
+                is_better = not is_significantly_less(before, rms, errors, trial_errors)
+            else:
+                is_better = is_significantly_less(rms, before, trial_errors, errors)
+            if is_better:
+                n_best, best, errors = n, trial, trial_errors
+    report(0.8)
+    return Choice(n_best, held_out), best
+
+
+def is_significantly_less(
+    rms: float, rms_before: float, errors: FloatArray, errors_before: FloatArray
+) -> bool:
+    """Return whether a lens model predicts images better than the one before.
+
+    Parameters
+    ----------
+    rms, rms_before : float
+        Cross-validated error of all points, px.
+    errors, errors_before : (V,) array
+        That of each image, px.
+    """
+    # By how many times, so that no one image decides alone...
+    gains = np.log(np.maximum(errors_before, FINEST) / np.maximum(errors, FINEST))
+    chance = float(gains.std(ddof=1)) * len(gains) ** 0.5
+    # ... unless it gains much more than others lose: few may reach the rim.
+    losses = float(np.sqrt(2 * np.sum(np.minimum(gains, 0.0) ** 2)))
+    least = SIGMAS * min(chance, max(losses, MUCH / SIGMAS))
+    return bool(rms < (1 - WORTH) * rms_before and gains.sum() > least)
+
+
+def is_wide(camera: Camera, pixels: FloatArray) -> bool:
+    """Return whether points were seen so far off the axis that a fisheye differs.
+
+    ``pixels`` (..., 2) are NaN where one was not seen.
+    """
+    off = (pixels - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    return bool(np.nanmax(np.linalg.norm(off, axis=-1)) > WIDE)
+
+
+def usual_distortion(camera: Camera) -> FloatArray:
+    """Return the information of intrinsics by what lenses usually do, (4 + n, 4 + n).
+
+    It is of the coefficients that fold the corners of an image, about 0.
+    """
+    information = np.zeros((len(camera.intrinsics),) * 2)
+    if camera.lens is LensModel.BROWN:
+        corner = 0.5 * np.hypot(*camera.image_size) / camera.fx
+        information[8, 8] = (OF_K3 / corner**6) ** -2
+        at = np.arange(9, len(information))
+        information[at, at] = (OF_RATIONAL / corner ** (2 * at - 16.0)) ** -2
+    return information
+
+
+def fit_camera(views: Views, near: Camera) -> BoardFit:
+    """Fit camera, poses and board from an initial camera."""
+    poses = rough_poses(near, views)
+    state = BoardState(
+        (near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
+    )
+    straight = replace(near, distortion=np.zeros_like(near.distortion))
+    origin = replace(state, cameras=(straight,))
+    return adjust_board(views, state, (usual_distortion(near),), origin)
+
+
+def rms_together(errors: FloatArray, views: Views) -> float:
+    """Return the error of all points, px rms, given the error of each view."""
+    counts = views.seen.sum(axis=(1, 2))
+    return float(np.sqrt(np.average(errors**2, weights=counts)))
+
+
+def rough_poses(near: Camera, views: Views) -> BoardPoses:
+    """Return the poses of the views, also for a lens model that folds them."""
+    try:
+        return start_board_poses(near, views)
+    except CalibrationError:
+        straight = replace(near, distortion=np.zeros(FEW), lens=LensModel.BROWN)
+        return start_board_poses(straight, views)

@@ -1,0 +1,227 @@
+"""Features of least squares of the orthogonal distances, with the full covariance.
+
+The sum of the squared distances is minimised by Gauss-Newton steps with
+Levenberg-Marquardt's damping; the frame of the feature moves along, so the unknowns are
+small motions of it. At the solution the unknowns follow the points by
+
+    dp = -(J^T J)^-1 J^T G dX
+
+with the derivatives ``J`` of the distances by the unknowns and ``G`` by the points. It
+propagates the covariance of all points, common parts included, to the feature.
+
+References
+----------
+.. [1] A. B. Forbes, "Least-squares best-fit geometric elements", NPL Report DITC 140/89
+   (1989).
+.. [2] ISO 10360-6:2001, Estimation of errors in computing Gaussian associated features.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.model.rigid import rotation_from_vector, skew
+from lightpen_extensions.measure.measuring.starts import Start, starts
+from lightpen_extensions.measure.measuring.surfaces import (
+    NAMES,
+    SURFACES,
+    FeatureKind,
+    FeatureModel,
+)
+
+MAX_STEPS = 200
+ROUGHLY, CONVERGED = 1e-7, 1e-15  # of the extent of the points
+SHRINKS = 0.5  # a step before rounding by this at least
+LEAST_DAMPING, LARGEST_DAMPING = 1e-14, 1e8  # the least keeps a system regular
+ROUNDING = 1e-12  # relative, of a sum of squares: within it, no step is worse
+UNDETERMINED = 1e-7  # of the largest singular value, columns scaled
+FRAMED = {FeatureKind.POINT, FeatureKind.SPHERE}  # their axes mean nothing
+FOLLOWING = {
+    *(FeatureKind.LINE, FeatureKind.PLANE, FeatureKind.CYLINDER, FeatureKind.CONE)
+}
+PLACE, AXIS = slice(0, 3), slice(3, 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A fitted feature."""
+
+    kind: FeatureKind
+    # (3,), mm: centre of point, circle, sphere; of line, plane, cylinder and cone
+    # the point nearest to the mean of the points
+    origin: FloatArray
+    # (3, 3), of its frame, as columns; z is the axis of cylinder and cone, direction of
+    # a line, normal of plane and circle
+    axes: FloatArray
+    sizes: FloatArray  # (S,), see `FeatureModel.sizes`; radius of a cone at its origin
+    distances: FloatArray  # (N, K), of the points from it, mm
+    # (6 + S, 3 N), derivative of origin, axis and sizes by the points
+    by_points: FloatArray
+    # (N K, 3 N), derivative of the distances by the points, the feature following
+    distances_by_points: FloatArray
+    offsets: FloatArray  # (N, 3), from the feature to the points, mm
+
+    @property
+    def axis(self) -> FloatArray:
+        """Direction of the line, axis or normal, (3,)."""
+        return self.axes[:, 2]
+
+    @property
+    def values(self) -> FloatArray:
+        """Origin, axis and sizes, (6 + S,)."""
+        return np.concatenate([self.origin, self.axis, self.sizes])
+
+    @property
+    def form_error(self) -> float:
+        """Peak-to-valley distance, mm; of a line twice the largest."""
+        if self.kind in {FeatureKind.LINE, FeatureKind.POINT}:
+            return 2 * float(np.linalg.norm(self.distances, axis=1).max())
+        return float(np.ptp(self.distances[:, 0]))
+
+    def distance_of(self, point: FloatArray) -> float:
+        """Return the signed distance of a point (3,) from a surface, or its length."""
+        q = (point - self.origin) @ self.axes
+        off = SURFACES[self.kind].distances(q[None], self.sizes).values[0]
+        return float(off[0] if len(off) == 1 else np.linalg.norm(off))
+
+    def size(self, name: str) -> float:
+        """Return a size by its name."""
+        return float(self.sizes[SURFACES[self.kind].sizes.index(name)])
+
+
+def fit_feature(kind: FeatureKind, points: FloatArray) -> Feature:
+    """Fit a feature of a kind to points (N, 3), mm.
+
+    Raises `CalibrationError` if they are too few or do not determine the feature.
+    """
+    surface = SURFACES[kind]
+    if len(points) < surface.min_points:
+        raise CalibrationError(
+            "measuring.too-few",
+            kind=NAMES[kind],
+            n_points=len(points),
+            needed=surface.min_points,
+        )
+    solved = [_solve(surface, points, start, ROUGHLY) for start in starts(kind, points)]
+    best, _ = min(solved, key=lambda each: each[1])
+    return _feature(kind, points, _solve(surface, points, best, CONVERGED)[0])
+
+
+def _jacobian(
+    surface: FeatureModel, points: FloatArray, at: Start
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return distances (M,), their derivatives (M, U), and by the points (N, K, 3)."""
+    origin, axes, sizes = at
+    q = (points - origin) @ axes
+    found, J = surface.derivatives(q, sizes)
+    by_points = found.by_point @ axes.T
+    return found.values.ravel(), J.reshape(-1, surface.n_unknowns), by_points
+
+
+def _moved(surface: FeatureModel, at: Start, step: FloatArray) -> Start:
+    origin, axes, sizes = at
+    n_free = len(surface.free)
+    motion = np.zeros(6)
+    motion[list(surface.free)] = step[:n_free]
+    return (
+        origin + axes @ motion[:3],
+        axes @ rotation_from_vector(motion[3:]),
+        sizes + step[n_free:],
+    )
+
+
+def _solve(
+    surface: FeatureModel, points: FloatArray, start: Start, converged: float
+) -> tuple[Start, float]:
+    """Return the feature of least squares from a start, and its sum of squares."""
+    extent = max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
+    at, damping, before = start, 1e-6, np.inf
+    values, J, _ = _jacobian(surface, points, at)
+    cost = float(values @ values)
+    for _ in range(MAX_STEPS):
+        scale = np.sqrt(np.einsum("mu,mu->u", J, J)) + np.finfo(float).tiny
+        scaled, damper = J / scale, np.eye(J.shape[1])
+        if converged >= ROUGHLY:
+            normal = scaled.T @ scaled + damping * damper
+            step = np.linalg.solve(normal, -scaled.T @ values) / scale
+        else:
+            damped = np.vstack([scaled, np.sqrt(damping) * damper])
+            wanted = np.concatenate([-values, np.zeros(J.shape[1])])
+            step = np.linalg.lstsq(damped, wanted)[0] / scale
+        after = _moved(surface, at, step)
+        values_after, J_after, _ = _jacobian(surface, points, after)
+        cost_after = float(values_after @ values_after)
+        length = float(np.abs(step * scale).max()) / (extent * np.sqrt(len(points)))
+        # At the end rounding alone is left: steps are small and shrink no more.
+        small = length <= converged or SHRINKS * before < length < ROUGHLY
+        before = length
+        if cost_after <= cost * (1 + ROUNDING):
+            at, values, J = after, values_after, J_after
+            cost, damping = cost_after, max(damping / 10, LEAST_DAMPING)
+        else:
+            damping *= 10
+        if small or damping > LARGEST_DAMPING:
+            break
+    return at, cost
+
+
+def _feature(kind: FeatureKind, points: FloatArray, at: Start) -> Feature:
+    """Return a solved feature with its derivatives, in its standard form."""
+    surface = SURFACES[kind]
+    origin, axes, sizes = _standard(kind, points, at)
+    values, J, by_point = _jacobian(surface, points, (origin, axes, sizes))
+    scale = np.linalg.norm(J, axis=0)
+    if not (scale > 0).all() or _condition(J / scale) > 1 / UNDETERMINED:
+        raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
+    n, k, _ = by_point.shape
+    G = np.zeros((n, k, n, 3))
+    G[np.arange(n), :, np.arange(n)] = by_point
+    direct = G.reshape(n * k, 3 * n)
+    unknowns = -np.linalg.pinv(J) @ direct
+    by_distances = direct + J @ unknowns
+    n_free = len(surface.free)
+    motion = np.zeros((6, 3 * n))
+    motion[list(surface.free)] = unknowns[:n_free]
+    if kind in FOLLOWING:  # the mean of the points, where the feature is free
+        along = [i for i in range(3) if i not in surface.free]
+        a, b, _ = (points.mean(axis=0) - origin) @ axes
+        of_mean = axes.T @ np.tile(np.eye(3), n) / n
+        of_mean[2] += a * motion[4] - b * motion[3]
+        motion[along] = of_mean[along]
+        if kind is FeatureKind.CONE:
+            unknowns[n_free] += np.tan(sizes[1]) * motion[2]
+    by_points = np.concatenate(
+        [axes @ motion[:3], -skew(axes[:, 2]) @ axes @ motion[3:], unknowns[n_free:]]
+    )
+    distances = values.reshape(n, k)
+    offsets = np.einsum("nk,nkd->nd", distances, by_point)
+    return Feature(
+        kind, origin, axes, sizes, distances, by_points, by_distances, offsets
+    )
+
+
+def _condition(J: FloatArray) -> float:
+    singular = np.linalg.svd(J, compute_uv=False)
+    return float(singular[0] / max(singular[-1], np.finfo(float).tiny))
+
+
+def _standard(kind: FeatureKind, points: FloatArray, at: Start) -> Start:
+    """Return a feature with a unique frame and positive sizes."""
+    origin, axes, sizes = at
+    middle = points.mean(axis=0)
+    z = axes[:, 2]
+    if kind in FOLLOWING - {FeatureKind.PLANE}:
+        shift = float((middle - origin) @ z)
+        origin = origin + shift * z
+        if kind is FeatureKind.CONE:
+            sizes = np.array([sizes[0] + shift * np.tan(sizes[1]), sizes[1]])
+    elif kind is FeatureKind.PLANE:
+        origin = middle - float((middle - origin) @ z) * z
+    if kind is FeatureKind.CONE:
+        if sizes[1] < 0:
+            axes, sizes = axes * (1, -1, -1), sizes * (1, -1)
+    elif kind not in FRAMED and z[int(np.argmax(np.abs(z)))] < 0:
+        axes = axes * (1, -1, -1)
+    return origin, axes, sizes

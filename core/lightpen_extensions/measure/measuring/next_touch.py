@@ -1,0 +1,178 @@
+"""Most informative place of the next touch on a feature.
+
+Of places spread over the feature, the chosen one most reduces the volume of the
+covariance of its unknowns (D-optimal design [1]_): with the derivatives ``J`` of the
+distances of all touches and ``j`` of the new one, ``det(I + j (J^T J)^-1 j^T)`` is
+largest.
+
+References
+----------
+.. [1] V. V. Fedorov, "Theory of Optimal Experiments", Academic Press (1972), ch. 3.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen_extensions.measure.measuring.features import Feature
+from lightpen_extensions.measure.measuring.plan import Nominal
+from lightpen_extensions.measure.measuring.starts import frame_about
+from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
+
+RIDGE = 1e-6  # of the squares of a touch: what is known before the first
+N_ROUND, N_ALONG = 24, 5  # places round an axis and along it
+N_GRID = 7  # places along the sides of a plane
+INSIDE = 0.8  # of the extent: edges are not probed
+HALF_ANGLE = np.radians(70.0)  # of a sphere, about its accessible pole
+APART = 1.0  # mm, of two touches
+USUAL_LENGTH = 20.0  # mm, of a feature whose nominal has none
+
+
+@dataclass(frozen=True, eq=False)
+class ProbedArea:
+    """A feature and how far it reaches."""
+
+    kind: FeatureKind
+    origin: FloatArray  # (3,), as `features.Feature` has them
+    axes: FloatArray  # (3, 3)
+    sizes: FloatArray  # (S,)
+    half: FloatArray  # (3,), half of its extent along its axes, mm
+    # (3,), direction to the accessible side of a sphere, frame of the feature
+    pole: FloatArray
+
+    def local(self, points: FloatArray) -> FloatArray:
+        """Return points (N, 3) in the frame of the feature."""
+        return np.asarray((points - self.origin) @ self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place on a feature, and the normal there, out of round surfaces; (3,) each."""
+
+    point: FloatArray
+    normal: FloatArray
+
+
+def area_of(feature: Feature, points: FloatArray) -> ProbedArea:
+    """Return the area that points (N, 3) were probed on."""
+    q = (points - feature.origin) @ feature.axes
+    middle = q.mean(axis=0)
+    length = float(np.linalg.norm(middle))
+    pole = middle / length if length > 0 else np.array([0.0, 0.0, 1.0])
+    half = np.maximum(np.abs(q).max(axis=0), 1e-9)
+    return ProbedArea(
+        feature.kind, feature.origin, feature.axes, feature.sizes, half, pole
+    )
+
+
+def nominal_area(kind: FeatureKind, nominal: Nominal) -> ProbedArea | None:
+    """Return the area of a feature by its nominals; None if they do not suffice."""
+    if nominal.origin is None:
+        return None
+    z = np.array(nominal.axis or (0.0, 0.0, 1.0))
+    length = nominal.length or USUAL_LENGTH
+    width = nominal.width or length
+    radius = (nominal.diameter or 0.0) / 2
+    named = {"radius": radius, "half_angle": np.radians((nominal.angle or 90.0) / 2)}
+    names = SURFACES[kind].sizes
+    if names and not radius:
+        return None
+    is_flat = kind is FeatureKind.PLANE
+    half = [length, width, 0.0] if is_flat else [radius, radius, length]
+    return ProbedArea(
+        kind,
+        np.array(nominal.origin),
+        _level_frame(z),
+        np.array([named[name] for name in names]),
+        INSIDE / 2 * np.array(half),
+        np.array([0.0, 0.0, 1.0]),
+    )
+
+
+def _level_frame(z: FloatArray) -> FloatArray:
+    """Return axes about z with x as close to the x axis of the part as possible."""
+    z = z / np.linalg.norm(z)
+    along = np.array([1.0, 0.0, 0.0])
+    x = along - (along @ z) * z
+    if np.linalg.norm(x) < 0.1:
+        return frame_about(z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+def best_places(
+    area: ProbedArea, n: int, touched: FloatArray | None = None
+) -> list[Place]:
+    """Return the n most informative places, one after the other.
+
+    ``touched`` (N, 3) are points that are probed already.
+    """
+    surface = SURFACES[area.kind]
+    places = _places(area)
+    J = surface.derivatives(places, area.sizes)[1]
+    unit = float(np.mean(np.sum(J**2, axis=(1, 2)))) / surface.n_unknowns
+    scale = np.sqrt(np.mean(J**2, axis=(0, 1))) + 1e-12
+    J = J / scale
+    known = RIDGE * np.eye(surface.n_unknowns) * max(unit, 1.0)
+    if touched is not None and len(touched):
+        own = surface.derivatives(area.local(touched), area.sizes)[1] / scale
+        own = own.reshape(-1, surface.n_unknowns)
+        known = known + own.T @ own
+    is_free = np.ones(len(places), dtype=bool)
+    if touched is not None and len(touched):
+        away = np.linalg.norm(places[:, None] - area.local(touched), axis=2)
+        is_free = away.min(axis=1) > APART
+    found = []
+    for _ in range(n):
+        if not is_free.any():
+            is_free[:] = True
+        inner = J @ np.linalg.inv(known) @ np.swapaxes(J, 1, 2)
+        gains = np.linalg.slogdet(np.eye(inner.shape[1]) + inner)[1]
+        best = int(np.argmax(np.where(is_free, gains, -np.inf)))
+        is_free &= np.linalg.norm(places - places[best], axis=1) > APART
+        known = known + J[best].T @ J[best]
+        found.append(_place(area, places[best]))
+    return found
+
+
+def _place(area: ProbedArea, q: FloatArray) -> Place:
+    gradient = SURFACES[area.kind].distances(q[None], area.sizes).by_point[0]
+    normal = gradient[0] if area.kind is not FeatureKind.POINT else gradient[2]
+    if area.kind is FeatureKind.LINE:
+        normal = np.array([0.0, 0.0, 0.0])
+    return Place(area.origin + area.axes @ q, area.axes @ normal)
+
+
+def _places(area: ProbedArea) -> FloatArray:
+    """Return places (N, 3) spread over a feature, in its frame."""
+    along = np.linspace(-1, 1, N_ALONG) * area.half[2]
+    turn = 2 * np.pi * np.arange(N_ROUND) / N_ROUND
+    round_ = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(N_ROUND)])
+    match area.kind:
+        case FeatureKind.POINT:
+            return np.zeros((1, 3))
+        case FeatureKind.LINE:
+            return np.outer(along, [0.0, 0.0, 1.0])
+        case FeatureKind.PLANE:
+            side = np.linspace(-1, 1, N_GRID)
+            x, y = np.meshgrid(side * area.half[0], side * area.half[1])
+            return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+        case FeatureKind.CIRCLE:
+            return np.asarray(area.sizes[0] * round_)
+        case FeatureKind.SPHERE:
+            tilt = np.linspace(0.0, HALF_ANGLE, N_ALONG)
+            caps = [
+                np.sin(t) * round_ + np.cos(t) * np.array([0.0, 0.0, 1.0]) for t in tilt
+            ]
+            return np.asarray(
+                area.sizes[0] * np.concatenate(caps) @ frame_about(area.pole).T
+            )
+        case FeatureKind.CYLINDER | FeatureKind.CONE:
+            slope = 0.0 if area.kind is FeatureKind.CYLINDER else np.tan(area.sizes[1])
+            return np.concatenate(
+                [
+                    (area.sizes[0] + slope * z) * round_ + np.array([0.0, 0.0, z])
+                    for z in along
+                ]
+            )

@@ -1,0 +1,456 @@
+"""Measurement of a part: features, alignment and characteristics of a plan."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import inf
+
+import numpy as np
+from msgspec import structs
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.errors import CalibrationError
+from lightpen.model.artefacts import Side
+from lightpen.model.decision_rules import Decision, conformity_probability, decide
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.record.folder.verifications import at_position
+from lightpen_extensions.measure.measuring import constructions
+from lightpen_extensions.measure.measuring.alignment import (
+    MIN_POINTS,
+    Alignment,
+    align_321,
+    align_points,
+    tie,
+)
+from lightpen_extensions.measure.measuring.characteristics import (
+    DEVIATIONS,
+    Measured,
+    Value,
+    evaluate,
+)
+from lightpen_extensions.measure.measuring.compensation import (
+    Evidence,
+    Normal,
+    ProbedFeature,
+    TouchedSurface,
+    along_touches,
+    surface_of,
+)
+from lightpen_extensions.measure.measuring.features import (
+    AXIS,
+    PLACE,
+    Feature,
+    fit_feature,
+)
+from lightpen_extensions.measure.measuring.plan import (
+    NEVER,
+    CharacteristicKind,
+    Nominal,
+    Plan,
+    PlannedCharacteristic,
+    PlannedConstruction,
+    PlannedFeature,
+)
+from lightpen_extensions.measure.measuring.quantities import (
+    Quantity,
+    derive,
+    quantity_of,
+)
+from lightpen_extensions.measure.measuring.recognition import recognise, recognised
+from lightpen_extensions.measure.measuring.surfaces import (
+    CENTRED,
+    NAMES,
+    SURFACES,
+    FeatureKind,
+)
+from lightpen_extensions.measure.measuring.touches import PartTouches
+from lightpen_extensions.measure.measuring.zones import Criterion, fit_zone
+
+OTHER_KIND = 0.05  # of the extent of points: farther off they show another kind
+FLAT_POINTS = 0.005  # of that extent: points as flat do not determine solids
+SOLID = {FeatureKind.SPHERE, FeatureKind.CYLINDER, FeatureKind.CONE}
+OUTLYING = 6.0  # of their noise, which is added to both
+MAX_SPREAD = 0.1  # rad of an axis, or of a size: more is not determined
+LYING = 0.2  # mm from a plane, of a point or line that was probed on it
+ROUNDS = 3  # of alignments by points whose normals are stated in the frame they give
+
+
+@dataclass(frozen=True, eq=False)
+class CharacteristicResult:
+    """A characteristic beside its tolerance."""
+
+    planned: PlannedCharacteristic
+    value: Value  # its U with that of a certified value
+    lower: float  # limits, mm or degrees; infinite without a tolerance
+    upper: float
+    decision: Decision | None  # None without a tolerance
+    probability: float | None  # probability of conformity (JCGM 106)
+    quantity: Quantity | None = None  # None for geometrical deviations
+
+    @property
+    def deviation(self) -> float | None:
+        """Value less nominal, mm or degrees."""
+        nominal = self.planned.nominal
+        return None if nominal is None else self.value.value - nominal
+
+    @property
+    def margin(self) -> float:
+        """The larger limit of the deviation, mm or degrees; infinite without one."""
+        nominal = self.planned.nominal or 0.0
+        return max(
+            self.upper - nominal, nominal - self.lower if self.lower > -inf else 0
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPart:
+    """A measured part."""
+
+    plan: Plan
+    touches: PartTouches
+    features: Mapping[str, Measured]  # all features and constructed features by name
+    alignment: Alignment | None  # None if results are in the frame of the camera
+    results: tuple[CharacteristicResult, ...]
+    # Motion of each later position to the first one, by datum points.
+    ties: Mapping[int, Alignment] = field(default_factory=dict)
+
+    def uncertainty(self, name: str) -> FloatArray:
+        """Return U (k = 2) of a feature's values in the frame of the part."""
+        return self.features[name].in_part.uncertainty(self.touches.inputs)
+
+
+def measure_part(
+    plan: Plan, touches: PartTouches, limits: VerificationLimits | None = None
+) -> MeasuredPart:
+    """Measure a part by a plan.
+
+    The limits judge the errors of certified values, and have the decision rule unless
+    the plan states one. Raises `CalibrationError` if a feature has too few touches or
+    none, its side or normal is unknown, or a characteristic is not defined for its
+    features.
+    """
+    limits = limits or VerificationLimits()
+    limits = replace(limits, rule=plan.rule or limits.rule)
+    were_recognised = {each.name for each in plan.features if each.kind is None}
+    plan = _with_kinds(plan, touches)
+    probed, ties = _probed(plan, touches)
+    surfaces = _surfaces(plan, probed, touches, were_recognised)
+    alignment = _aligned(plan, surfaces)
+    features = {}
+    for name, surface in surfaces.items():
+        own = surface.quantity
+        in_part = own if alignment is None else alignment.in_part(own)
+        features[name] = Measured(surface, in_part)
+        if name in probed:
+            each = probed[name]
+            nominal = each.planned.nominal
+            features[name] = Measured(surface, in_part, each.fit, each.points, nominal)
+    results = tuple(
+        _result(planned, features, touches, limits) for planned in plan.characteristics
+    )
+    return MeasuredPart(plan, touches, features, alignment, results, ties)
+
+
+def _probed(
+    plan: Plan, touches: PartTouches
+) -> tuple[dict[str, ProbedFeature], dict[int, Alignment]]:
+    """Return the features of ball centres, all in the first position.
+
+    Features with a centre that were probed in an earlier position and in a later one
+    are the datum points that tie the two together.
+    """
+    ties: dict[int, Alignment] = {}
+    probed: dict[str, ProbedFeature] = {}
+    for position in touches.positions:
+        own: dict[str, ProbedFeature] = {}
+        for each in plan.features:
+            name = at_position(each.name, position)
+            at = touches.of(name)
+            if len(at) or (position == 1 and not len(touches.first_of(each.name))):
+                own[each.name] = _of_centres(each, name, touches)
+        if position > 1:
+            shared = [n for n in own if n in probed and own[n].kind in CENTRED]
+            if len(shared) < MIN_POINTS:
+                raise CalibrationError(
+                    "measuring.not-tied",
+                    position=position,
+                    n_shared=len(shared),
+                    needed=MIN_POINTS,
+                )
+            ties[position] = motion = tie(
+                [probed[name].quantity for name in shared],
+                [own[name].quantity for name in shared],
+                touches.inputs,
+            )
+            own = {
+                name: replace(
+                    each,
+                    quantity=motion.in_part(each.quantity),
+                    points=motion.moved(each.points),
+                )
+                for name, each in own.items()
+            }
+        probed = {**own, **probed}
+    return {each.name: probed[each.name] for each in plan.features}, ties
+
+
+def _of_centres(
+    planned: PlannedFeature, name: str, touches: PartTouches
+) -> ProbedFeature:
+    """Return a feature of the ball centres of a name."""
+    at = touches.of(name)
+    fit = _fitted(structs.replace(planned, name=name), touches)
+    quantity = quantity_of(fit, 3 * at, touches.n_inputs)
+    if fit.kind in {FeatureKind.LINE, FeatureKind.CYLINDER}:
+        quantity = along_touches(quantity, touches.points_cam[at])
+    return ProbedFeature(planned, fit, at, quantity, touches.points(at))
+
+
+def _surfaces(
+    plan: Plan,
+    probed: Mapping[str, ProbedFeature],
+    touches: PartTouches,
+    were_recognised: set[str],
+) -> dict[str, TouchedSurface]:
+    """Return the surfaces of all features, and the constructed ones.
+
+    Points and lines come last: their normals are those of planes, or vectors in the
+    frame of the part, whose directions the ball does not change.
+    """
+    compensates = touches.ball_radius > 0
+    thin = {n: each for n, each in probed.items() if compensates and each.needs_normal}
+    found = {
+        n: surface_of(each, touches) for n, each in probed.items() if n not in thin
+    }
+    planes = {n: each for n, each in found.items() if each.kind is FeatureKind.PLANE}
+    normals = {n: _normal_of_plane(each, planes, touches) for n, each in thin.items()}
+    for name, each in thin.items():  # as long as the frame of the part is not known
+        found[name] = TouchedSurface(
+            each.kind, each.quantity, Side.CENTRE, Evidence.NONE
+        )
+    for _ in range(ROUNDS if thin else 0):
+        frame = None if plan.alignment is None else _aligned(plan, _with(plan, found))
+        for name, each in thin.items():
+            normal = normals[name] or _normal_of_plan(each, frame)
+            if normal is not None or name not in were_recognised:
+                found[name] = surface_of(each, touches, normal)
+    return _with(plan, {each.name: found[each.name] for each in plan.features})
+
+
+def _with(plan: Plan, surfaces: dict[str, TouchedSurface]) -> dict[str, TouchedSurface]:
+    """Return the surfaces with the constructed ones."""
+    for planned in plan.constructions:
+        surfaces = {**surfaces, planned.name: _constructed(planned, surfaces)}
+    return surfaces
+
+
+def _normal_of_plane(
+    probed: ProbedFeature, planes: Mapping[str, TouchedSurface], touches: PartTouches
+) -> Normal | None:
+    """Return the normal of the plane that the plan names, or that the feature is on."""
+    named, points = probed.planned.surface, probed.points.values.reshape(-1, 3)
+    limit = max(LYING, OUTLYING * touches.noise(probed.at))
+    for name, plane in planes.items():
+        place, normal = plane.quantity.values[PLACE], plane.quantity.values[AXIS]
+        heights = (points - place) @ normal - touches.ball_radius
+        is_on = not probed.planned.normal and bool((np.abs(heights) <= limit).all())
+        if name == named or (not named and is_on):
+            return Normal(derive(lambda p: p[AXIS], plane.quantity), Evidence.PLANE)
+    return None
+
+
+def _normal_of_plan(probed: ProbedFeature, frame: Alignment | None) -> Normal | None:
+    """Return the normal that the plan states in the frame of the part, or camera."""
+    stated = probed.planned.normal
+    if stated is None:
+        return None
+    vector = np.array(stated) / np.linalg.norm(stated)
+    if frame is None:
+        fixed = Quantity(vector, np.zeros((3, probed.quantity.by_inputs.shape[1])))
+        return Normal(fixed, Evidence.PLAN)
+    turned = derive(lambda m: rotation_from_vector(m[:3]).T @ vector, frame.motion)
+    return Normal(turned, Evidence.PLAN)
+
+
+def _with_kinds(plan: Plan, touches: PartTouches) -> Plan:
+    """Return a plan with the kinds that its touches show where it states none."""
+    return structs.replace(
+        plan,
+        features=tuple(
+            each
+            if each.kind is not None
+            else structs.replace(
+                each,
+                kind=recognised(each.name, kind_of(each.name, touches)),
+                touches=None,
+            )
+            for each in plan.features
+        ),
+    )
+
+
+def taught_plan(part: MeasuredPart) -> Plan:
+    """Return the plan of a part with its features, as measured, for nominals."""
+
+    def nominal_of(name: str) -> Nominal:
+        values, kind = part.features[name].in_part.values, part.features[name].kind
+        sizes = dict(zip(SURFACES[kind].sizes, values[6:].tolist(), strict=True))
+        radius, half = sizes.get("radius"), sizes.get("half_angle")
+        return Nominal(
+            origin=tuple(values[:3].tolist()),
+            axis=tuple(values[3:6].tolist()),
+            diameter=None if radius is None else 2 * radius,
+            angle=None if half is None else float(np.rad2deg(2 * half)),
+        )
+
+    return structs.replace(
+        part.plan,
+        features=tuple(
+            structs.replace(
+                each,
+                nominal=each.nominal or nominal_of(each.name),
+                side=part.features[each.name].surface.side
+                if each.kind is not FeatureKind.PLANE
+                and part.features[each.name].surface.evidence is Evidence.NONE
+                else each.side,
+                touches=len(part.touches.first_of(each.name)),
+            )
+            for each in part.plan.features
+        ),
+    )
+
+
+def kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
+    """Return the kind that the touches of a feature show, if they do."""
+    at = touches.first_of(name)
+    if not len(at):
+        return None
+    return recognise(
+        touches.points_cam[at], touches.noise(at), touches.approaches_cam[at]
+    )
+
+
+def _fitted(planned: PlannedFeature, touches: PartTouches) -> Feature:
+    at = touches.of(planned.name)
+    if not len(at) or len(at) < (planned.touches or 0):
+        raise CalibrationError(
+            "measuring.missing-touches",
+            name=planned.name,
+            n_touches=len(at),
+            needed=planned.touches or 1,
+        )
+    try:
+        return _determined(planned, touches, at)
+    except CalibrationError as error:
+        raise CalibrationError(
+            "measuring.of-feature", name=planned.name, said=error.message
+        ) from error
+
+
+def _determined(planned: PlannedFeature, touches: PartTouches, at: IntArray) -> Feature:
+    """Return the fit to touches that lie on a feature of its kind and determine it."""
+    kind, points = planned.kind, touches.points_cam[at]
+    assert kind is not None
+    feature = fit_feature(kind, points)
+    off = float(np.linalg.norm(feature.distances, axis=1).max())
+    extent = float(np.ptp(points, axis=0).max())
+    noise = OUTLYING * touches.noise(at)
+    limit = OTHER_KIND * extent + noise
+    if off > limit and kind is not FeatureKind.POINT:
+        raise CalibrationError("measuring.other-kind", kind=NAMES[kind], off=off)
+    if kind in SOLID:
+        height = fit_feature(FeatureKind.PLANE, points).form_error
+        if height < FLAT_POINTS * extent + noise:
+            raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
+    _require_determined(feature, touches, at)
+    if planned.criterion == NEVER:
+        return feature
+    # The points that touch the zone define it; its U is taken from least squares.
+    origin, axes, sizes, _ = fit_zone(kind, points, Criterion(planned.criterion))
+    return replace(feature, origin=origin, axes=axes, sizes=sizes)
+
+
+def _require_determined(feature: Feature, touches: PartTouches, at: IntArray) -> None:
+    """Refuse touches that determine a feature by their noise alone."""
+    columns = touches.columns(at)
+    spread = feature.by_points @ touches.covariance[np.ix_(columns, columns)]
+    variances = np.einsum("ij,ij->i", spread, feature.by_points)
+    tilt = float(np.sqrt(variances[AXIS].sum()))
+    sizes = np.sqrt(variances[6:]) > MAX_SPREAD * np.abs(feature.sizes)
+    if tilt > MAX_SPREAD or sizes.any():
+        raise CalibrationError("measuring.undetermined", kind=NAMES[feature.kind])
+
+
+def _constructed(
+    planned: PlannedConstruction, surfaces: Mapping[str, TouchedSurface]
+) -> TouchedSurface:
+    of = [surfaces[name] for name in planned.of]
+    made = constructions.constructor(planned.construct, [each.kind for each in of])
+    if made is None:
+        raise CalibrationError("measuring.no-construction", name=planned.name)
+    found = derive(made.made_from, *(of[i].quantity for i in made.order))
+    if made.kind is FeatureKind.POINT:  # without a direction
+        found = derive(lambda place: np.concatenate([place, [0.0, 0.0, 1.0]]), found)
+    return TouchedSurface(made.kind, found, Side.OUTSIDE, Evidence.NONE)
+
+
+def _aligned(plan: Plan, surfaces: Mapping[str, TouchedSurface]) -> Alignment | None:
+    planned = plan.alignment
+    if planned is None:
+        return None
+    if planned.points:
+        nominals = [plan.feature(name).nominal for name in planned.points]
+        places = np.array([each.origin for each in nominals if each is not None])
+        return align_points([surfaces[n].quantity for n in planned.points], places)
+    return align_321(
+        surfaces[planned.plane].quantity,
+        surfaces[planned.line].quantity,
+        surfaces[planned.point].quantity,
+    )
+
+
+def _result(
+    planned: PlannedCharacteristic,
+    features: Mapping[str, Measured],
+    touches: PartTouches,
+    limits: VerificationLimits,
+) -> CharacteristicResult:
+    value, quantity = evaluate(planned, features, touches)
+    lower, upper = planned.limits
+    if planned.certified is not None:
+        both = float(np.hypot(value.uncertainty, planned.certified))
+        value = replace(value, uncertainty=both)
+        if planned.tolerance is None:
+            lower, upper = _limits_of_error(planned, limits)
+    decision, probability = None, None
+    if upper < inf:
+        of_value = value.value, value.uncertainty
+        decision = decide(
+            *(limits.rule, *of_value),
+            lower=lower,
+            upper=upper,
+            max_risk=limits.risk / 100,
+        )
+        probability = conformity_probability(*of_value, lower=lower, upper=upper)
+    return CharacteristicResult(
+        planned, value, lower, upper, decision, probability, quantity
+    )
+
+
+def _limits_of_error(
+    planned: PlannedCharacteristic, limits: VerificationLimits
+) -> tuple[float, float]:
+    """Return the limits of a certified value by the limits of the station."""
+    nominal = planned.nominal or 0.0
+    match planned.quantity:
+        case CharacteristicKind.RADIUS:
+            limit = limits.radius
+        case CharacteristicKind.DIAMETER:
+            limit = 2 * limits.radius
+        case CharacteristicKind.LENGTH | CharacteristicKind.DISTANCE:
+            limit = limits.length_error(nominal)
+        case _ if planned.quantity in DEVIATIONS:
+            return -inf, nominal + limits.form
+        case _:
+            return -inf, inf
+    return nominal - limit, nominal + limit

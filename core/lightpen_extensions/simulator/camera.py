@@ -1,0 +1,335 @@
+"""The simulated pen as a live camera.
+
+Exposure and gain act as on a real sensor: the light of an LED fills the same fraction
+of full scale when one is doubled and the other halved, but then fewer electrons make it
+up and the image is noisier.
+"""
+
+from dataclasses import replace
+from math import ceil, floor
+from typing import Literal
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.protocol import (
+    CameraCapabilities,
+    CameraSettings,
+    ConfigError,
+    Frame,
+    FrameTimeout,
+    Range,
+    Stats,
+    sealed,
+)
+from lightpen.model.rig import Rig
+from lightpen_extensions.simulator.hand import HandPose, Operator
+from lightpen_extensions.simulator.image_plans import (
+    ImagePlan,
+    camera_turn,
+    lamps_beside,
+    led_faces,
+    led_gains,
+    render_plan,
+)
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import leds_in_camera
+from lightpen_extensions.simulator.view import Lamp, View
+
+SERIAL = "SIM-1"
+EXPOSURE_US = Range(10.0, 50_000.0, 1.0)
+GAIN_DB = Range(0.0, 24.0, 0.1)
+FRAME_RATE = Range(0.1, 200.0)
+USUAL_EXPOSURE_US = 1000.0  # short, so that the swing hardly blurs
+USUAL_FRAME_RATE = 20.0
+UNSEEN = 4  # times the period, while no image is displayed
+BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
+
+N_BUFFERED = 16  # images that wait for a late reader, as with real cameras
+MAX_POSES = 64  # through one exposure
+TURNING_TIME = 60.0  # s, for the whole rotation of the camera in the scene
+STILL = 0.02  # px moved during the exposure that blur hides
+
+
+class SimulatedCamera:
+    """A camera with a simulated operator and pen in view.
+
+    With a `SkippingClock` images come as fast as they are made, and waits for its
+    reader; else it is a live camera, which loses images that are not read in time.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Pen, camera, tip, cone, optics and sensor; its swing and its disturbances are
+        left out.
+    operator : Operator, optional
+        Must use the same clock.
+    rig : Rig, optional
+        The camera is the second of it, and the scene before the first.
+    lamps : tuple of Lamp
+        Foreign lights in the picture.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | None = None,
+        clock: Clock | None = None,
+        operator: Operator | None = None,
+        *,
+        lamps: tuple[Lamp, ...] = (),
+        serial: str = SERIAL,
+        rig: Rig | None = None,
+    ) -> None:
+        self.scene = scene or Scene()
+        self._place = np.eye(3), np.zeros(3)  # cam_from_rig
+        if rig is not None:
+            self._place = rig.rotations[1], rig.translations[1]
+            self.scene = replace(self.scene, camera=rig.cameras[1], viewpoint=1)
+        self._clock = clock or MachineClock()
+        n_leds = self.scene.pen.n_leds
+        self.operator = operator or Operator(
+            self._clock, self.scene.seed, n_leds=n_leds
+        )
+        self._lamps = lamps
+        self._serial = serial
+        self._gains = led_gains(self.scene)
+        self._faces = led_faces(self.scene)
+        self._settings = self._usual_settings
+        self._stats = Stats()
+        self.is_seen = True  # displayed; else fewer images are made
+        self._next_seq = 0
+        self._is_open = self._is_streaming = False
+        self._next_end = 0.0  # of the exposure of the next image
+
+    @property
+    def serial(self) -> str:
+        """Serial number."""
+        return self._serial
+
+    @property
+    def caps(self) -> CameraCapabilities:
+        """Capabilities of the camera."""
+        self._check_open()
+        usual = f"Mono{self.scene.sensor.bits}"
+        others = tuple(name for name in BITS if name != usual)
+        return CameraCapabilities(
+            width=self.scene.camera.width,
+            height=self.scene.camera.height,
+            pixel_formats=(usual, *others),
+            exposure_us=EXPOSURE_US,
+            gain_db=GAIN_DB,
+            frame_rate=FRAME_RATE,
+            waits=not self._clock.is_real,
+        )
+
+    def open(self) -> None:
+        """Open the camera; no-op if it is open."""
+        self._is_open = True
+
+    def close(self) -> None:
+        """Stop and close the camera."""
+        self.stop()
+        self._is_open = False
+
+    def configure(self, settings: CameraSettings) -> CameraSettings:
+        """Apply settings before the start; return the actual ones."""
+        self.probe()
+        if self._is_streaming:
+            raise ValueError("`configure` needs a stopped camera.")
+        now = self._settings
+        pixel_format = settings.pixel_format or now.pixel_format
+        if pixel_format not in BITS:
+            raise ConfigError(
+                "camera.pixel-format", wanted=str(pixel_format), offered=", ".join(BITS)
+            )
+        self._settings = CameraSettings(
+            exposure_us=_applied(EXPOSURE_US, settings.exposure_us, now.exposure_us),
+            gain_db=_applied(GAIN_DB, settings.gain_db, now.gain_db),
+            frame_rate=_applied(FRAME_RATE, settings.frame_rate, now.frame_rate),
+            pixel_format=pixel_format,
+        )
+        return self._settings
+
+    def set_exposure(self, exposure_us: float) -> float:
+        """Set the exposure of the next images; return the actual one, us."""
+        self.probe()
+        applied = EXPOSURE_US.nearest(exposure_us)
+        self._settings = replace(self._settings, exposure_us=applied)
+        return applied
+
+    def set_gain(self, gain_db: float) -> float:
+        """Set the gain of the next images; return the actual one, dB."""
+        self.probe()
+        applied = GAIN_DB.nearest(gain_db)
+        self._settings = replace(self._settings, gain_db=applied)
+        return applied
+
+    def start(self) -> None:
+        """Start streaming; no-op while streaming."""
+        self.probe()
+        if not self._is_streaming:
+            self._is_streaming = True
+            # On the beat of the clock, as if one signal triggered all cameras.
+            self._next_end = (floor(self._now / self._period) + 1) * self._period
+
+    def stop(self) -> None:
+        """Stop streaming; no-op if stopped."""
+        self._is_streaming = False
+
+    def read(self, timeout_s: float) -> Frame:
+        """Return the next image, rendered now."""
+        self._check_streaming()
+        self._await_image(timeout_s)
+        frame = self._take_image()
+        self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
+        return frame
+
+    def probe(self) -> None:
+        """Raise an error unless the camera responds."""
+        self._check_open()
+
+    def stats(self) -> Stats:
+        """Return the frame counters."""
+        return self._stats
+
+    @property
+    def _now(self) -> float:
+        return self._clock.now_ns() * 1e-9
+
+    @property
+    def _usual_settings(self) -> CameraSettings:
+        return CameraSettings(
+            exposure_us=USUAL_EXPOSURE_US,
+            gain_db=0.0,
+            frame_rate=USUAL_FRAME_RATE,
+            pixel_format=f"Mono{self.scene.sensor.bits}",
+        )
+
+    @property
+    def _exposure(self) -> float:
+        return (self._settings.exposure_us or USUAL_EXPOSURE_US) * 1e-6
+
+    @property
+    def _period(self) -> float:
+        rate = self._settings.frame_rate or USUAL_FRAME_RATE
+        unseen = 1 if self.is_seen else UNSEEN
+        return unseen * max(1 / rate, self._exposure)
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise ValueError("The camera is not open: call `open` first.")
+
+    def _check_streaming(self) -> None:
+        self._check_open()
+        if not self._is_streaming:
+            raise ValueError("The camera delivers no images: call `start` first.")
+
+    def _await_image(self, timeout_s: float) -> None:
+        """Wait until the exposure of the next image has ended."""
+        limit = self._now + timeout_s
+        end = self._schedule_next()
+        if end > limit:
+            self._clock.wait(limit - self._now)
+            self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
+            raise FrameTimeout("camera.no-image", serial=self._serial, waited=timeout_s)
+        self._clock.wait(end - self._now)
+
+    def _schedule_next(self) -> float:
+        """Return the end of the exposure of the next image, s."""
+        n_late = ceil((self._now - self._next_end) / self._period - N_BUFFERED)
+        if n_late > 0:
+            self._lose(n_late)
+            self._next_end += n_late * self._period
+        return self._next_end
+
+    def _lose(self, n_frames: int) -> None:
+        self._next_seq += n_frames
+        self._stats = replace(self._stats, missed=self._stats.missed + n_frames)
+
+    def _take_image(self) -> Frame:
+        end = self._next_end
+        self._next_end += self._period
+        seq = self._next_seq
+        self._next_seq += 1
+        return self._expose(seq, end)
+
+    def _expose(self, seq: int, end: float) -> Frame:
+        settings = self._settings
+        pixel_format = settings.pixel_format or "Mono8"
+        times = end - self._exposure * np.array([1.0, 0.5, 0.0])
+        scene = _with_gain(self.scene, settings)
+        shown = self.operator.in_view
+        if shown is None:
+            image = render_plan(scene, self._image_plan(scene, seq, times))
+        else:
+            rng = np.random.default_rng([scene.seed, seq])
+            image = shown.image(scene.camera, scene.sensor, times[1], rng)
+        return Frame(
+            image=sealed(image),
+            seq=seq,
+            host_ts_ns=self._clock.now_ns(),
+            device_ts_ns=round(times[0] * 1e9),
+            exposure_us=settings.exposure_us,
+            gain_db=settings.gain_db,
+            pixel_format=pixel_format,
+            full_scale=2 ** BITS[pixel_format] - 1,
+        )
+
+    def _image_plan(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
+        """Return the plan of the image exposed between the first and the last time."""
+        held = self.operator.held(times)
+        rotations, translations = self._poses(scene, held)
+        moved = _pixels_moved(scene, rotations, translations)
+        if held.is_away or moved <= STILL:
+            path = slice(1, 2)
+            shown = rotations[path], translations[path]
+        else:
+            n_poses = min(3 + int(moved / scene.optics.psf_sigma), MAX_POSES)
+            parts = (np.arange(n_poses) + 0.5) / n_poses
+            between = times[0] + parts * (times[-1] - times[0])
+            shown = self._poses(scene, self.operator.held(between))
+        gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
+        gains[[led - 1 for led in held.covered]] = 0
+        share = float(times[1]) / TURNING_TIME
+        turn = camera_turn(scene, share)
+        shown = turn @ shown[0], shown[1] @ turn.T
+        lamps = (*self._lamps, *lamps_beside(scene, share))
+        view = View(*shown, gains, lamps, faces=self._faces)
+        return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
+
+    def _poses(self, scene: Scene, held: HandPose) -> tuple[FloatArray, FloatArray]:
+        """Return cam_from_pen of a hand pose."""
+        R, t = self._place
+        rotations = held.postures.rotations
+        translations = scene.cone_cam + held.offsets - rotations @ scene.tip_pen
+        return R @ rotations, translations @ R.T + t
+
+
+def _applied(
+    offered: Range, wanted: float | None, present: float | None
+) -> float | None:
+    return present if wanted is None else offered.nearest(wanted)
+
+
+def _with_gain(scene: Scene, settings: CameraSettings) -> Scene:
+    """Return the scene with exposure and gain applied."""
+    gain = 10 ** ((settings.gain_db or 0.0) / 20)
+    exposure = (settings.exposure_us or USUAL_EXPOSURE_US) / USUAL_EXPOSURE_US
+    optics = replace(scene.optics, exposure=scene.optics.exposure * exposure * gain)
+    sensor = replace(
+        scene.sensor,
+        bits=BITS[settings.pixel_format or "Mono8"],
+        full_well=scene.sensor.full_well / gain,
+        offset=scene.sensor.offset / gain,  # the same number in the image
+    )
+    return replace(scene, optics=optics, sensor=sensor)
+
+
+def _pixels_moved(
+    scene: Scene, rotations: FloatArray, translations: FloatArray
+) -> float:
+    """Return the largest displacement of an LED between the two poses, px."""
+    leds, _ = leds_in_camera(scene.pen, rotations[[0, -1]], translations[[0, -1]])
+    first, last = scene.camera.project(leds)
+    return float(np.linalg.norm(last - first, axis=-1).max())

@@ -1,0 +1,165 @@
+"""``lightpen simulate``: write a simulated swing."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from lightpen.commands.arguments import number_from, whole_number
+from lightpen.commands.console import printing, progress, shown
+from lightpen.model.pen import DISC_DIAMETER
+
+LED_DIAMETERS = (2.0, 12.0)  # mm, of simulated LEDs
+MAX_RIG = 4  # simulated cameras
+BASELINES = (50.0, 1500.0)  # mm, between simulated cameras
+BLURS = (0.3, 8.0)  # px, of simulated optics
+LARGEST_SHIFT = 10.0  # px, of simulated images
+MAX_RENDERED = 30_000  # images
+
+
+def add_simulate(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen simulate``."""
+    parser.set_defaults(run=_simulate)
+    parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
+    parser.add_argument(
+        "--images",
+        type=_n_images,
+        default=60,
+        metavar="N",
+        help="number of images (60)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=whole_number,
+        default=0,
+        metavar="S",
+        help="seed of the random numbers (0)",
+    )
+    parser.add_argument(
+        "--scene",
+        choices=("clean", "hard"),
+        default="clean",
+        help="disturbance to simulate",
+    )
+    parser.add_argument(
+        "--swing",
+        choices=("field", "cone", "operator", "one-axis", "upright"),
+        default="field",
+        help="motion of the pen",
+    )
+    parser.add_argument(
+        "--leds",
+        choices=("even", "hot-spot", "dome", "ring", "halo", "ghost", "board"),
+        default="even",
+        help="appearance of the LEDs",
+    )
+    parser.add_argument(
+        "--led-diameter",
+        type=number_from(*LED_DIAMETERS, "diameter", "mm"),
+        default=DISC_DIAMETER,
+        metavar="MM",
+        help=f"diameter of the LED discs ({DISC_DIAMETER:g})",
+    )
+    parser.add_argument(
+        "--blur",
+        type=number_from(*BLURS, "blur", "px"),
+        default=0.8,
+        metavar="PX",
+        help="standard deviation of the optical blur",
+    )
+    parser.add_argument(
+        "--bits", type=int, choices=(8, 12, 16), default=8, help="bits per pixel (8)"
+    )
+    parser.add_argument(
+        "--binning",
+        type=int,
+        choices=(1, 2, 4),
+        default=1,
+        help="binning factor in rows and columns",
+    )
+    parser.add_argument(
+        "--cameras",
+        type=int,
+        choices=range(1, MAX_RIG + 1),
+        default=1,
+        help="number of cameras in a row, each facing the pen; with several, OUT "
+        "gets one folder per camera, and rig.json",
+    )
+    parser.add_argument(
+        "--baseline",
+        type=number_from(*BASELINES, "baseline", "mm"),
+        default=1000.0,
+        metavar="MM",
+        help="distance from the first to the last camera",
+    )
+    parser.add_argument(
+        "--lamp",
+        action="store_true",
+        help="fixed lamp in view, to detect camera motion",
+    )
+    parser.add_argument(
+        "--camera-turn",
+        type=number_from(0.0, LARGEST_SHIFT, "shift", "px"),
+        default=0.0,
+        metavar="PX",
+        help="image shift during the swing due to camera rotation",
+    )
+    parser.add_argument(
+        "--pen",
+        choices=("paper", "six", "eight", "near-symmetric", "fanned"),
+        default="paper",
+        help="layout of the LEDs",
+    )
+
+
+def _n_images(text: str) -> int:
+    number = whole_number(text)
+    if number == 0:
+        raise argparse.ArgumentTypeError("at least one image is needed.")
+    if number > MAX_RENDERED:
+        raise argparse.ArgumentTypeError(f"at most {MAX_RENDERED} images are rendered.")
+    return number
+
+
+@printing
+def _simulate(options: argparse.Namespace) -> None:
+    # Imported here as the simulator is not needed to calibrate.
+    from lightpen_extensions.simulator.samples import SAMPLE_PENS, row_of_cameras
+    from lightpen_extensions.simulator.scene_files import write_rig_scene, write_scene
+    from lightpen_extensions.simulator.scenes import LEDS, SCENES, Scene
+    from lightpen_extensions.simulator.sensor import Sensor
+    from lightpen_extensions.simulator.swings import paper_camera
+
+    looks = LEDS[options.leds]
+
+    scene = Scene(
+        n_images=options.images,
+        seed=options.seed,
+        swing=options.swing,
+        disturbances=SCENES[options.scene],
+        sensor=Sensor(bits=options.bits),
+        faces=looks.faces,
+        optics=replace(looks.optics, psf_sigma=options.blur),
+        has_lamp=options.lamp,
+        camera_turn=options.camera_turn,
+        pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
+        camera=paper_camera(options.binning),
+    )
+    with progress("Rendering") as report:
+        if options.cameras == 1:
+            x, y, z = write_scene(scene, options.out, report)
+            written = f"{scene.n_images} images, camera.yaml"
+        else:
+            rig = row_of_cameras(options.cameras, options.baseline, options.binning)
+            x, y, z = write_rig_scene(scene, rig, options.out, report)
+            folders = ", ".join(rig.names)
+            written = (
+                f"{scene.n_images} images of each camera (folders {folders}), their "
+                "intrinsics files, rig.json"
+            )
+    print(
+        shown(
+            f"{written}, leds.csv and the true answer (truth.json) are in "
+            f"{options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} mm in the "
+            "frame of leds.csv."
+        )
+    )

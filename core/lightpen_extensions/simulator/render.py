@@ -1,0 +1,279 @@
+"""Irradiance on the sensor by LEDs, lamps, reflections and fingers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lightpen.arrays import FloatArray
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen_extensions.simulator.contours import (
+    LightArray,
+    Patch,
+    blurred_insides,
+    disc_contours,
+    ellipse_contour,
+)
+from lightpen_extensions.simulator.faces import face_patches
+from lightpen_extensions.simulator.swings import faces_camera, leds_in_camera
+from lightpen_extensions.simulator.view import (
+    BOARD_OFFSET,
+    GHOST_OFFSET,
+    Finger,
+    Glare,
+    Lamp,
+    Optics,
+    View,
+)
+
+OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
+HIDDEN_SAMPLES = 8  # per pixel and axis
+POLYGON_SAMPLES = 4
+DEFOCUS_SAMPLES = 9  # per pixel and axis, of the defocus kernel
+HALO_SIGMA = 15.0  # px
+BOARD_SIGMA = 2.0  # px
+HALO_REACH = 3.0  # standard deviations; zero beyond
+
+
+class Window(NamedTuple):
+    """Rows ``top`` to ``bottom`` and columns ``left`` to ``right`` of an image."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Index of the window into an image."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """Light on the sensor, before noise."""
+
+    levels: LightArray  # (H, W), light above the background, fraction of full scale
+    windows: tuple[Window, ...]  # where levels are not zero; they may overlap
+    background: float = 0.0  # fraction of full scale
+    gradient: tuple[float, float] = (0.0, 0.0)  # of it, over width and height
+
+
+def render_view(camera: Camera, pen: Pen, view: View, optics: Optics) -> Light:
+    """Return the light of one exposure."""
+    levels = np.zeros((camera.height, camera.width), dtype=np.float32)
+    windows = _add_patches(levels, _led_patches(camera, pen, view, optics))
+    for lamp in view.lamps:
+        windows += _add_patches(levels, _lamp_patches(lamp, optics))
+    for glare in view.glares:
+        windows += _add_glare(levels, glare, optics.exposure)
+    for finger in view.fingers:
+        _darken(levels, finger)
+    across, down = optics.gradient
+    return Light(
+        levels,
+        tuple(windows),
+        optics.exposure * optics.background,
+        (optics.exposure * across, optics.exposure * down),
+    )
+
+
+def led_levels(
+    leds_cam: FloatArray, normals_cam: FloatArray, optics: Optics
+) -> FloatArray:
+    """Return the level of every LED of gain 1, fraction of full scale, (..., L).
+
+    Zero for those that face away.
+    """
+    ranges = np.linalg.norm(leds_cam, axis=-1)
+    cosines = -np.einsum("...i,...i->...", leds_cam, normals_cam) / ranges
+    peak = optics.peak * optics.exposure
+    levels = peak * np.maximum(cosines, 0) ** optics.cos_power
+    return np.where(faces_camera(leds_cam, normals_cam), levels, 0.0)
+
+
+def hidden_fraction(
+    camera: Camera, outline: FloatArray, fingers: Sequence[Finger]
+) -> float:
+    """Return the fraction of the area of an outline (N, 2), px, that is hidden.
+
+    Fingers or the border hide it. To about 0.002 for discs of 40 px.
+    """
+    top_left = np.floor(outline.min(axis=0)).astype(int) - 1
+    right, bottom = np.ceil(outline.max(axis=0)).astype(int) + 2
+    window = Window(int(top_left[1]), int(bottom), int(top_left[0]), int(right))
+    width, height = camera.width - 0.5, camera.height - 0.5
+    sensor = np.array([[-0.5, -0.5], [width, -0.5], [width, height], [-0.5, height]])
+    whole = _fine_polygon(window, outline, HIDDEN_SAMPLES)
+    shown = whole & _fine_polygon(window, sensor, HIDDEN_SAMPLES)
+    for finger in fingers:
+        shown &= ~_fine_polygon(window, finger.outline, HIDDEN_SAMPLES)
+    return 1 - np.count_nonzero(shown) / np.count_nonzero(whole)
+
+
+def _led_patches(camera: Camera, pen: Pen, view: View, optics: Optics) -> list[Patch]:
+    leds, normals = leds_in_camera(pen, view.rotations, view.translations)
+    levels = (view.gains * led_levels(leds, normals, optics)).min(axis=0)
+    lit = np.flatnonzero(levels)
+    if len(lit) == 0:
+        return []
+    margin = _margin(optics)
+    if view.faces:
+        patches = face_patches(
+            camera,
+            pen,
+            view.rotations,
+            view.translations,
+            view.faces,
+            lit.tolist(),
+            optics.psf_sigma,
+            margin,
+        )
+    else:
+        contours = disc_contours(
+            camera, leds[:, lit], normals[:, lit], pen.diameter / 2, optics.psf_sigma
+        )
+        patches = blurred_insides(contours, optics.psf_sigma, margin)
+    return _scattered(_shining(patches, levels[lit], optics), optics)
+
+
+def _lamp_patches(lamp: Lamp, optics: Optics) -> list[Patch]:
+    contour = ellipse_contour(lamp.center, lamp.semi_axes, lamp.angle, optics.psf_sigma)
+    patches = blurred_insides(contour, optics.psf_sigma, _margin(optics))
+    return _shining(patches, np.array([lamp.level * optics.exposure]), optics)
+
+
+def _margin(optics: Optics) -> int:
+    """Return the reach of scattered light around a disc, px."""
+    halo = HALO_REACH * HALO_SIGMA if optics.halo > 0 else 0.0
+    ghost = max(GHOST_OFFSET) if optics.ghost > 0 else 0
+    board = max(BOARD_OFFSET) + HALO_REACH * BOARD_SIGMA if optics.board > 0 else 0.0
+    return int(np.ceil(optics.defocus_radius + max(halo, ghost, board)))
+
+
+def _shining(patches: list[Patch], levels: FloatArray, optics: Optics) -> list[Patch]:
+    """Return scaled and defocused patches."""
+    radius = optics.defocus_radius
+    for patch, level in zip(patches, levels, strict=True):
+        patch.levels[:] *= np.float32(level)
+        if radius > 0:
+            kernel = _disc_kernel(radius)
+            patch.levels[:] = cv2.filter2D(
+                patch.levels, -1, kernel, borderType=cv2.BORDER_CONSTANT
+            )
+    return patches
+
+
+def _scattered(patches: list[Patch], optics: Optics) -> list[Patch]:
+    """Return patches with halo, ghost image and reflection."""
+    if optics.halo == 0 and optics.ghost == 0 and optics.board == 0:
+        return patches
+    across, down = GHOST_OFFSET
+    beside, below = BOARD_OFFSET
+    for patch in patches:
+        sharp = patch.levels.copy()
+        patch.levels[:] *= np.float32(1 - optics.halo - optics.ghost - optics.board)
+        if optics.halo > 0:
+            patch.levels[:] += np.float32(optics.halo) * cv2.GaussianBlur(
+                sharp, (0, 0), HALO_SIGMA, borderType=cv2.BORDER_CONSTANT
+            )
+        patch.levels[down:, across:] += (
+            np.float32(optics.ghost) * sharp[:-down, :-across]
+        )
+        if optics.board > 0:
+            reflected = cv2.GaussianBlur(
+                sharp, (0, 0), BOARD_SIGMA, borderType=cv2.BORDER_CONSTANT
+            )
+            patch.levels[below:, beside:] += (
+                np.float32(optics.board) * reflected[:-below, :-beside]
+            )
+    return patches
+
+
+@lru_cache(maxsize=32)
+def _disc_kernel(radius: float) -> LightArray:
+    """Return a uniform disc; the weight of a pixel is its covered area."""
+    half = int(np.ceil(radius))
+    n_fine = (2 * half + 1) * DEFOCUS_SAMPLES
+    fine = (np.arange(n_fine) + 0.5) / DEFOCUS_SAMPLES - half - 0.5
+    inside = fine[:, None] ** 2 + fine**2 <= radius**2
+    shape = (2 * half + 1, DEFOCUS_SAMPLES, 2 * half + 1, DEFOCUS_SAMPLES)
+    covered = inside.reshape(shape).sum(axis=(1, 3))
+    return np.asarray(covered / covered.sum(), dtype=np.float32)
+
+
+def _add_patches(levels: LightArray, patches: list[Patch]) -> list[Window]:
+    windows = []
+    for patch in patches:
+        top, left = patch.top, patch.left
+        height, width = patch.levels.shape
+        window = _clipped(levels, Window(top, top + height, left, left + width))
+        if window is not None:
+            rows = slice(window.top - top, window.bottom - top)
+            columns = slice(window.left - left, window.right - left)
+            levels[window.slices] += patch.levels[rows, columns]
+            windows.append(window)
+    return windows
+
+
+def _add_glare(levels: LightArray, glare: Glare, exposure: float) -> list[Window]:
+    window = _window_round(levels, glare.outline, glare.softness)
+    if window is None:
+        return []
+    mask = _soft_polygon(window, glare.outline, glare.softness)
+    levels[window.slices] += np.float32(glare.level * exposure) * mask
+    return [window]
+
+
+def _darken(levels: LightArray, finger: Finger) -> None:
+    window = _window_round(levels, finger.outline, finger.softness)
+    if window is not None:
+        mask = _soft_polygon(window, finger.outline, finger.softness)
+        levels[window.slices] *= 1 - mask
+
+
+def _window_round(
+    levels: LightArray, outline: FloatArray, softness: float
+) -> Window | None:
+    left, top = np.floor(outline.min(axis=0) - 4 * softness - 1).astype(int)
+    right, bottom = np.ceil(outline.max(axis=0) + 4 * softness + 2).astype(int)
+    return _clipped(levels, Window(top, bottom, left, right))
+
+
+def _clipped(levels: LightArray, window: Window) -> Window | None:
+    height, width = levels.shape
+    clipped = Window(
+        max(int(window.top), 0),
+        min(int(window.bottom), height),
+        max(int(window.left), 0),
+        min(int(window.right), width),
+    )
+    empty = clipped.top >= clipped.bottom or clipped.left >= clipped.right
+    return None if empty else clipped
+
+
+def _soft_polygon(window: Window, outline: FloatArray, softness: float) -> LightArray:
+    fine = _fine_polygon(window, outline, POLYGON_SAMPLES)
+    size = (window.right - window.left, window.bottom - window.top)
+    covered = cv2.resize(fine, size, interpolation=cv2.INTER_AREA)
+    soft = cv2.GaussianBlur(
+        covered.astype(np.float32), (0, 0), softness, borderType=cv2.BORDER_REPLICATE
+    )
+    return np.asarray(soft / 255, dtype=np.float32)
+
+
+def _fine_polygon(
+    window: Window, outline: FloatArray, samples: int
+) -> npt.NDArray[np.uint8]:
+    """Return 255 inside a polygon, with ``samples`` fine pixels per pixel and axis."""
+    height, width = window.bottom - window.top, window.right - window.left
+    mask = np.zeros((samples * height, samples * width), dtype=np.uint8)
+    corners = outline - np.array([window.left, window.top]) + 0.5
+    scaled = np.rint((corners * samples - 0.5) * 2**OUTLINE_BITS).astype(np.int32)
+    cv2.fillPoly(mask, [scaled], 255, shift=OUTLINE_BITS)
+    return mask

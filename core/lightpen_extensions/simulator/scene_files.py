@@ -1,0 +1,366 @@
+"""Write a simulated set: camera, pen, images and ground truth."""
+
+import json
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.decoding import encode_png
+from lightpen.formats.files import why_unwritten, write_whole
+from lightpen.formats.pen_files import write_pen
+from lightpen.formats.rig_files import write_rig
+from lightpen.formats.simulated_files import mark_simulated
+from lightpen.model.ellipse import disc_images
+from lightpen.model.pen import pen_frame_from_raw
+from lightpen.model.rig import Rig, from_first
+from lightpen.model.rigid import fit_rigid, vector_from_rotation
+from lightpen_extensions.simulator.contours import disc_contours, measure_insides
+from lightpen_extensions.simulator.image_plans import (
+    ImagePlan,
+    ScenePlan,
+    plan_rig,
+    plan_scene,
+    render_plan,
+)
+from lightpen_extensions.simulator.render import hidden_fraction, led_levels
+from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.swings import edge_gaps, leds_in_camera
+
+Json: TypeAlias = dict[str, Any]
+Report: TypeAlias = Callable[[float], None]
+
+N_THREADS = 2  # one renders while another compresses
+NOTES = (
+    "u = R x + T. proj: projected LED centre; ellipse_center: centre of the exact "
+    "conic image of the disc contour in the undistorted normalised plane, then "
+    "distorted to px; centroid: area centroid of the exact distorted disc region; all "
+    "of the whole disc at mid-exposure. visible: lit and not wholly hidden. saturated: "
+    "brighter than full scale. occluded_fraction: share of the disc's area behind "
+    "fingers or outside the image."
+)
+
+
+@dataclass(frozen=True)
+class SampleFiles:
+    """The files of simulated cameras: camera file, rig file, pen file."""
+
+    camera: Path
+    rig: Path
+    pen: Path
+
+
+def write_scene(
+    scene: Scene, folder: Path, report: Report = lambda fraction: None
+) -> FloatArray:
+    """Write a simulated set: ``camera.yaml``, ``leds.csv``, ``images``, ``truth.json``.
+
+    ``report`` is called with the fraction done; an exception from it stops the writing.
+    Returns the true tip (3,), mm, in the frame in which the LEDs of ``leds.csv`` fit
+    the true ones best. Raises `FileError` if the folder is not empty or cannot be
+    written.
+    """
+    images = folder / "images"
+    names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
+    _make_folders(folder, images)
+    mark_simulated(folder)
+    plan = plan_scene(scene)
+    write_camera(scene.camera, folder / "camera.yaml")
+    _write_measured_pen(plan, folder)
+    _write_images(plan, images, names, report)
+    truth = {"set": folder.name, **scene_truth(plan)}
+    write_whole(folder / "truth.json", json.dumps(truth, indent=1).encode())
+    return _tip_in_file_frame(plan)
+
+
+def write_rig_scene(
+    scene: Scene, rig: Rig, folder: Path, report: Report = lambda fraction: None
+) -> FloatArray:
+    """Write the images of a swing by several cameras; see `write_scene`.
+
+    One folder for each camera, and a camera file beside it; ``rig.json``, ``leds.csv``,
+    ``truth.json``. The scene's camera stands for the middle of the rig, from which
+    cam_from_rig is, with the covariance that its file states.
+    """
+    names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
+    _make_folders(folder, *(folder / name for name in rig.names))
+    mark_simulated(folder)
+    plans = plan_rig(scene, rig)
+    there = from_first(rig)
+    camera_files = [f"{name}.yaml" for name in rig.names]
+    for camera, file in zip(rig.cameras, camera_files, strict=True):
+        write_camera(camera, folder / file)
+    write_rig(there, folder / "rig.json", camera_files)
+    _write_measured_pen(plans[0], folder)
+    views = []
+    for c, (name, plan) in enumerate(zip(rig.names, plans, strict=True)):
+
+        def part(fraction: float, c: int = c) -> None:
+            report((c + fraction) / rig.n_cameras)
+
+        _write_images(plan, folder / name, names, part)
+        cam_from_rig = {
+            "rotation": there.rotations[c].tolist(),
+            "translation": there.translations[c].tolist(),
+        }
+        truth = scene_truth(plan, f"{name}/")
+        views.append({"name": name, "cam_from_rig": cam_from_rig, **truth})
+    whole = {
+        "set": folder.name,
+        "pen": _pen_truth(plans[0]),
+        "cone_point": plans[0].scene.cone_cam.tolist(),
+        "cameras": views,
+    }
+    write_whole(folder / "truth.json", json.dumps(whole, indent=1).encode())
+    return _tip_in_file_frame(plans[0])
+
+
+def _write_measured_pen(plan: ScenePlan, folder: Path) -> None:
+    # A table of coordinates has no place for these.
+    anonymous = replace(plan.measured_pen, name="", nominal_tip=None)
+    write_pen(anonymous, folder / "leds.csv")
+
+
+def _write_images(
+    plan: ScenePlan, folder: Path, names: list[str], report: Report
+) -> None:
+    with ThreadPoolExecutor(N_THREADS) as pool:
+        encoded = _in_order(
+            pool,
+            lambda image_plan: encode_png(render_plan(plan.scene, image_plan)),
+            plan.image_plans,
+        )
+        for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
+            write_whole(folder / name, data)
+            report(done / len(names))
+
+
+def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
+    """Write the camera, rig and pen files of a scene."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _no_folder(folder, error) from error
+    mark_simulated(folder)
+    files = SampleFiles(
+        folder / "camera.yaml", folder / "rig.json", folder / "pen.json"
+    )
+    rig = beside(scene.camera, scene.cone_cam)
+    second = folder / "camera-2.yaml"
+    write_camera(scene.camera, files.camera)
+    write_camera(rig.cameras[1], second)
+    write_rig(rig, files.rig, [files.camera.name, second.name])
+    write_pen(scene.pen, files.pen)
+    return files
+
+
+def _tip_in_file_frame(plan: ScenePlan) -> FloatArray:
+    R, t = fit_rigid(plan.scene.pen.leds, plan.measured_pen.leds)
+    return np.asarray(R @ plan.scene.tip_pen + t)
+
+
+def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
+    """Return the ground truth of a set, as JSON.
+
+    Lengths in mm, pixels in px, angles in degrees; see `NOTES`.
+    """
+    scene = plan.scene
+    camera = scene.camera
+    optics, sensor = scene.optics, scene.sensor
+    return {
+        "units": "mm, px, deg; pixel (0,0) is the centre of the top-left pixel",
+        "camera": {
+            "image_width": camera.width,
+            "image_height": camera.height,
+            "fx": camera.fx,
+            "fy": camera.fy,
+            "cx": camera.cx,
+            "cy": camera.cy,
+            **dict(
+                zip(camera.distortion_names, camera.distortion.tolist(), strict=True)
+            ),
+        },
+        "pen": _pen_truth(plan),
+        "cone_point": scene.cone_cam.tolist(),
+        "image_model": {
+            "bits": sensor.bits,
+            "psf_gauss_sigma_px": optics.psf_sigma,
+            "pixel": "100% fill box",
+            "faces": scene.faces,
+            "halo": optics.halo,
+            "ghost": optics.ghost,
+            "has_lamp": scene.has_lamp,
+            "camera_turn_px": scene.camera_turn,
+            "radiance_cos_power": optics.cos_power,
+            "peak_dn": optics.peak * optics.exposure * sensor.full_scale,
+            "full_well_e": sensor.full_well,
+            "e_per_dn": sensor.electrons_per_dn,
+            "read_noise_e": sensor.read_noise,
+            "offset_dn": sensor.offset / sensor.electrons_per_dn,
+            "background": optics.background,
+            "background_gradient": list(optics.gradient),
+            "vignetting": "none",
+        },
+        "notes": NOTES,
+        "seed": scene.seed,
+        "frames": [
+            _image_truth(plan, image_plan, folder) for image_plan in plan.image_plans
+        ],
+    }
+
+
+def _make_folders(folder: Path, *below: Path) -> None:
+    """Create a folder and its subfolders; refuse one that is not empty."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        others = [path.name for path in folder.iterdir()]
+        if not others:
+            for each in below:
+                each.mkdir()
+    except OSError as error:
+        raise _no_folder(folder, error) from error
+    if others:
+        raise FileError("scene.not-empty", folder=folder, example=min(others))
+
+
+def _no_folder(folder: Path, error: OSError) -> FileError:
+    return FileError("scene.no-folder", folder=folder, reason=why_unwritten(error))
+
+
+def _in_order(
+    pool: ThreadPoolExecutor,
+    encode: Callable[[ImagePlan], bytes],
+    image_plans: tuple[ImagePlan, ...],
+) -> Iterator[bytes]:
+    """Yield the results in order, with only a few images in memory at a time."""
+    ahead: list[Future[bytes]] = []
+    try:
+        for image_plan in image_plans:
+            ahead.append(pool.submit(encode, image_plan))
+            if len(ahead) > N_THREADS:
+                yield ahead.pop(0).result()
+        while ahead:
+            yield ahead.pop(0).result()
+    finally:
+        for future in ahead:
+            future.cancel()
+
+
+def _pen_truth(plan: ScenePlan) -> Json:
+    scene = plan.scene
+    measured = plan.measured_pen.leds
+    tip_measured = _tip_in_file_frame(plan)
+    return {
+        "tip": scene.tip_pen.tolist(),
+        "leds": scene.pen.leds.tolist(),
+        "normals": scene.pen.normals.tolist(),
+        "disc_radius_mm": scene.pen.diameter / 2,
+        "radiance_gain": plan.gains.tolist(),
+        "leds_measured_csv": measured.tolist(),
+        "tip_in_leds_csv_frame_bestfit": tip_measured.tolist(),
+        **_frame_truth(scene.pen.leds, measured, tip_measured),
+    }
+
+
+def _frame_truth(leds: FloatArray, measured: FloatArray, tip: FloatArray) -> Json:
+    """Return the tip in the frame that the paper defines by the measured LEDs."""
+    try:
+        R, t = pen_frame_from_raw(measured)
+        R_true, t_true = pen_frame_from_raw(leds)
+    except FileError:  # a pen of another layout, which has no such frame
+        return {}
+    return {
+        "tip_in_frame_redefined_from_leds_csv": (R @ tip + t).tolist(),
+        "frame_definition_check": {
+            "rotation_minus_identity_max": float(np.abs(R_true - np.eye(3)).max()),
+            "origin_abs_max": float(np.abs(t_true).max()),
+        },
+    }
+
+
+def _image_truth(plan: ScenePlan, image_plan: ImagePlan, folder: str) -> Json:
+    scene, swing, index = plan.scene, plan.swing, image_plan.index
+    tilt, direction, roll = np.degrees(
+        [
+            swing.postures.tilts[index],
+            swing.postures.directions[index],
+            swing.postures.rolls[index],
+        ]
+    )
+    gaps = edge_gaps(
+        scene.camera, scene.pen, image_plan.rotation[None], image_plan.translation[None]
+    )
+    return {
+        "file": f"{folder}frame_{index + 1:04d}.png",
+        "R": image_plan.rotation.tolist(),
+        "T": image_plan.translation.tolist(),
+        "rvec": vector_from_rotation(image_plan.rotation).tolist(),
+        "tip_cam": swing.tips_cam[index].tolist(),
+        "posture": {
+            "tilt_deg": tilt,
+            "tilt_dir_deg": direction % 360,
+            "roll_deg": roll,
+        },
+        "min_gap_px": float(gaps[0]),
+        "flags": list(image_plan.flags),
+        "tip_in_cone": not swing.slipped[index],
+        "exposure": image_plan.optics.exposure,
+        "psf_gauss_sigma_px": image_plan.optics.psf_sigma,
+        "defocus_radius_px": image_plan.optics.defocus_radius,
+        "lamps": [
+            {
+                "center": lamp.center.tolist(),
+                "semi_axes": list(lamp.semi_axes),
+                "level": lamp.level,
+            }
+            for lamp in image_plan.view.lamps
+        ],
+        "leds": _led_truths(scene, image_plan),
+    }
+
+
+def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
+    camera, pen, view = scene.camera, scene.pen, image_plan.view
+    leds, normals = leds_in_camera(pen, image_plan.rotation, image_plan.translation)
+    ellipses = disc_images(camera, leds, normals, pen.diameter / 2)
+    contours = disc_contours(
+        camera, leds[None], normals[None], pen.diameter / 2, scene.optics.psf_sigma
+    )
+    insides = measure_insides(contours)
+    levels = view.gains * led_levels(leds, normals, image_plan.optics)
+    hidden = [hidden_fraction(camera, nodes, view.fingers) for nodes in contours.nodes]
+    projected = camera.project(leds)
+    cosines = -np.einsum("li,li->l", leds, normals) / np.linalg.norm(leds, axis=-1)
+    return [
+        {
+            "led": led + 1,
+            "xyz_cam": leds[led].tolist(),
+            "normal_cam": normals[led].tolist(),
+            "proj": projected[led].tolist(),
+            "ellipse_center": ellipses.centers[led].tolist(),
+            "centroid": insides.centroids[led].tolist(),
+            **_axes_truth(ellipses.shapes[led]),
+            "area_px": float(insides.areas[led]),
+            "view_angle_deg": float(np.degrees(np.arccos(cosines[led]))),
+            "visible": bool(levels[led] > 0 and hidden[led] < 1),
+            "occluded_fraction": hidden[led],
+            "saturated": bool(levels[led] >= 1),
+        }
+        for led in range(pen.n_leds)
+    ]
+
+
+def _axes_truth(shape: FloatArray) -> Json:
+    variances, directions = np.linalg.eigh(shape)
+    major = directions[:, 1]
+    return {
+        "semi_axes": (2 * np.sqrt(variances[::-1])).tolist(),
+        "angle_deg": float(np.degrees(np.arctan2(major[1], major[0])) % 180),
+    }

@@ -1,0 +1,175 @@
+"""The image sensor: shot noise, read noise, quantisation.
+
+A pixel that collects the mean charge q reads
+
+    DN = round(clip((Poisson(q) + N(0, read noise) + offset) / e_per_dn)).
+
+Shot noise is drawn as a Gaussian of variance q: read noise of some electrons hides the
+difference at small q, the central limit at large q. Most of an
+image is dark: its pixels are independent draws from one discrete distribution, so only
+those that do not read the most likely number are drawn, at exponential gaps.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from statistics import NormalDist
+from typing import Literal
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen_extensions.simulator.contours import LightArray
+from lightpen_extensions.simulator.render import Light
+
+MOSTLY = 0.9  # share of the most likely reading above which the rest is drawn alone
+TABLE_SIZE = 2**16  # equally likely values: one for each 16-bit random number
+STRIP = 64  # rows
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """An image sensor."""
+
+    bits: Literal[8, 12, 16] = 8  # 8, or 12 or 16 in a 16-bit image
+    full_well: float = 10_000.0  # charge that reads full scale, electrons
+    read_noise: float = 7.0  # standard deviation, electrons
+    offset: float = 0.1 * 10_000 / 255  # added to the charge, electrons
+
+    def __post_init__(self) -> None:
+        if self.bits not in {8, 12, 16}:
+            raise ValueError(f"`bits` must be 8, 12 or 16, got {self.bits}.")
+
+    @property
+    def full_scale(self) -> int:
+        """Largest number a pixel reads."""
+        return int(2**self.bits - 1)
+
+    @property
+    def electrons_per_dn(self) -> float:
+        """Charge of one step of the reading."""
+        return self.full_well / self.full_scale
+
+
+def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
+    """Return the image (H, W) that a sensor reads, uint8 for 8 bits, else uint16."""
+    if light.gradient != (0.0, 0.0):
+        return _read_uneven(light, sensor, rng)
+    image = _dark_image(light.background, sensor, light.levels.size, rng)
+    image = image.reshape(light.levels.shape)
+    for window in light.windows:
+        levels = light.levels[window.slices] + np.float32(light.background)
+        # Where windows overlap the last reading stands, which is as good as the first.
+        image[window.slices] = _read(levels, sensor, rng)
+    return image
+
+
+def quantize(light: Light, sensor: Sensor) -> Image:
+    """Return the image without noise, as `expose`."""
+    charges = (light.levels + _background(light)) * np.float32(sensor.full_well)
+    return _digits(charges, sensor)
+
+
+def _background(light: Light) -> LightArray:
+    height, width = light.levels.shape
+    across, down = light.gradient
+    ramp = across * (np.arange(width) / width - 0.5)
+    slope = down * (np.arange(height) / height - 0.5)
+    background = light.background + ramp + slope[:, None]
+    return np.asarray(np.maximum(background, 0), dtype=np.float32)
+
+
+def _read_uneven(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
+    """Read all pixels one by one, in strips that fit the processor's cache."""
+    image = _blank(light.levels.shape, sensor)
+    levels = light.levels + _background(light)
+    for top in range(0, len(image), STRIP):
+        rows = slice(top, top + STRIP)
+        image[rows] = _read(levels[rows], sensor, rng)
+    return image
+
+
+def _read(levels: LightArray, sensor: Sensor, rng: np.random.Generator) -> Image:
+    charges = levels * np.float32(sensor.full_well)
+    noise = np.maximum(charges, 0)
+    noise += np.float32(sensor.read_noise**2)
+    np.sqrt(noise, out=noise)
+    noise *= _normal_table()[
+        rng.integers(TABLE_SIZE, size=noise.shape, dtype=np.uint16)
+    ]
+    charges += noise
+    return _digits(charges, sensor)
+
+
+def _digits(charges: LightArray, sensor: Sensor) -> Image:
+    readings = charges + np.float32(sensor.offset)
+    readings *= np.float32(1 / sensor.electrons_per_dn)
+    np.rint(readings, out=readings)
+    np.clip(readings, 0, sensor.full_scale, out=readings)
+    if sensor.bits == 8:
+        return readings.astype(np.uint8)
+    return readings.astype(np.uint16)
+
+
+def _blank(shape: tuple[int, ...], sensor: Sensor) -> Image:
+    if sensor.bits == 8:
+        return np.zeros(shape, dtype=np.uint8)
+    return np.zeros(shape, dtype=np.uint16)
+
+
+@lru_cache(maxsize=1)
+def _normal_table() -> LightArray:
+    """Return equally likely values of a standard normal variable."""
+    chances = (np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE
+    values = np.array([NormalDist().inv_cdf(chance) for chance in chances.tolist()])
+    return np.asarray(values / values.std(), dtype=np.float32)
+
+
+def _dark_image(
+    background: float, sensor: Sensor, n_pixels: int, rng: np.random.Generator
+) -> Image:
+    """Return ``n_pixels`` independent readings of an even background."""
+    values, probabilities = _dark_distribution(background, sensor)
+    likely = int(np.argmax(probabilities))
+    others = 1 - probabilities[likely]
+    if probabilities[likely] < MOSTLY:
+        edges = np.rint(np.cumsum(probabilities) * TABLE_SIZE).astype(np.int64)
+        table = _blank((TABLE_SIZE,), sensor)
+        table[:] = np.repeat(values, np.diff(edges, prepend=0))
+        return table[rng.integers(TABLE_SIZE, size=n_pixels, dtype=np.uint16)]
+    image = _blank((n_pixels,), sensor)
+    if values[likely] > 0:
+        image[:] = values[likely]
+    if others <= 0:
+        return image
+    places = _bernoulli_places(n_pixels, others, rng)
+    probabilities = probabilities.copy()
+    probabilities[likely] = 0
+    cumulated = np.cumsum(probabilities / others)
+    rank = np.searchsorted(cumulated, rng.random(len(places)))
+    image[places] = values[np.minimum(rank, len(values) - 1)]
+    return image
+
+
+def _bernoulli_places(n: int, probability: float, rng: np.random.Generator) -> IntArray:
+    """Return the places of the successes in ``n`` independent trials."""
+    spread = np.sqrt(n * probability)
+    n_gaps = int(n * probability + 8 * spread + 8)
+    places = np.cumsum(rng.geometric(probability, size=n_gaps)) - 1
+    return places[: np.searchsorted(places, n)]
+
+
+@lru_cache(maxsize=32)
+def _dark_distribution(
+    background: float, sensor: Sensor
+) -> tuple[IntArray, FloatArray]:
+    """Return the readings that occur and their probabilities."""
+    charge = background * sensor.full_well
+    mean = (charge + sensor.offset) / sensor.electrons_per_dn
+    sigma = np.sqrt(charge + sensor.read_noise**2) / sensor.electrons_per_dn
+    low = max(int(np.floor(mean - 7 * sigma)), 0)
+    high = min(int(np.ceil(mean + 7 * sigma)), sensor.full_scale)
+    values = np.arange(low, max(high, low) + 1)
+    reading = NormalDist(mean, max(sigma, 1e-12))
+    upper = np.array([reading.cdf(value + 0.5) for value in values.tolist()])
+    upper[-1] = 1
+    return values, np.diff(upper, prepend=0.0)

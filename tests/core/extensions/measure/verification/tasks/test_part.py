@@ -1,0 +1,521 @@
+"""A part as a task of a session: the simulated plate, undone points, what is kept."""
+
+import os
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from msgspec import structs
+from tests.accepted_tip import Hold, Holder
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.file_format import FileFormat
+from lightpen.messages import Message
+from lightpen.model.posture import FACING
+from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.measure.measuring.alignment import THIN
+from lightpen_extensions.measure.measuring.exports import EXPORTS
+from lightpen_extensions.measure.measuring.part import taught_plan
+from lightpen_extensions.measure.measuring.plan import (
+    Nominal,
+    Plan,
+    PlannedFeature,
+    free_plan,
+)
+from lightpen_extensions.measure.measuring.qif import qif_text
+from lightpen_extensions.measure.measuring.surfaces import CENTRED, FeatureKind
+from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.verification.session.session import (
+    advance_session,
+    end_task,
+    with_moved_part,
+    without_last_touch,
+)
+from lightpen_extensions.measure.verification.session.session_state import (
+    SessionSetup,
+    SessionState,
+    bands_so_far,
+)
+from lightpen_extensions.measure.verification.tasks.part import PART, Part
+from lightpen_extensions.measure.verification.tasks.part_course import (
+    SIMULATED_AXES,
+    SIMULATED_ORIGIN,
+    PartOptions,
+    course,
+    feature_so_far,
+    planned_places,
+    touches_of_part,
+    with_move,
+)
+from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
+from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.simulator.swings import PAPER_CONE
+
+BALL = 10.0  # mm
+QIF = Path(os.environ.get("LIGHTPEN_DATA", "no such folder")) / "qif/QIFDocument.xsd"
+NOISE = 0.002  # mm
+RAISED = FACING
+UNMOVED = np.zeros(3)  # mm
+
+
+@dataclass
+class Station:
+    """A session with a part, and a pen that a simulated hand holds."""
+
+    setup: SessionSetup
+    holder: Holder
+    state: SessionState = field(default_factory=SessionState)
+
+    def probe(
+        self, n: int, plan: Plan | None = None, moved: FloatArray = UNMOVED
+    ) -> None:
+        """Probe the next points, of a plan with nominals or of the one in use."""
+        by = self.options if plan is None else PartOptions(plan)
+        for _ in range(n):
+            goal = PART.hand(by, len(self.state.runs), len(self.state.touches))
+            assert goal.point is not None
+            assert goal.outwards is not None
+            place = goal.point + BALL / 2 * goal.outwards + moved
+            seen = [*self.holder.still(Hold(tuple(place.tolist()), 0.1), 5)]
+            for detection in [*seen, *self.holder.away(6)]:
+                transition = advance_session(self.setup, self.state, "image", detection)
+                self.state = transition.state
+
+    @property
+    def options(self) -> PartOptions:
+        return self.setup.choices.options_of(PART)
+
+    @property
+    def found(self) -> Part:
+        found = self.state.found_by(PART)
+        assert found is not None
+        return found
+
+
+def station(instrument: Instrument, plan: Plan) -> Station:
+    choices = VerificationChoices(PART.kind, (PartOptions(plan),), n_frames=2)
+    setup = SessionSetup(instrument, choices, BALL)
+    return Station(setup, Holder(instrument.rig, instrument.pen))
+
+
+def n_points(plan: Plan) -> int:
+    return sum(each.n_touches for each in plan.features)
+
+
+def probed_plate(
+    instrument: Instrument, plan: Plan
+) -> list[tuple[str, list[ProbedPoint]]]:
+    """Return points of all features, which share the error of the tip."""
+    rng = np.random.default_rng(5)
+    options, n_parameters = PartOptions(plan), len(instrument.covariance)
+    sensitivity = np.zeros((3, n_parameters))
+    sensitivity[:, instrument.parameters.tip] = np.eye(3)
+    runs = []
+    for run, planned in enumerate(plan.features):
+        points = []
+        for step in range(planned.n_touches):
+            goal = PART.hand(options, run, step)
+            assert goal.point is not None
+            assert goal.outwards is not None
+            center = PAPER_CONE + goal.point + BALL / 2 * goal.outwards
+            points.append(
+                ProbedPoint(
+                    center + NOISE * rng.standard_normal(3),
+                    NOISE**2 * np.eye(3),
+                    sensitivity,
+                    RAISED,
+                    (f"{planned.name} {step}",),
+                    rms=0.01,
+                )
+            )
+        runs.append((planned.name, points))
+    return runs
+
+
+@pytest.fixture(scope="module")
+def measured(instrument: Instrument) -> Station:
+    """The plate of the simulated station, probed in one go."""
+    at_it = station(instrument, plate_plan())
+    runs = probed_plate(instrument, plate_plan())
+    found = PART.measure(runs, at_it.setup.conditions, at_it.options)
+    at_it.state = replace(at_it.state, done=PART, found=found)
+    return at_it
+
+
+def test_ten_features_of_the_plate_are_measured_without_a_key(
+    measured: Station,
+) -> None:
+    part = measured.found.part
+
+    assert len(part.plan.features) == 10
+    for result in part.results:
+        error = result.value.value - (result.planned.nominal or 0.0)
+        assert abs(error) < max(2 * result.value.uncertainty, 0.02), result.planned
+    assert measured.found.missing == ()
+    assert measured.found.assessment.grade is not Grade.REPEAT
+
+
+def test_tables_have_a_decision_for_each_characteristic(measured: Station) -> None:
+    characteristics, features = PART.tables(measured.found, measured.setup.conditions)
+
+    assert len(features.rows) == 10
+    assert measured.found.part.alignment is not None
+    assert isinstance(features.title, Message)
+    assert features.title.code == "part.features-in-part"
+    assert {str(row.remark) for row in characteristics.rows} <= {"OK", "NOT PROVEN"}
+    entries = PART.entries(measured.found, measured.setup.instrument)
+    assert len(entries["touches"]) == n_points(plate_plan())
+
+
+@pytest.mark.parametrize("export", EXPORTS, ids=lambda each: each.name)
+def test_every_export_names_the_characteristics(
+    measured: Station, export: FileFormat
+) -> None:
+    part = measured.found.part
+    text = export.encoded(part).decode()
+
+    assert all(each.planned.label in text for each in part.results)
+
+
+def test_qif_has_every_feature_with_its_place_and_uncertainty(
+    measured: Station,
+) -> None:
+    part = measured.found.part
+    names = {"q": "http://qifstandards.org/xsd/qif3"}
+    root = ElementTree.fromstring(qif_text(part))
+    (features,) = root.iterfind(".//q:MeasuredFeatures", names)
+
+    assert [each.findtext("q:FeatureName", None, names) for each in features] == [
+        *part.features
+    ]
+    (dome,) = features.iterfind("q:SphereFeatureMeasurement", names)
+    place, diameter = (dome.find(f"q:{x}", names) for x in ("Location", "Diameter"))
+    assert place is not None
+    assert diameter is not None
+    assert float(diameter.text or "") == pytest.approx(20, abs=0.02)
+    assert float(place.attrib["xCombinedUncertainty"]) == pytest.approx(
+        part.uncertainty("dome")[0] / 2
+    )
+    ids = [each.attrib["id"] for each in root.iter() if "id" in each.attrib]
+    assert len(ids) == len(set(ids)) == int(root.attrib["idMax"])
+
+
+@pytest.mark.skipif(not QIF.is_file(), reason="The schema of QIF is not there.")
+def test_qif_is_as_its_published_schema_says(measured: Station) -> None:
+    from xmlschema import XMLSchema  # takes long
+
+    assert not [*XMLSchema(QIF).iter_errors(qif_text(measured.found.part))]
+
+
+def test_a_taught_plan_measures_the_same_part_again(measured: Station) -> None:
+    taught = taught_plan(measured.found.part)
+
+    again = station(measured.setup.instrument, taught)
+    again.probe(taught.features[0].n_touches)
+    assert len(again.state.runs) == 1
+
+
+def test_features_are_recognised_while_they_are_probed(instrument: Instrument) -> None:
+    plate = plate_plan()
+    at_it = station(instrument, free_plan("Part", touches=6))
+    wanted = [plate.features[i] for i in (0, 7)]
+    plate = structs.replace(
+        plate, features=tuple(structs.replace(each, touches=6) for each in wanted)
+    )
+    at_it.probe(12, plate)
+    at_it.state = end_task(at_it.setup, at_it.state).state
+
+    kinds = [each.kind for each in at_it.found.part.features.values()]
+    assert kinds == [FeatureKind.PLANE, FeatureKind.SPHERE]
+
+
+def test_a_feature_that_is_done_shows_its_results_at_once(
+    instrument: Instrument,
+) -> None:
+    plan = plate_plan().limited_to({"dome", "hole 1"})
+    at_it = station(instrument, plan)
+    own = plan.features[0].name
+    at_it.probe(plan.features[0].n_touches)
+
+    bands = bands_so_far(at_it.setup, at_it.state)
+
+    planned = [each for each in plan.characteristics if each.of == (own,)]
+    assert planned
+    assert [each.name for each in bands] == [each.words for each in planned]
+    assert [(each.lower, each.upper) for each in bands] == [
+        each.limits for each in planned
+    ]
+    assert all(each.decision for each in bands)
+    at_it.probe(1)  # of the next feature
+    assert bands_so_far(at_it.setup, at_it.state) == bands
+
+
+def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(5)  # one short of the plane
+    progress = at_it.state.progress(at_it.setup, PART)
+
+    now = feature_so_far(at_it.options, progress, at_it.setup.conditions)
+
+    assert now is not None
+    assert now.kind is FeatureKind.PLANE
+    assert now.next_touch is not None
+    away = [
+        np.linalg.norm(point.point_cam - now.next_touch.point)
+        for point in progress.points
+    ]
+    assert min(away) > 9  # half a step of the grid of places
+
+
+def test_a_line_is_planned_from_left_to_right_at_the_front_of_the_part() -> None:
+    edge = Nominal(origin=(10.0, 0.0, 0.0), axis=(-1.0, 0.0, 0.0), length=40.0)
+    front = PlannedFeature(
+        "edge", FeatureKind.LINE, nominal=edge, normal=(0.0, -1.0, 0.0)
+    )
+    places = planned_places(front)
+
+    along = [float(each.point[0]) for each in places]
+    assert along == sorted(along)
+    assert along[-1] - along[0] > 20
+    for each in places:
+        np.testing.assert_array_equal(each.normal, [0.0, -1.0, 0.0])
+
+
+def test_an_undone_point_can_be_probed_again(instrument: Instrument) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(3)
+    at_it.state = without_last_touch(at_it.state)
+    assert len(at_it.state.touches) == 2
+    at_it.probe(4)
+
+    assert len(at_it.state.runs) == 1
+
+
+def test_a_plan_that_is_ended_early_gives_what_was_probed(
+    instrument: Instrument,
+) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(6)
+    at_it.state = end_task(at_it.setup, at_it.state).state
+
+    assert [*at_it.found.part.features] == ["top"]
+    assert len(at_it.found.missing) == 9
+    assert at_it.found.assessment.grade is Grade.CHECK
+
+
+def test_points_that_do_not_determine_their_feature_are_reported_at_once(
+    instrument: Instrument,
+) -> None:
+    line = plate_plan().features[1]
+    flat = structs.replace(line, touches=4)
+    plan = structs.replace(
+        plate_plan(),
+        features=(structs.replace(flat, kind=FeatureKind.PLANE),),
+        alignment=None,
+        characteristics=(),
+    )
+    at_it = station(instrument, plan)
+    at_it.probe(4, structs.replace(plan, features=(flat,)))
+
+    assert not at_it.state.runs
+    assert at_it.state.fault is not None
+    assert str(at_it.state.fault).startswith(
+        "Feature front: The points do not determine a plane."
+    )
+    assert len(at_it.state.touches) == 4  # nothing is lost
+
+
+def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
+    setup = replace(SessionSetup(instrument), ball_diameter=BALL)
+
+    with pytest.raises(CalibrationError, match="No measuring plan"):
+        PART.measure([], setup.conditions, PartOptions())
+    assert PART.missing(PartOptions(), BALL) is not None
+
+
+def test_a_part_moved_in_between_goes_on_after_three_datum_points(
+    instrument: Instrument,
+) -> None:
+    holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
+    distance = plate_plan().characteristics[8]  # of holes 1 and 4
+    plan = Plan("Holes", (*holes,), characteristics=(distance,))
+    at_it = station(instrument, plan)
+    at_it.probe(10)  # three holes, and a point of the fourth
+    at_it.state = without_last_touch(at_it.state)
+    at_it.setup = with_moved_part(at_it.setup, at_it.state)
+    away = np.array([4.0, -3.0, 2.0])
+    at_it.probe(9, moved=away)
+    names = [each.name for each in course(at_it.options)]
+    at_it.probe(3, moved=away)
+
+    assert names[3:] == ["hole 1@2", "hole 2@2", "hole 3@2", "hole 4@2"]
+    (result,) = at_it.found.part.results
+    assert result.value.value == pytest.approx(40, abs=result.value.uncertainty)
+    # Without the tie it would be off by the way of the part.
+    assert np.linalg.norm(away) > 10 * result.value.uncertainty
+    (motion,) = at_it.found.part.ties.values()
+    assert motion.residuals.max() < 0.05
+    (note, *_) = PART.tables(at_it.found, at_it.setup.conditions)[1].notes
+    assert note.code == "part.moved"
+    assert note.values["residual"] == motion.residuals.max()
+
+
+def test_other_datum_points_than_before_are_reported(instrument: Instrument) -> None:
+    holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
+    plan = Plan("Holes", tuple(holes))
+    runs = probed_plate(instrument, plan)
+    again = [(f"{name}@2", points) for name, points in runs]
+    setup, options = station(instrument, plan).setup, PartOptions(plan)
+    swapped = [(again[0][0], runs[1][1]), (again[1][0], runs[0][1]), *again[2:]]
+
+    good = PART.measure([*runs, *again], setup.conditions, options)
+    bad = PART.measure([*runs, *swapped], setup.conditions, options)
+
+    assert good.assessment.grade is Grade.PASS
+    assert bad.assessment.reason.code == "part.datums-moved"
+
+
+def test_the_datum_points_of_a_moved_part_span_the_largest_triangle(
+    measured: Station, instrument: Instrument
+) -> None:
+    runs = [tuple(points) for _, points in probed_plate(instrument, plate_plan())]
+    features = measured.found.part.features
+    centres = {
+        name: each.feature.origin
+        for name, each in features.items()
+        if each.feature is not None and each.kind in CENTRED
+    }
+
+    def area(names: tuple[str, ...]) -> float:
+        a, b, c = (centres[name] for name in names)
+        return float(np.linalg.norm(np.cross(b - a, c - a)))
+
+    moved = with_move(measured.options, runs, measured.setup.conditions)
+
+    largest = max(area(names) for names in combinations(centres, 3))
+    assert area(moved.moves[0].datums) == pytest.approx(largest, rel=1e-3)
+
+
+@pytest.mark.parametrize(("share", "is_thin"), [(0.8, True), (1.25, False)])
+def test_datum_points_nearly_on_a_line_are_none(
+    instrument: Instrument, share: float, is_thin: bool
+) -> None:
+    places = (-40.0, 0.0), (40.0, 0.0), (0.0, share * THIN * 80.0)
+    holes = [
+        structs.replace(
+            planned, nominal=structs.replace(planned.nominal, origin=(*place, 0.0))
+        )
+        for planned, place in zip(plate_plan().features[2:5], places, strict=True)
+        if planned.nominal is not None
+    ]
+    plan = Plan("Holes", tuple(holes))
+    runs = [tuple(points) for _, points in probed_plate(instrument, plan)]
+    setup = station(instrument, plan).setup
+    with pytest.raises(CalibrationError) if is_thin else nullcontext():
+        with_move(PartOptions(plan), runs, setup.conditions)
+
+
+def test_the_ball_is_known_by_its_diameter(instrument: Instrument) -> None:
+    name, points = probed_plate(instrument, plate_plan())[0]
+    conditions = Conditions(instrument, ball_diameter=10.0)
+    options = PartOptions(ball_uncertainty=0.004)
+
+    touches = touches_of_part([(name, each) for each in points], conditions, options)
+
+    assert (touches.ball_radius, touches.ball_uncertainty) == (5.0, 0.002)
+
+
+def test_a_camera_that_moved_counts_in_each_point(instrument: Instrument) -> None:
+    name, points = probed_plate(instrument, plate_plan())[0]
+    found, drift = [(name, each) for each in points], np.array([0.005, 0.002, 0.001])
+
+    still, moved = (
+        touches_of_part(found, conditions, PartOptions())
+        for conditions in (Conditions(instrument), Conditions(instrument, drift=drift))
+    )
+
+    np.testing.assert_allclose(
+        np.diag(moved.covariance - still.covariance).reshape(-1, 3),
+        np.tile(drift**2, (len(points), 1)),
+    )
+
+
+def test_a_part_is_not_moved_before_three_datum_points_are_probed(
+    instrument: Instrument,
+) -> None:
+    at_it = station(instrument, plate_plan())
+    at_it.probe(6)
+
+    with pytest.raises(CalibrationError, match="3 that are not on one line"):
+        with_moved_part(at_it.setup, at_it.state)
+
+
+@pytest.mark.slow
+def test_a_moved_part_is_tied_by_datum_points_probed_again(
+    instrument: Instrument,
+) -> None:
+    plan = plate_plan()
+    at_it = station(instrument, plan)
+    turn = rotation_from_vector(np.array([0.1, -0.2, 0.3]))
+    runs = []
+    for name, points in probed_plate(instrument, plan):
+        away = [
+            replace(
+                each,
+                point_cam=turn @ each.point_cam + np.array([20.0, -10.0, 30.0]),
+                rotation=turn @ each.rotation,
+            )
+            for each in points
+        ]
+        if name != "pad":
+            runs.append((name, points))
+        if name in {"pad", "dome", "hole 1", "hole 2", "hole 3"}:
+            runs.append((f"{name}@2", away))
+
+    found = PART.measure(runs, at_it.setup.conditions, at_it.options)
+
+    pad = found.part.features["pad"].in_part
+    assert pad.values[:3] == pytest.approx([0, 24, 0], abs=0.02)
+    once = PART.measure(
+        probed_plate(instrument, plan), at_it.setup.conditions, at_it.options
+    )
+    assert found.part.uncertainty("pad")[1] > once.part.uncertainty("pad")[1]
+    # A plane is probed elsewhere each time: it is no datum point.
+    few = [each for each in runs if not each[0].startswith("hole")]
+    few.append(("top@2", runs[0][1]))
+    with pytest.raises(CalibrationError, match="Position 2 shares 1 datum points"):
+        PART.measure(few, at_it.setup.conditions, at_it.options)
+
+
+def test_a_scanned_feature_needs_one_point_held_still(instrument: Instrument) -> None:
+    hole = structs.replace(plate_plan().features[2], scan=True, touches=12)
+    plan = structs.replace(
+        plate_plan(), features=(hole,), alignment=None, characteristics=()
+    )
+    at_it = station(instrument, plan)
+    assert hole.nominal is not None
+    middle = SIMULATED_ORIGIN + SIMULATED_AXES @ np.array(hole.nominal.origin)
+    radius = 12.0 - BALL / 2
+    for turn in np.radians(np.arange(0.0, 360.0, 2.5)):  # 0.3 mm each
+        place = middle + radius * np.array([np.cos(turn), 0.0, np.sin(turn)])
+        n_images = 1 if at_it.state.touches else 5
+        for seen in at_it.holder.still(Hold(tuple(place.tolist()), 0.1), n_images):
+            at_it.state = advance_session(at_it.setup, at_it.state, "image", seen).state
+        if at_it.state.done is not None:
+            break
+
+    part = at_it.found.part
+    assert len(part.touches.points_cam) == 12
+    away = np.linalg.norm(np.diff(part.touches.points_cam[1:], axis=0), axis=1)
+    assert away.min() > 0.4
+    assert np.isnan(part.touches.approaches_cam[1:]).all()
+    diameter = 2 * part.features[hole.name].in_part.values[6]
+    assert abs(diameter - 24) < 2 * part.uncertainty(hole.name)[6] + 0.02

@@ -1,0 +1,230 @@
+"""The course of a part: its runs, its datum points, and what is probed now."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.errors import CalibrationError
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.model.artefacts import Side
+from lightpen_extensions.measure.measuring.plan import Nominal, Plan, PlannedFeature
+from lightpen_extensions.measure.measuring.surfaces import FeatureKind
+from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.verification.tasks.part_course import (
+    Move,
+    PartOptions,
+    course,
+    feature_so_far,
+    hand_goal,
+    planned_at,
+    planned_places,
+    touches_of_part,
+    with_move,
+)
+from lightpen_extensions.measure.verification.tasks.probed_point import (
+    ProbedPoint,
+    joint_covariance,
+)
+from lightpen_extensions.measure.verification.tasks.task import Conditions, TaskProgress
+from lightpen_extensions.simulator.swings import PAPER_CONE
+
+Placed = Callable[[Sequence[Sequence[float]]], tuple[ProbedPoint, ...]]
+PLATE = plate_plan()
+
+
+@pytest.fixture(scope="module")
+def placed(instrument: Instrument) -> Placed:
+    """Return a function that makes points off the cone."""
+    shared = np.zeros((3, len(instrument.covariance)))
+
+    def points(offs: Sequence[Sequence[float]]) -> tuple[ProbedPoint, ...]:
+        return tuple(
+            ProbedPoint(
+                PAPER_CONE + np.array(off),
+                1e-6 * np.eye(3),
+                shared,
+                np.eye(3),
+                ("",),
+                0,
+            )
+            for off in offs
+        )
+
+    return points
+
+
+def points_plan(n: int) -> PartOptions:
+    """A plan of single points."""
+    features = (
+        PlannedFeature(f"p{i}", FeatureKind.POINT, side=Side.OUTSIDE) for i in range(n)
+    )
+    return PartOptions(Plan("Points", tuple(features)))
+
+
+def test_after_a_move_datum_points_come_first_and_all_names_have_the_position() -> None:
+    options = points_plan(4)
+    moved = replace_moves(options, Move(2, ("p0", "p3")))
+    twice = replace_moves(options, Move(2, ("p0", "p3")), Move(3, ("p1",)))
+
+    def names(of: PartOptions) -> list[str]:
+        return [each.name for each in course(of)]
+
+    assert names(options) == ["p0", "p1", "p2", "p3"]
+    assert names(moved) == ["p0", "p1", "p0@2", "p3@2", "p2@2"]
+    assert names(twice) == ["p0", "p1", "p0@2", "p1@3", "p3@3", "p2@3"]
+    assert names(PartOptions()) == []
+    planned = planned_at(moved, 4)
+    assert planned is not None
+    assert planned.name == "p2@2"
+    assert planned_at(moved, 5) is None
+
+
+def replace_moves(options: PartOptions, *moves: Move) -> PartOptions:
+    return PartOptions(options.plan, options.ball_uncertainty, moves)
+
+
+def test_datum_points_span_the_largest_triangle(
+    instrument: Instrument, placed: Placed
+) -> None:
+    places: list[list[float]] = [
+        [0, 0, 0],
+        [10, 0, 0],
+        [0, 10, 0],
+        [40, 0, 0],
+        [0, 30, 5],
+    ]
+    runs = [placed([each]) for each in places]
+    moved = with_move(points_plan(5), runs, Conditions(instrument))
+    early = with_move(points_plan(5), runs[:4], Conditions(instrument))
+
+    assert moved.moves == (Move(5, ("p0", "p3", "p4")),)
+    assert early.moves == (Move(4, ("p0", "p2", "p3")),)
+    with pytest.raises(CalibrationError) as refused:
+        with_move(points_plan(5), runs[:2], Conditions(instrument))
+    said = refused.value.message.values
+    assert (said["n_points"], said["needed"]) == (2, 3)
+
+
+def test_a_small_part_has_datum_points_too(
+    instrument: Instrument, placed: Placed
+) -> None:
+    runs = [placed([each]) for each in ([0.0, 0, 0], [0.5, 0, 0], [0, 0.5, 0])]
+    moved = with_move(points_plan(3), runs, Conditions(instrument))
+
+    assert moved.moves[0].datums == ("p0", "p1", "p2")
+
+
+def test_features_without_a_centre_are_no_datum_points(
+    instrument: Instrument, placed: Placed
+) -> None:
+    corners: list[list[float]] = [[0, 0, 0], [40, 0, 0], [0, 30, 0], [40, 30, 0]]
+    plane = PlannedFeature("top", FeatureKind.PLANE)
+    plan = points_plan(2).plan
+    assert plan is not None
+    options = PartOptions(Plan("Part", (plane, *plan.features)))
+    runs = [placed(corners), *(placed([each]) for each in corners[:2])]
+
+    with pytest.raises(CalibrationError) as refused:
+        with_move(options, runs, Conditions(instrument))
+    assert refused.value.message.values["n_points"] == 2
+
+
+def test_touches_of_a_part_are_those_of_the_ball_with_what_the_camera_moved(
+    instrument: Instrument, placed: Placed
+) -> None:
+    one, other = placed([[0.0, 0, 0], [3, 0, 0]])
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    other = replace(other, approach_cam=np.array([0.0, 0, 1]), rotation=turn)
+    drift = np.array([0.01, 0.02, 0.0])
+    conditions = Conditions(instrument, ball_diameter=3.0, drift=drift)
+
+    found = touches_of_part(
+        [("a", one), ("b", other)], conditions, PartOptions(ball_uncertainty=0.004)
+    )
+
+    moved = np.diag(np.tile(drift**2, 2))
+    shared = joint_covariance((one, other), instrument)
+    np.testing.assert_allclose(found.covariance, shared + moved)
+    np.testing.assert_array_equal(found.points_cam, [one.point_cam, other.point_cam])
+    np.testing.assert_array_equal(found.approaches_cam, [[np.nan] * 3, [0, 0, 1]])
+    np.testing.assert_array_equal(found.styli_cam, [[0, 1, 0], [-1, 0, 0]])
+    assert (found.owners, found.ball_radius) == (("a", "b"), 1.5)
+    assert found.ball_uncertainty == 0.002
+    assert (
+        touches_of_part([("a", one)], Conditions(instrument), PartOptions()).ball_radius
+        == 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "places", "signs"),
+    [
+        # Of a plane deviations have a sign, off a line they have none.
+        (
+            FeatureKind.PLANE,
+            [[-20, -20, 0.1], [20, -20, -0.1], [-20, 20, -0.1], [20, 20, 0.1]],
+            [1, -1, -1, 1],
+        ),
+        (
+            FeatureKind.LINE,
+            [[-20, 0, 0.1], [-10, 0, -0.2], [10, 0, 0.2], [20, 0, -0.1]],
+            [1, 1, 1, 1],
+        ),
+    ],
+)
+def test_deviations_of_the_feature_that_is_probed(
+    instrument: Instrument,
+    placed: Placed,
+    kind: FeatureKind,
+    places: list[list[float]],
+    signs: list[int],
+) -> None:
+    options = PartOptions(Plan("Part", (PlannedFeature("it", kind, touches=6),)))
+    conditions, points = Conditions(instrument), placed(places)
+    now = feature_so_far(options, TaskProgress(points), conditions)
+    begun = feature_so_far(options, TaskProgress(), conditions)
+
+    assert now is not None
+    assert begun is not None
+    assert now.fit is not None
+    off = np.array([now.fit.distance_of(point.point_cam) for point in points])
+    found = off * np.sign(off[0])
+    assert np.sign(found).tolist() == signs
+    if kind is FeatureKind.PLANE:
+        np.testing.assert_allclose(found, 0.1 * np.array(signs), atol=1e-9)
+    assert begun.fit is None
+    assert feature_so_far(options, TaskProgress((), (points,)), conditions) is None
+
+
+def test_places_are_planned_by_kind_and_nominals_together() -> None:
+    nominal = Nominal(origin=(10.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    hole = next(each for each in PLATE.features if each.side is Side.INSIDE)
+
+    assert planned_places(PlannedFeature("a", FeatureKind.PLANE)) == ()
+    assert planned_places(PlannedFeature("a", None, nominal=nominal)) == ()
+    inside = planned_places(hole)
+    outside = planned_places(
+        PlannedFeature(hole.name, hole.kind, nominal=hole.nominal, touches=hole.touches)
+    )
+    assert len(inside) == hole.n_touches
+    for one, other in zip(inside, outside, strict=True):
+        np.testing.assert_array_equal(one.normal, -other.normal)
+
+
+def test_the_simulated_operator_goes_round_the_places_of_each_feature() -> None:
+    options = PartOptions(PLATE)
+    n = PLATE.features[0].n_touches
+    first, again = (hand_goal(options, 0, step) for step in (0, n))
+    place = planned_places(PLATE.features[0])[0]
+
+    assert first.point is not None
+    assert first.outwards is not None
+    np.testing.assert_array_equal([first.point], [again.point])
+    u, v, w = place.point
+    np.testing.assert_allclose(first.point, [u, -w - 30.0, v])
+    u, v, w = place.normal
+    np.testing.assert_allclose(first.outwards, [u, -w, v])
+    assert hand_goal(options, len(PLATE.features), 0).point is None
+    assert hand_goal(PartOptions(), 0, 0).point is None
