@@ -14,10 +14,44 @@ Conventions used everywhere in this package:
 * ``data`` is a data folder; ``now`` returns date and time with the time zone.
 * What reads or writes files raises `FileError` where they cannot be read or written, or
   are damaged; the archive `ArchiveError`. A docstring names other errors only.
+
+The names below are public; the modules behind them may move. See docs/python.md.
 """
 
 import logging
+from importlib import import_module
 
 __version__ = "1.0.0"
 
+# The module of each public name, imported when the name is used; `__init__.pyi` tells
+# type checkers the same.
+_PLACES = {
+    "Calibration": "estimation.calibrate",
+    "Camera": "model.camera",
+    "LightpenError": "errors",
+    "Pen": "model.pen",
+    "calibrate": "estimation.calibrate",
+    "calibrate_pivot": "estimation.pivot_calibration",
+    "calibrate_rig": "estimation.calibrate",
+    "calibration_text": "estimation.reports.summary",
+    "detect": "detection.observations",
+    "find_images": "formats.images",
+    "judge": "estimation.reports.verdict",
+    "read_calibration": "record.calibrations.calibrations",
+    "read_camera": "formats.camera_files",
+    "read_pen": "formats.pen_files",
+    "read_poses": "formats.observation_files",
+    "read_rig": "formats.rig_files",
+    "reported": "estimation.reports.methods",
+}
+_OTHERWISE = {"detect": "observe_images"}  # names in their modules
+__all__ = list(_PLACES)
+
 logging.getLogger(__name__).addHandler(logging.NullHandler())
+
+
+def __getattr__(name: str) -> object:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module(f"{__name__}.{_PLACES[name]}")
+    return getattr(module, _OTHERWISE.get(name, name))
