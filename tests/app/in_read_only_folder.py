@@ -53,7 +53,7 @@ def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
     walker.until_says("No swing")
     walker.until_tells(WAY)
     walker.window.resize(940, 500)
-    walker.until_tells("the disk is read-only.")
+    walker.until_tells("The disk is read-only.")
     assert min(letters(walker)) >= TextSize.SMALL
 
 

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
-from tests.app.walks import NAMES, page_text, read_out, result_on_disk
+from tests.app.walks import NAMES, page_text, read_out, result_on_disk, set_up
 
 from lightpen.record.swings.recordings import files_beside
 from lightpen_app.widgets.number_field import NumberField
@@ -43,6 +43,7 @@ def test_a_pen_without_a_file_becomes_an_accepted_tip(
 
 def find_and_accept(walker: "Walker", step: str) -> None:
     """Find pen and camera without files, and accept the tip by the same images."""
+    set_up(walker)
     for name, text in NAMES.items():
         walker.click_into(name, text)
     # The swing is as the clock has it: without files U is near the usual limit.

@@ -17,6 +17,7 @@ from lightpen_app.print_report.printing import A4, paint_on, pdf_of
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.save_dialog import ask_file
+from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
@@ -60,10 +61,10 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._larger = PushButton()
         self._save = PushButton()
         self._print = PushButton()
-        self._close = PushButton()
+        self._close, self._said = PushButton(), SignLabel()
 
         # Layout
-        layout = vertical_layout(self, (self._pages, 1), margins=GRID)
+        layout = vertical_layout(self, (self._pages, 1), self._said, margins=GRID)
         zoom = self._smaller, self._larger
         horizontal_layout(layout, *zoom, 1, self._print, self._save, self._close)
 
@@ -74,6 +75,8 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._save.clicked.connect(self._ask_file)
         self._print.clicked.connect(self._ask_printer)
         self._close.clicked.connect(self.close)
+        self.saved.connect(self._on_saved)
+        self.failed.connect(self._on_failed)
 
         self._retranslate()
 
@@ -108,6 +111,13 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         job.start(
             lambda _: self.saved.emit(path), self.failed, ended=self._on_saving_ended
         )
+
+    def _on_saved(self, path: Path) -> None:
+        text = self.tr("Saved as {0}").format(path)
+        self._said.set_value(StatusMessage.good(text))
+
+    def _on_failed(self, why: str) -> None:
+        self._said.set_value(StatusMessage.fault(why))
 
     def _on_saving_ended(self) -> None:
         self._saving = None

@@ -19,8 +19,6 @@ from lightpen.model.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.record.folder.camera_calibrations import CameraTrial
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.live_view import LiveView
@@ -45,6 +43,9 @@ class BoardCalibration(QObject):
 
     found_changed = Signal()
     remark_changed = Signal()
+    begun = Signal()
+    progressed = Signal(float)  # of the computation, 0 to 1
+    ended = Signal()
     saved = Signal(str)  # a camera file was written
     concluded = Signal(object)  # CameraTrial: outcome of an attempt
 
@@ -80,9 +81,8 @@ class BoardCalibration(QObject):
 
     def calibrate_by_folder(self, folder: str, board: Board) -> None:
         """Calibrate by the images in a folder."""
-        self.conclude()
-        self._capture.start(None)
-        self._run(partial(calibrate_by_folder, folder, board))
+        self._capture.stop()
+        self._run(partial(calibrate_by_folder, folder, board), is_of_folder=True)
 
     def leave_out(self, name: str) -> None:
         """Calibrate again without one of the views."""
@@ -111,29 +111,46 @@ class BoardCalibration(QObject):
 
     def _give_up(self) -> None:
         """Cancel the computation and discard an unused result."""
-        self._job.cancel()
+        self.cancel()
         if self._computed is not None and not self._is_saved:
             self.concluded.emit(self._trial(TrialOutcome.REFUSED))
         self._computed = None
         self.found_changed.emit()
 
-    def _run(self, calibrate: Callable[[Report], ComputedCamera]) -> None:
-        self._give_up()
+    def cancel(self) -> None:
+        """End the computation; what was found before stays."""
+        self._job.cancel()
+        self.ended.emit()
+
+    @property
+    def is_computing(self) -> bool:
+        """Whether a result is awaited."""
+        return self._job.is_running
+
+    def _run(
+        self,
+        calibrate: Callable[[Report], ComputedCamera],
+        *,
+        is_of_folder: bool = False,
+    ) -> None:
         self._job.start(
-            calibrate, self._on_found, self._on_refused, progressed=self._on_progressed
+            calibrate,
+            partial(self._on_found, is_of_folder),
+            self._on_refused,
+            progressed=self.progressed,
+            ended=self.ended,
         )
-
-    def _on_progressed(self, fraction: float) -> None:
-        self.set_remark(partial(self._progress_message, fraction))
-
-    def _progress_message(self, fraction: float) -> StatusMessage:
-        words = self.tr("Calibrating: {0:.0%}").format(fraction)
-        return StatusMessage(words, Sign.WAIT, Tone.QUIET)
+        self.begun.emit()
 
     def _on_refused(self, sentence: str) -> None:
         self.set_remark(partial(StatusMessage.fault, sentence))
 
-    def _on_found(self, computed: ComputedCamera) -> None:
+    def _on_found(self, is_of_folder: bool, computed: ComputedCamera) -> None:
+        if is_of_folder:
+            self.conclude()
+            self._capture.start(None)
+        else:
+            self._give_up()
         self._computed, self._is_saved = computed, False
         self.found_changed.emit()
         self.set_remark(partial(self._found_message, computed.found))

@@ -14,6 +14,7 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
@@ -64,7 +65,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
         # Widgets
         self._image = BoardView()
-        self._remark = SignLabel()
+        self._remark, self._progress = SignLabel(), JobProgress()
         self.board = BoardForm()
         self._begin = PushButton()
         self._folder = PushButton()
@@ -100,7 +101,8 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         rows = vertical_layout(column, (scroll, 1))
         horizontal_layout(rows, (self._compute, 1), (self._save, 1))
         layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
-        vertical_layout(layout, (self._image, 1), self._remark, stretch=1, spacing=-1)
+        left = vertical_layout(layout, (self._image, 1), stretch=1, spacing=-1)
+        fill(left, self._progress, self._remark)
         layout.addWidget(column)
 
         # Connections
@@ -108,6 +110,12 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._capture.changed.connect(self._refresh)
         self._calibration.remark_changed.connect(self._refresh)
         self._calibration.found_changed.connect(self._on_found_changed)
+        self._calibration.begun.connect(self._progress.begin)
+        self._calibration.begun.connect(self._refresh)
+        self._calibration.progressed.connect(self._progress.set_fraction)
+        self._calibration.ended.connect(self._progress.end)
+        self._calibration.ended.connect(self._refresh)
+        self._progress.cancelled.connect(self._calibration.cancel)
         self._calibration.saved.connect(self.saved)
         self._calibration.concluded.connect(self.concluded)
         self._begin.clicked.connect(self._on_begin_clicked)
@@ -151,6 +159,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
             self._hold_simulated(None)
         elif not is_refusing(self):
             self._calibration.conclude()
+            self._calibration.set_remark(StatusMessage)
             board = self._named_board()
             self._capture.start(board)
             self._hold_simulated(board)
@@ -168,7 +177,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         except UsageError as error:
             self._calibration.set_remark(partial(fault_message, error.message))
             return None
-        self._calibration.set_remark(StatusMessage)
         return board
 
     def _on_image_shown(self, shown: DisplayedImage) -> None:
@@ -257,11 +265,17 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         n_views = 0 if views is None else views.n_views
         self._count.setText(self.tr("Views captured: {0}").format(n_views))
         too_few = self.tr("At least {0} views are needed.").format(MIN_VIEWS)
-        self._compute.set_why_not(too_few if state.n_kept < MIN_VIEWS else "")
+        busy = ""
+        if self._calibration.is_computing:
+            busy = self.tr("Another operation is in progress.")
+        self._folder.set_why_not(busy)
+        self._compute.set_why_not(busy or (too_few if state.n_kept < MIN_VIEWS else ""))
         nothing = self.tr("Calibrate first.")
-        self._save.set_why_not("" if found is not None else nothing)
+        self._save.set_why_not(busy or ("" if found is not None else nothing))
         is_chosen = found is not None and self._worst.currentItem() is not None
-        self._remove.set_why_not("" if is_chosen else self.tr("Select a view."))
+        self._remove.set_why_not(
+            busy or ("" if is_chosen else self.tr("Select a view."))
+        )
         self._outcome.setVisible(found is not None)
         self._facts.setText("" if found is None else facts_text(found))
         for button in (self._shows_residuals, self._shows_uncertainty):

@@ -18,6 +18,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.page_scroll import PageScroll
@@ -62,7 +63,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
         # Widgets
         self._image = BoardView()
-        self._instruction = SignLabel()
+        self._instruction, self._progress = SignLabel(), JobProgress()
         self._count = text_label(TextSize.BODY)
         self._begin = PushButton()
         self._dial = PostureDial()
@@ -98,7 +99,12 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         vertical_layout(column, (scroll, 1), self._compute, self._save)
         layout = horizontal_layout(self, spacing=2 * GRID, margins=2 * GRID)
         vertical_layout(
-            layout, self._instruction, (self._image, 1), stretch=1, spacing=-1
+            layout,
+            self._instruction,
+            self._progress,
+            (self._image, 1),
+            stretch=1,
+            spacing=-1,
         )
         layout.addWidget(column)
 
@@ -109,6 +115,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._run.saved.connect(self._on_saved)
         self._begin.clicked.connect(self._on_begin_clicked)
         self._compute.clicked.connect(self._on_compute_clicked)
+        self._progress.cancelled.connect(self._run.cancel)
         self._save.clicked.connect(self._run.save)
         self._pen.led_chosen.connect(self._on_led_chosen)
         for edit in fields:
@@ -147,9 +154,6 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
             self._run.choose_frame(origin, led)
 
     def _on_compute_clicked(self) -> None:
-        if self._run.state.progress is not None:
-            self._run.cancel()
-            return
         if is_refusing(self):
             return
         sigma = self._u.value() / 2
@@ -189,11 +193,12 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         why_not = "" if state.found else self.tr("Swing the pen first.")
         if not why_not and not self._length.value():
             why_not = self.tr("Enter the distance of the LEDs.")
-        is_computing = state.progress is not None
-        self._compute.set_why_not("" if is_computing else why_not)
-        self._compute.setText(
-            self.tr("Cancel") if is_computing else self.tr("Find pen and camera")
-        )
+        self._progress.set_running(state.progress is not None)
+        if state.progress is not None:
+            self._progress.set_fraction(state.progress)
+            why_not = self.tr("Computing")
+        self._compute.set_why_not(why_not)
+        self._compute.setText(self.tr("Find pen and camera"))
         nothing = self.tr("Find pen and camera first.")
         self._save.set_why_not("" if state.is_final else nothing)
 
@@ -223,8 +228,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
     def _instructed(self, state: DiscoveryState) -> StatusMessage:
         if state.progress is not None:
-            words = self.tr("Computing: {0:.0%}").format(state.progress)
-            return StatusMessage(words, Sign.WAIT, Tone.QUIET)
+            return StatusMessage(self.tr("Computing"), Sign.WAIT, Tone.QUIET)
         if state.fault:
             return StatusMessage.warning(state.fault)
         limit = self._workbench.selection.preparation.limits.max_uncertainty

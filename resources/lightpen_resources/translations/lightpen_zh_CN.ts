@@ -45,10 +45,6 @@
         <translation>保存...</translation>
     </message>
     <message>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
         <source>Listed entries (CSV)...</source>
         <translation>所列条目 (CSV)...</translation>
     </message>
@@ -182,10 +178,6 @@
 <context>
     <name>BoardCalibration</name>
     <message>
-        <source>Calibrating: {0:.0%}</source>
-        <translation>正在标定：{0:.0%}</translation>
-    </message>
-    <message>
         <source>Camera calibrated.</source>
         <translation>相机标定完成。</translation>
     </message>
@@ -298,6 +290,10 @@
     <message>
         <source>Views captured: {0}</source>
         <translation>已采集的视图：{0}</translation>
+    </message>
+    <message>
+        <source>Another operation is in progress.</source>
+        <translation>另一项操作正在进行。</translation>
     </message>
     <message>
         <source>Select a view.</source>
@@ -788,10 +784,6 @@
         <translation>请先摆动光笔。</translation>
     </message>
     <message>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
         <source>Tip {0}: {1:.4f} ± {2:.4f} mm (k = 2)</source>
         <translation>测头 {0}：{1:.4f} ± {2:.4f} mm (k = 2)</translation>
     </message>
@@ -820,12 +812,12 @@
         <translation>请输入 LED 间距。</translation>
     </message>
     <message>
-        <source>Frame of the pen: click the LED at the origin, then one along y.</source>
-        <translation>光笔坐标系：先点击原点处的 LED，再点击 y 方向上的一个 LED。</translation>
+        <source>Computing</source>
+        <translation>正在计算</translation>
     </message>
     <message>
-        <source>Computing: {0:.0%}</source>
-        <translation>正在计算：{0:.0%}</translation>
+        <source>Frame of the pen: click the LED at the origin, then one along y.</source>
+        <translation>光笔坐标系：先点击原点处的 LED，再点击 y 方向上的一个 LED。</translation>
     </message>
     <message>
         <source>U of the tip is {0:.3f} mm; the limit is {1:g} mm. Swing again with more images and tilt, or measure the length better.</source>
@@ -1372,10 +1364,6 @@
         <translation>请先打开内参文件和 LED 文件。</translation>
     </message>
     <message>
-        <source>Computing: {0:.0%}</source>
-        <translation>正在计算：{0:.0%}</translation>
-    </message>
-    <message>
         <source>Saved in {0}: {1} and {2}. Residuals of the swing held out: {3} px, with the old file {4} px.</source>
         <translation>已保存到 {0}：{1} 和 {2}。留出的摆动的残差：{3} px，用旧文件时为 {4} px。</translation>
     </message>
@@ -1869,6 +1857,17 @@
     <message>
         <source>Browse...</source>
         <translation>浏览...</translation>
+    </message>
+</context>
+<context>
+    <name>JobProgress</name>
+    <message>
+        <source>Progress</source>
+        <translation>进度</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>取消</translation>
     </message>
 </context>
 <context>
@@ -2938,16 +2937,8 @@
         <translation>用蒙特卡洛法传播文件、就位和噪声的分布（JCGM 101）。将占用除一个以外的所有处理器核心，历时数秒至数分钟。</translation>
     </message>
     <message>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
         <source>Trials</source>
         <translation>试验次数</translation>
-    </message>
-    <message>
-        <source>Progress</source>
-        <translation>进度</translation>
     </message>
     <message>
         <source>U by Monte Carlo and by uncertainty budget</source>
@@ -3497,6 +3488,10 @@ needed</source>
         <source>Save report</source>
         <translation>保存报告</translation>
     </message>
+    <message>
+        <source>Saved as {0}</source>
+        <translation>已保存为 {0}</translation>
+    </message>
 </context>
 <context>
     <name>ProbingPage</name>
@@ -4029,14 +4024,6 @@ needed</source>
     <message>
         <source>Details</source>
         <translation>详细信息</translation>
-    </message>
-    <message>
-        <source>Progress of the computation</source>
-        <translation>计算进度</translation>
-    </message>
-    <message>
-        <source>Cancel</source>
-        <translation>取消</translation>
     </message>
     <message>
         <source>Keep last solution</source>
@@ -5109,14 +5096,6 @@ needed</source>
         <translation>空格：继续</translation>
     </message>
     <message>
-        <source>about {0} min left</source>
-        <translation>约剩 {0} 分钟</translation>
-    </message>
-    <message>
-        <source>about {0} s left</source>
-        <translation>约剩 {0} 秒</translation>
-    </message>
-    <message>
         <source>Space: pause</source>
         <translation>空格：暂停</translation>
     </message>
@@ -5131,6 +5110,17 @@ needed</source>
     <message>
         <source>at most {0} images</source>
         <translation>最多 {0} 幅图像</translation>
+    </message>
+</context>
+<context>
+    <name>TimeLeft</name>
+    <message>
+        <source>about {0} min left</source>
+        <translation>约剩 {0} 分钟</translation>
+    </message>
+    <message>
+        <source>about {0} s left</source>
+        <translation>约剩 {0} 秒</translation>
     </message>
 </context>
 <context>
@@ -5770,6 +5760,14 @@ needed</source>
         <translation>输入/输出错误</translation>
     </message>
     <message>
+        <source>Its folder does not exist. Create the folder, or choose another.</source>
+        <translation>所在文件夹不存在。请创建文件夹，或选择其他文件夹。</translation>
+    </message>
+    <message>
+        <source>Its folder is not a folder. Check the path.</source>
+        <translation>所在位置不是文件夹。请检查路径。</translation>
+    </message>
+    <message>
         <source>Keep the tip in the cone for a moment. The program then learns your position.</source>
         <translation>请将测头在锥孔中保持片刻，程序随后会记住您的位置。</translation>
     </message>
@@ -6054,6 +6052,10 @@ needed</source>
         <translation>权限不够</translation>
     </message>
     <message>
+        <source>Permission is denied. Choose another folder, or ask for access.</source>
+        <translation>没有权限。请选择其他文件夹，或申请权限。</translation>
+    </message>
+    <message>
         <source>Points excluded because they lie elsewhere: {n_left_out} of {n_touches}, the first {first}. The pen was lifted or slipped.</source>
         <translation>{n_touches} 个测点中有 {n_left_out} 个位于别处而被剔除，第一个是 {first}：光笔被抬起或滑动。</translation>
     </message>
@@ -6250,12 +6252,24 @@ needed</source>
         <translation>此用户账户不认识链 {chain}：它是在另一账户中开始的。请将其名称与以前报告上的名称核对。</translation>
     </message>
     <message>
+        <source>The disk is full. Free some space, or write to another disk.</source>
+        <translation>磁盘已满。请清理空间，或写到其他磁盘。</translation>
+    </message>
+    <message>
+        <source>The disk is read-only. Choose another folder.</source>
+        <translation>磁盘是只读的。请选择其他文件夹。</translation>
+    </message>
+    <message>
         <source>The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
         <translation>锥孔间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
     </message>
     <message>
         <source>The file has {n_leds} LEDs.</source>
         <translation>文件有 {n_leds} 个 LED。</translation>
+    </message>
+    <message>
+        <source>The file would be larger than allowed here. Write to another disk.</source>
+        <translation>文件超过此处允许的大小。请写到其他磁盘。</translation>
     </message>
     <message>
         <source>The file {file} is damaged: {what}.</source>
@@ -6332,6 +6346,14 @@ needed</source>
     <message>
         <source>The limits in {file} were not approved by a supervisor of this station. Nothing is accepted until the file is removed.</source>
         <translation>{file} 中的限值未经本工位主管批准。在移除该文件之前，不接受任何结果。</translation>
+    </message>
+    <message>
+        <source>The name is a link that leads back to itself. Choose another name.</source>
+        <translation>该名称是指向自身的链接。请另选名称。</translation>
+    </message>
+    <message>
+        <source>The name is too long. Choose a shorter one.</source>
+        <translation>名称太长。请选择较短的名称。</translation>
     </message>
     <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
@@ -6422,6 +6444,10 @@ needed</source>
         <translation>{name} 的 {what} 不是协方差矩阵：它必须对称且没有负方差。请更正或删除。</translation>
     </message>
     <message>
+        <source>There is a file of that name already. Try again.</source>
+        <translation>已有同名文件。请重试。</translation>
+    </message>
+    <message>
         <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
         <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
     </message>
@@ -6496,6 +6522,10 @@ needed</source>
     <message>
         <source>Write image size, camera matrix and distortion coefficients as text: by jsonencode in MATLAB, by cv2.FileStorage in Python.</source>
         <translation>请将图像尺寸、相机矩阵和畸变系数写成文本：MATLAB 用 jsonencode，Python 用 cv2.FileStorage。</translation>
+    </message>
+    <message>
+        <source>Your disk quota is used up. Free some space, or write elsewhere.</source>
+        <translation>磁盘配额已用完。请清理空间，或写到其他地方。</translation>
     </message>
     <message>
         <source>a Digital Calibration Certificate in the schema of PTB; it names the laboratory</source>
@@ -6974,10 +7004,6 @@ needed</source>
         <translation>{part}：{n_judged} 个特性中有 {n_out} 个超差（{names}）。</translation>
     </message>
     <message>
-        <source>{path} cannot be written: {reason} The images recorded so far are safe.</source>
-        <translation>无法写入 {path}：{reason}已记录的图像是安全的。</translation>
-    </message>
-    <message>
         <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database, with %40 for an @ in the password.</source>
         <translation>无法读取档案服务器的地址。其格式为 postgresql://user:password@host/database，口令中的 @ 写作 %40。</translation>
     </message>
@@ -7158,14 +7184,6 @@ needed</source>
         <translation>不是数字列表。</translation>
     </message>
     <message>
-        <source>its folder does not exist. Create the folder, or choose another.</source>
-        <translation>所在文件夹不存在。请创建文件夹，或选择其他文件夹。</translation>
-    </message>
-    <message>
-        <source>its folder is not a folder. Check the path.</source>
-        <translation>所在位置不是文件夹。请检查路径。</translation>
-    </message>
-    <message>
         <source>journal</source>
         <translation>日志文件</translation>
     </message>
@@ -7184,10 +7202,6 @@ needed</source>
     <message>
         <source>pen</source>
         <translation>光笔</translation>
-    </message>
-    <message>
-        <source>permission is denied. Choose another folder, or ask for access.</source>
-        <translation>没有权限。请选择其他文件夹，或申请权限。</translation>
     </message>
     <message>
         <source>picture</source>
@@ -7266,32 +7280,12 @@ needed</source>
         <translation>球（直径）</translation>
     </message>
     <message>
-        <source>the disk is full. Free some space, or write to another disk.</source>
-        <translation>磁盘已满。请清理空间，或写到其他磁盘。</translation>
-    </message>
-    <message>
-        <source>the disk is read-only. Choose another folder.</source>
-        <translation>磁盘是只读的。请选择其他文件夹。</translation>
-    </message>
-    <message>
         <source>the file ends within the number {number}, which has {n_decimals} decimals where all others have {n_others}. Copy the file again, or remove the line.</source>
         <translation>文件在数字 {number} 处中断：它有 {n_decimals} 位小数，而其他都有 {n_others} 位。请重新复制文件，或删除该行。</translation>
     </message>
     <message>
-        <source>the file would be larger than allowed here. Write to another disk.</source>
-        <translation>文件超过此处允许的大小。请写到其他磁盘。</translation>
-    </message>
-    <message>
         <source>the lens, beyond its distortion model, and the systematic error of the LED centres. Calibrate the camera with views that fill the image, so that its file states the lens field, focus the lens, and illuminate the LEDs evenly</source>
         <translation>镜头超出畸变模型的部分以及 LED 中心的系统误差。请以布满图像的视图标定相机，使其文件给出镜头残余场；对焦镜头，并使 LED 发光均匀</translation>
-    </message>
-    <message>
-        <source>the name is a link that leads back to itself. Choose another name.</source>
-        <translation>该名称是指向自身的链接。请另选名称。</translation>
-    </message>
-    <message>
-        <source>the name is too long. Choose a shorter one.</source>
-        <translation>名称太长。请选择较短的名称。</translation>
     </message>
     <message>
         <source>the pen&apos;s {axis} axis</source>
@@ -7308,10 +7302,6 @@ needed</source>
     <message>
         <source>the {what} is {value:g} where the first LED has {first:g}. It must be the same for all LEDs of a pen.</source>
         <translation>{what} 为 {value:g}，而第一个 LED 为 {first:g}。同一光笔的所有 LED 必须相同。</translation>
-    </message>
-    <message>
-        <source>there is a file of that name already. Try again.</source>
-        <translation>已有同名文件。请重试。</translation>
     </message>
     <message>
         <source>tip</source>
@@ -7368,10 +7358,6 @@ needed</source>
     <message>
         <source>y must grow from LED 1 to LED 4. Change the sign of all y.</source>
         <translation>y 必须从 LED 1 到 LED 4 递增。请改变所有 y 的符号。</translation>
-    </message>
-    <message>
-        <source>your disk quota is used up. Free some space, or write elsewhere.</source>
-        <translation>磁盘配额已用完。请清理空间，或写到其他地方。</translation>
     </message>
     <message>
         <source>{cell} is not a finite number.</source>
@@ -8366,10 +8352,6 @@ needed</source>
         <translation>评定准则“{criterion}”不适用于{kind}。请使用最小二乘。</translation>
     </message>
     <message>
-        <source>The data folder {folder} is not writable: {reason}</source>
-        <translation>数据文件夹 {folder} 无法写入：{reason}</translation>
-    </message>
-    <message>
         <source>The datum points are on one line, which leaves the rotation about it undetermined. Add a point beside that line.</source>
         <translation>基准点位于同一条直线上，绕该直线的转动不能确定。请在直线之外增加一点。</translation>
     </message>
@@ -8452,10 +8434,6 @@ needed</source>
     <message>
         <source>The file {path} cannot be read: {reason}. Check the name and the read permission.</source>
         <translation>文件 {path} 无法读取：{reason}。请检查名称和读取权限。</translation>
-    </message>
-    <message>
-        <source>The folder {folder} cannot be created or read: {reason}</source>
-        <translation>文件夹 {folder} 无法创建或读取：{reason}</translation>
     </message>
     <message>
         <source>The folder {folder} cannot be created: {reason}. Check the write permission.</source>
@@ -9406,6 +9384,22 @@ needed</source>
         <translation>{of} 的{quantity}</translation>
     </message>
     <message>
+        <source>{reason} The data folder {folder} is not writable.</source>
+        <translation>{reason}数据文件夹 {folder} 不可写。</translation>
+    </message>
+    <message>
+        <source>{reason} The folder {folder} cannot be created or read.</source>
+        <translation>{reason}无法创建或读取文件夹 {folder}。</translation>
+    </message>
+    <message>
+        <source>{reason} {path} cannot be written. The images recorded so far are safe.</source>
+        <translation>{reason}无法写入 {path}。已记录的图像是安全的。</translation>
+    </message>
+    <message>
+        <source>{reason} {path} cannot be written. The previous content is unchanged.</source>
+        <translation>{reason}无法写入 {path}。原有内容未改变。</translation>
+    </message>
+    <message>
         <source>{reason} {power}</source>
         <translation>{reason} {power}</translation>
     </message>
@@ -9608,10 +9602,6 @@ needed</source>
     <message>
         <source>{path} cannot be written: it is a folder. Choose a file name.</source>
         <translation>无法写入 {path}：它是文件夹。请指定文件。</translation>
-    </message>
-    <message>
-        <source>{path} cannot be written: {reason} The previous content is unchanged.</source>
-        <translation>无法写入 {path}：{reason} 原有内容未改变。</translation>
     </message>
     <message>
         <source>{path} has several cameras; only calibrations of a single camera can be recomputed. Remove it.</source>

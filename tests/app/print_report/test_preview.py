@@ -15,6 +15,7 @@ from lightpen.record.results.results import Result
 from lightpen_app.print_report.pages import PrintReport
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.print_report.printing import paint_on
+from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.workbench import Workbench
 
 
@@ -46,6 +47,11 @@ def test_escape_closes_it_and_nothing_is_scrolled_to_the_sides(
     assert not window.isVisible()
 
 
+def said(window: PrintReportWindow) -> str:
+    (label,) = window.findChildren(SignLabel)
+    return label.value().text
+
+
 def test_it_is_saved_where_it_is_wanted(
     qtbot: QtBot, window: PrintReportWindow, tmp_path: Path
 ) -> None:
@@ -64,6 +70,7 @@ def test_it_is_saved_where_it_is_wanted(
 
     assert saved.args == [path]
     assert path.read_bytes().startswith(b"%PDF-1.4")
+    assert said(window) == f"Saved as {path}"
 
 
 def test_where_it_cannot_be_saved_is_reported(
@@ -73,6 +80,7 @@ def test_where_it_cannot_be_saved_is_reported(
         window.write(tmp_path / "no" / "such" / "record.pdf")
 
     assert "record.pdf" in failed.args[0]
+    assert said(window) == failed.args[0]
 
 
 def test_a_printer_gets_every_page(

@@ -214,7 +214,7 @@ def test_a_device_is_written_to_and_not_replaced() -> None:
 
 
 def test_a_missing_folder_is_named_as_the_reason(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="its folder does not exist"):
+    with pytest.raises(FileError, match="Its folder does not exist"):
         write_whole(tmp_path / "none" / "cam.yaml", b"new")
 
 
@@ -225,7 +225,7 @@ def test_a_folder_is_not_written_over(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_a_full_device_is_named_as_the_reason() -> None:
-    with pytest.raises(FileError, match="the disk is full"):
+    with pytest.raises(FileError, match="The disk is full"):
         write_whole(Path("/dev/full"), b"new")
 
 
@@ -237,7 +237,7 @@ def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path) -> None:
         "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))",
         f"write_whole(Path({str(path)!r}), bytes(10_000))",
     )
-    assert "the file would be larger than allowed" in result
+    assert "The file would be larger than allowed" in result
     assert "The previous content is unchanged" in result
     assert path.read_bytes() == b"old"
     assert names_in(tmp_path) == ["cam.yaml"]
@@ -258,7 +258,7 @@ def test_a_full_file_system_leaves_the_old_file_whole(tmp_path: Path) -> None:
         pytest.skip("this system does not allow mounting")
     try:
         path = file(disk, b"old")
-        with pytest.raises(FileError, match=r"the disk is full\. Free some space"):
+        with pytest.raises(FileError, match=r"The disk is full\. Free some space"):
             write_whole(path, bytes(200_000))
         assert path.read_bytes() == b"old"
         assert names_in(disk) == ["cam.yaml"]
@@ -271,7 +271,7 @@ def test_a_write_protected_file_is_not_replaced(open_folder: Path) -> None:
     path = file(open_folder, b"old")
     path.chmod(0o444)
     result = as_nobody(f"write_whole(Path({str(path)!r}), b'new')")
-    assert "permission is denied" in result
+    assert "Permission is denied" in result
     assert path.read_bytes() == b"old"
 
 
@@ -306,7 +306,7 @@ def test_a_new_file_is_created_whole(tmp_path: Path) -> None:
 
 def test_a_file_that_exists_is_not_created_again(tmp_path: Path) -> None:
     path = file(tmp_path, b"old")
-    with pytest.raises(FileError, match="there is a file of that name already"):
+    with pytest.raises(FileError, match="There is a file of that name already"):
         create_whole(path, b"new")
 
     assert path.read_bytes() == b"old"
@@ -321,7 +321,7 @@ def test_a_disk_that_knows_no_links_gets_new_files_only_as_well(
 
     monkeypatch.setattr(Path, "hardlink_to", refuse)  # FAT answers so
     create_whole(tmp_path / "cam.yaml", b"old")
-    with pytest.raises(FileError, match="there is a file of that name already"):
+    with pytest.raises(FileError, match="There is a file of that name already"):
         create_whole(tmp_path / "cam.yaml", b"new")
 
     assert (tmp_path / "cam.yaml").read_bytes() == b"old"
@@ -353,7 +353,7 @@ def test_a_new_file_on_a_full_disk_is_none(tmp_path: Path) -> None:
         "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))",
         f"create_whole(Path({str(path)!r}), bytes(10_000))",
     )
-    assert "the file would be larger than allowed" in result
+    assert "The file would be larger than allowed" in result
     assert names_in(tmp_path) == []
 
 

@@ -91,7 +91,7 @@ class ArchiveControl(QObject):
         job.start(
             on_succeeded,
             self._on_failed,
-            progressed=self._panel.set_progress,
+            progressed=self._panel.progress.set_fraction,
             ended=self._on_done,
         )
 

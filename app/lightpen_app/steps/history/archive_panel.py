@@ -5,7 +5,7 @@ from enum import Enum, auto
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QMenu, QProgressBar, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.archive.checks.check import ArchiveCheckResult
 from lightpen.archive.logbook.logbook import ReplicationState
@@ -13,6 +13,7 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -53,9 +54,7 @@ class ArchivePanel(Translated, QWidget):
             saving: menu.addAction("") for saving in SaveFormat
         }
         self._save.setMenu(menu)
-        self._progress = QProgressBar(maximum=100)
-        self._cancel = PushButton()
-        self._working = QWidget()
+        self.progress = JobProgress()
         self._delivered = SignLabel()
         self._outcome = SignLabel()
         self._findings: list[SignLabel] = []
@@ -63,15 +62,11 @@ class ArchivePanel(Translated, QWidget):
         # Layout
         self._layout = layout = vertical_layout(self, margins=(0, GRID, 0, 0))
         horizontal_layout(layout, self._check, self._save, 1)
-        fill(layout, self._working, self._delivered, self._outcome, 1)
-        horizontal_layout(
-            self._working, (self._progress, 1), self._cancel, spacing=2 * GRID
-        )
-        self._working.hide()
+        fill(layout, self.progress, self._delivered, self._outcome, 1)
 
         # Connections
         self._check.clicked.connect(self.check_requested)
-        self._cancel.clicked.connect(self.cancel_requested)
+        self.progress.cancelled.connect(self.cancel_requested)
         for saving, action in self._savings.items():
             action.triggered.connect(
                 lambda _=False, saving=saving: self.save_requested.emit(saving)
@@ -81,13 +76,8 @@ class ArchivePanel(Translated, QWidget):
 
     def set_working(self, working: bool) -> None:
         """Show that an operation is in progress, and disable the others."""
-        self._progress.setValue(0)
-        self._working.setVisible(working)
+        self.progress.set_running(working)
         self._refresh_buttons()
-
-    def set_progress(self, fraction: float) -> None:
-        """Show the progress, 0 to 1."""
-        self._progress.setValue(round(100 * fraction))
 
     def checked(self) -> ArchiveCheckResult | None:
         """Return the result of the last check; None before the first."""
@@ -111,7 +101,6 @@ class ArchivePanel(Translated, QWidget):
     def _retranslate(self) -> None:
         self._check.setText(self.tr("Check the archive"))
         self._save.setText(self.tr("Save..."))
-        self._cancel.setText(self.tr("Cancel"))
         for saving, text in (
             (SaveFormat.TABLE, self.tr("Listed entries (CSV)...")),
             (SaveFormat.WHOLE, self.tr("All entries (JSON lines)...")),
@@ -122,8 +111,9 @@ class ArchivePanel(Translated, QWidget):
         self._show_outcome()
 
     def _refresh_buttons(self) -> None:
-        is_working = not self._working.isHidden()
-        why_not = self.tr("Another operation is in progress.") if is_working else ""
+        why_not = ""
+        if self.progress.is_running:
+            why_not = self.tr("Another operation is in progress.")
         tooltips = (
             self.tr("Read and compare every entry, record, result and image"),
             self.tr("For other programs"),

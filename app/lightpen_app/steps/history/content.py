@@ -19,8 +19,7 @@ from lightpen.model.limits import DueRule
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.quantities import number_text
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.look.theme import GRID
 from lightpen_app.print_report.control import PrintReportControl
 from lightpen_app.steps.history.archive_control import NOTICE, ArchiveControl
 from lightpen_app.steps.history.archive_panel import ArchivePanel
@@ -36,7 +35,7 @@ from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.widgets.trend_panel import TrendPanel
-from lightpen_app.work.job import Job, Report
+from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
@@ -59,6 +58,7 @@ class HistoryContent(Translated, QWidget):
         self._print_report = PrintReportControl(workbench.save_place, self)
         self._trend = Trend()
         self._followed: EntryFilter | None = None  # whose trend it is
+        self._adjusting = LatestJob(self)
 
         # Widgets: the order of making them is the order of the Tab key
         self._filter = FilterBar()
@@ -98,6 +98,7 @@ class HistoryContent(Translated, QWidget):
         self._print_report.saved.connect(self._on_report_saved)
         self._print_report.failed.connect(self._show_fault)
         self._selection.adjust_requested.connect(self._adjust_together)
+        self._selection.adjusting.cancelled.connect(self._adjusting.cancel)
         self._selection.report_requested.connect(self._report_study)
         self._due.rule_changed.connect(self._on_rule_changed)
         self._whole.checked.connect(self.checked)
@@ -220,14 +221,15 @@ class HistoryContent(Translated, QWidget):
         if prepared.pen_file is None or prepared.camera_file is None:
             self._on_not_adjusted(self.tr("Open the files of camera and LEDs first."))
             return
-        job = Job(partial(adjust_together, archive, prepared, chosen, now), self)
-        job.start(
-            self._on_adjusted, self._on_not_adjusted, progressed=self._on_adjusting
+        progress = self._selection.adjusting
+        progress.begin()
+        self._adjusting.start(
+            partial(adjust_together, archive, prepared, chosen, now),
+            self._on_adjusted,
+            self._on_not_adjusted,
+            progressed=progress.set_fraction,
+            ended=progress.end,
         )
-
-    def _on_adjusting(self, fraction: float) -> None:
-        words = self.tr("Computing: {0:.0%}").format(fraction)
-        self._selection.set_adjusted(StatusMessage(words, Sign.WAIT, Tone.QUIET))
 
     def _on_adjusted(self, new: NewLedFile) -> None:
         improved = new.improved

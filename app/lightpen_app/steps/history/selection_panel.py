@@ -26,6 +26,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.capability_row import CapabilityRow
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -58,6 +59,7 @@ class SelectionPanel(Translated, QWidget):
         self._limits = VerificationLimits()
         self._study = CapabilityRow()
         self._adjust, self._adjusted = PushButton(), SignLabel()
+        self.adjusting = JobProgress()
         self._report = PushButton()
 
         # Layout
@@ -79,6 +81,7 @@ class SelectionPanel(Translated, QWidget):
         for row, button in enumerate((self._adjust, self._report), 5):
             layout.addWidget(button, row, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self._adjusted, 5, 1, Qt.AlignmentFlag.AlignVCenter)
+        layout.addWidget(self.adjusting, 6, 1)
         layout.setRowStretch(7, 1)
 
         # Connections

@@ -77,8 +77,10 @@ class DetailTabs(QTabWidget):
 
     def pictures(self) -> "list[NamedPicture]":
         """Return all plots for saving, also of hidden tabs."""
-        for panel in self._panels:
+        for panel, tab in self._tab_of.items():
             self._show_solution(panel.content())
+            tab.resize(self.currentWidget().size())
+            tab.grab()  # lays it out as if it was looked at
         cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
         return [card.picture() for card in cards if card.is_needed]
 

@@ -2,7 +2,7 @@
 
 import os
 
-from PySide6.QtWidgets import QProgressBar, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
@@ -16,6 +16,7 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.focus import give_focus
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
@@ -24,7 +25,6 @@ from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import LatestJob, Report
 
 USUAL_TRIALS, MOST_TRIALS = 200, 10_000
-PROGRESS_STEPS = 1000
 
 
 class MonteCarloRow(Translated, QWidget):
@@ -43,8 +43,7 @@ class MonteCarloRow(Translated, QWidget):
         self._trials = NumberField("", (MIN_TRIALS, MOST_TRIALS), 0)
         self._trials.set_value(USUAL_TRIALS)
         self._label.setBuddy(self._trials)
-        self._cancel = PushButton()
-        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
+        self._progress = JobProgress()
         self._outcome = SignLabel()
         self._table = NumberTable()
 
@@ -53,7 +52,6 @@ class MonteCarloRow(Translated, QWidget):
         horizontal_layout(
             layout,
             self._start,
-            self._cancel,
             self._label,
             self._trials,
             (self._progress, 1),
@@ -63,7 +61,7 @@ class MonteCarloRow(Translated, QWidget):
 
         # Connections
         self._start.clicked.connect(self._on_start_clicked)
-        self._cancel.clicked.connect(self._on_cancel_clicked)
+        self._progress.cancelled.connect(self._on_cancel_clicked)
 
         self._retranslate()
 
@@ -89,20 +87,17 @@ class MonteCarloRow(Translated, QWidget):
             with local_workers(max(1, (os.cpu_count() or 1) - 1)) as in_workers:
                 return run_monte_carlo(calibration, n_trials, in_workers, report)
 
-        self._found, self._fault = None, ""
-        self._progress.setValue(0)
+        self._fault = ""
+        self._progress.begin()
         self._job.start(
             compute,
             self._on_found,
             self._on_failed,
-            progressed=self._on_progressed,
+            progressed=self._progress.set_fraction,
             crashed=self._on_cancel_clicked,
         )
         self._refresh()
-        self._cancel.setFocus()
-
-    def _on_progressed(self, fraction: float) -> None:
-        self._progress.setValue(round(PROGRESS_STEPS * fraction))
+        self._progress.take_focus()
 
     def _on_found(self, found: MonteCarlo) -> None:
         self._found = found
@@ -128,10 +123,8 @@ class MonteCarloRow(Translated, QWidget):
                 "for seconds to minutes."
             ),
         )
-        self._cancel.setText(self.tr("Cancel"))
         self._label.setText(self.tr("Trials"))
         self._trials.setAccessibleName(self.tr("Trials"))
-        self._progress.setAccessibleName(self.tr("Progress"))
         self._table.setAccessibleName(
             self.tr("U by Monte Carlo and by uncertainty budget")
         )
@@ -143,8 +136,8 @@ class MonteCarloRow(Translated, QWidget):
         self._start.set_why_not(self._why_not())
         for field in (self._label, self._trials):
             field.setVisible(not is_busy)
-        self._cancel.setVisible(is_busy)
-        self._progress.setVisible(is_busy)
+        if not is_busy:
+            self._progress.end()
         self._outcome.set_value(self._message())
         self._outcome.setVisible(not is_busy)
         self._table.setVisible(self._found is not None)

@@ -79,10 +79,10 @@ class ReviewPage(Page):
         # Connections
         notices = workbench.notifications
         self._run.changed.connect(self._on_run_changed)
-        self._run.progressed.connect(view.set_progress)
+        self._run.progressed.connect(view.solving.set_fraction)
         self._accepted.timeout.connect(self.changed)
         self._reading.timeout.connect(self.changed)
-        view.cancel.clicked.connect(lambda: self._ask(SwingWorkflow.cancel))
+        view.solving.cancelled.connect(lambda: self._ask(SwingWorkflow.cancel))
         view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
         view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
         view.tabs.images_made.connect(self._on_images_made)
@@ -196,7 +196,7 @@ class ReviewPage(Page):
             self._accepted.start(2 * QApplication.doubleClickInterval())
         if (now.result, now.assessment) != (before.result, before.assessment):
             self._view.end_questions()
-        self._view.set_solving(now.is_solving)
+        self._view.solving.set_running(now.is_solving)
         self._press.follow(now)
         if now.assessment is not before.assessment:
             reviewed = reviewed_result(now)

@@ -1,7 +1,7 @@
 """View of the step Review: the verdict, the result and its details."""
 
-from PySide6.QtCore import QSize, QTimer
-from PySide6.QtWidgets import QProgressBar, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import (
@@ -18,6 +18,7 @@ from lightpen_app.steps.review.next_tips import NextTipsRow
 from lightpen_app.steps.review.result_panel import ResultPanel, TipSummary
 from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.view_state import ReviewPageState
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -50,10 +51,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
         self.question, self.reason = QuestionBar(), ReasonBar()
         self.withdrawal = WithdrawalBar()
-        self._progress = QProgressBar()
-        self.cancel = PushButton()
-        self._solving = QWidget()
-        self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
+        self.solving = JobProgress(PATIENCE_MS)
         self._messages = StatusMessageList()
         self.result = ResultPanel()
         self._scroll = PageScroll()
@@ -66,8 +64,6 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
         # Layout
-        horizontal_layout(self._solving, (self._progress, 1), self.cancel)
-        self._solving.hide()
         self._scroll.setWidget(self._first)
         self._first_box = vertical_layout(self._first, (self.result, 1))
         row = horizontal_layout(self._buttons, (self.tools, 3))
@@ -76,14 +72,13 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         row.setStretchFactor(others, 2)
         fill(others, (self.accept, 1), (self.verify, 1), (self.take_back, 1))
         self._box = layout = vertical_layout(self, self._banner, self.question)
-        fill(layout, self.reason, self.withdrawal, self._solving, self._messages)
+        fill(layout, self.reason, self.withdrawal, self.solving, self._messages)
         fill(layout, (self.tabs, 1), self.next_tips)
         self.tabs.insertTab(0, self._scroll, "")
         self.tabs.setCurrentIndex(0)
         self._use_room()
 
         # Connections
-        self._patience.timeout.connect(self._solving.show)
         self.reason.declined.connect(self.tabs.setFocus)
         self.withdrawal.declined.connect(self.tabs.setFocus)
         self.question.declined.connect(self.tabs.setFocus)
@@ -114,19 +109,6 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.verify.setVisible(state.is_accepted and self._can_verify)
         self.take_back.setVisible(state.is_accepted)
 
-    def set_solving(self, is_solving: bool) -> None:
-        """Show the progress of a slow solution."""
-        self._progress.setValue(0)
-        if is_solving:
-            self._patience.start()
-        else:
-            self._patience.stop()
-            self._solving.hide()
-
-    def set_progress(self, fraction: float) -> None:
-        """Show the progress of the solution, 0 to 1."""
-        self._progress.setValue(round(100 * fraction))
-
     def end_questions(self) -> None:
         """Hide the question."""
         self.question.hide()
@@ -144,9 +126,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         )
         self._scroll.setAccessibleName(self.tr("Result"))
         self.tabs.setAccessibleName(self.tr("Details"))
-        self._progress.setAccessibleName(self.tr("Progress of the computation"))
-        self.cancel.setText(self.tr("Cancel"))
-        set_tooltip(self.cancel, self.tr("Keep last solution"))
+        self.solving.set_cancel_tooltip(self.tr("Keep last solution"))
         self.capture_more.setText(self.tr("Capture more"))
         self.repeat.setText(self.tr("Repeat swing"))
         self.accept.setText(self.tr("Accept..."))

@@ -16,6 +16,7 @@ from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound
+from lightpen_app.look.time_left import TimeLeft
 from lightpen_app.steps.swing.live_detection import LiveDetectionView
 from lightpen_app.steps.swing.remaining_images import RemainingImages
 from lightpen_app.steps.swing.view_state import SwingViewState
@@ -118,6 +119,8 @@ class SwingPresenter(QObject):
         self._progress: SwingProgress | None = None
         self.sight = LiveDetectionView(run, self)
         self.solved = 0.0  # how far the tip is computed, 0 to 1
+        self._time_left = TimeLeft()
+        self._timed: tuple[Path | None, Phase | None] = None, None
 
     def view_state(self, *, is_away: bool) -> SwingViewState | None:
         """Return the view state of the swing; None without one."""
@@ -126,7 +129,7 @@ class SwingPresenter(QObject):
         self._progress = progress = advance_progress(self._progress, status)
         if state is None or setup is None or progress is None:
             return None
-        return SwingViewState(
+        view = SwingViewState(
             setup=setup,
             state=state,
             short=progress.short,
@@ -143,6 +146,18 @@ class SwingPresenter(QObject):
             is_away=is_away,
             to_go=progress.to_go,
         )
+        return replace(view, time_left=self._job_time_left(view))
+
+    def _job_time_left(self, view: SwingViewState) -> str:
+        """Return the time left of reading recorded images, or of the computation."""
+        phase = view.state.phase
+        timed = self._run.status.record_folder, phase
+        if timed != self._timed:
+            self._timed = timed
+            self._time_left.restart()
+        is_reading = phase is Phase.CAPTURING and view.setup.is_recording
+        is_job = is_reading or view.solving is not None
+        return self._time_left.text(view.fraction or 0.0) if is_job else ""
 
     def fraction_kept(self) -> float:
         """Return the fraction of accepted images, 0 to 1."""

@@ -41,6 +41,7 @@ class SwingViewState:
     is_simulated: bool = False
     is_away: bool = False  # whether another step is shown
     to_go: RemainingImages | None = None
+    time_left: str = ""  # of reading recorded images, or of the computation
 
     @cached_property
     def dial(self) -> DialValue:

@@ -1,7 +1,7 @@
 """The step Swing in words, signs and numbers."""
 
 from dataclasses import replace
-from math import ceil, isfinite
+from math import isfinite
 
 from PySide6.QtCore import QObject
 
@@ -28,6 +28,7 @@ from lightpen_app.look.phrases import (
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
+from lightpen_app.look.time_left import time_left_text
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.swing.view_state import ENDED, SwingViewState
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -45,7 +46,6 @@ PRESSED = (  # shown where the tip is to be pressed into the cone
 )
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 PACE_S, N_PACING = 15.0, 6  # last seconds and images for the remaining time
-LONG_S = 90.0  # shown in minutes
 LEAST_JUDGED = 5  # kept images, from which on misfitting LEDs are reported
 
 _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
@@ -304,6 +304,8 @@ class SwingWords(QObject):
 
     def _time_left(self, view: SwingViewState) -> str:
         state, is_recording = view.state, view.setup.is_recording
+        if view.time_left:
+            return view.time_left
         is_on = state.phase is Phase.CAPTURING and not is_recording
         if not is_on or not isfinite(state.kept.uncertainty):
             return ""
@@ -311,10 +313,7 @@ class SwingWords(QObject):
         period = images_period(times[times > state.time - PACE_S])
         if period is None or view.lacks_images:
             return ""
-        seconds = view.n_more * period
-        if seconds > LONG_S:
-            return self.tr("about {0} min left").format(ceil(seconds / 60))
-        return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
+        return time_left_text(view.n_more * period)
 
     def _keys(self, view: SwingViewState) -> str:
         if view.is_away:

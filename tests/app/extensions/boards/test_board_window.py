@@ -24,6 +24,7 @@ from lightpen.model.camera import Camera
 from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
 from lightpen.record.folder.outcome import TrialOutcome
 from lightpen_app.look.pooling import pooled
+from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.workbench import Workbench
@@ -237,9 +238,11 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
         lambda trial: workbench.archive_writer.keep_camera_trial(trial, names)
     )
     folder = written(tmp_path, images)
+    (progress,) = window.findChildren(JobProgress)
     for _ in range(2):  # the first is not used
         window.read_folder(folder)
-        qtbot.waitUntil(lambda: views_listed(window) == 7)
+        qtbot.waitUntil(lambda: not progress.is_running)
+        assert views_listed(window) == 7
     with qtbot.waitSignal(window.saved):
         window.save(tmp_path / "camera.yaml")
     window.close()
@@ -358,6 +361,38 @@ def test_a_calibration_under_way_ends_where_other_views_are_begun(
 
     assert (remark(window), views_listed(window)) == ("", 0)
     press(window, "Stop")
+
+
+@pytest.mark.slow
+def test_a_calibration_that_is_cancelled_leaves_the_one_before(
+    window: BoardWindow,
+    images: list[Image],
+    tmp_path: Path,
+    qtbot: QtBot,
+    hold_back: "HoldBack",
+) -> None:
+    reported: list[CameraTrial] = []
+    window.concluded.connect(reported.append)
+    folder = written(tmp_path, images)
+    window.read_folder(folder)
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
+    before = remark(window)
+    may_begin = hold_back(
+        "lightpen_app_extensions.boards.board_calibration.find_images"
+    )
+    (progress,) = window.findChildren(JobProgress)
+    assert not progress.isVisible()
+
+    window.read_folder(folder)
+    assert progress.isVisible()
+    press(window, "Cancel")
+    may_begin.set()
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()
+
+    assert not progress.isVisible()
+    assert (remark(window), views_listed(window)) == (before, 7)
+    assert reported == []
 
 
 def test_a_simulated_operator_holds_the_board_while_views_are_captured(

@@ -7,11 +7,11 @@ from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 from benchmarks.small_records import record_of, small_record
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, QThreadPool
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -89,6 +89,9 @@ from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_resources import languages
+
+if TYPE_CHECKING:
+    from tests.app.conftest import HoldBack
 
 W = TypeVar("W", bound=QWidget)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
@@ -517,6 +520,13 @@ def test_several_swings_are_adjusted_together(desk: Desk, tmp_path: Path) -> Non
     desk.select(0, 1, 2)
     assert not remark.value().text
     desk.click("Adjust together")
+    desk.click("Cancel")
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()
+    assert not remark.value().text
+    assert not list(folder.rglob("led files/*"))
+
+    desk.click("Adjust together")
     desk.until(lambda: "Residuals of the swing held out" in remark.value().text)
 
     (camera,) = folder.rglob("led files/*.yaml")
@@ -651,6 +661,30 @@ def test_a_check_tells_notes_that_prove_no_change(desk: Desk) -> None:
     reported = " ".join(remark.text for remark in panel.messages())
     assert "No changes in 2 entries" in reported
     assert "library/000001.json is not entered in the archive" in reported
+
+
+def test_a_check_that_is_cancelled_leaves_the_one_before(
+    desk: Desk, hold_back: "HoldBack"
+) -> None:
+    desk.enter(2)
+    desk.open()
+    desk.show_tab(WHOLE)
+    desk.click("Check the archive")
+    panel = desk.child(ArchivePanel)
+    desk.until(lambda: panel.checked() is not None)
+    before = panel.checked()
+    desk.until(lambda: not panel.progress.is_running)
+    may_begin = hold_back("lightpen_app.steps.history.archive_control.check_archive")
+
+    desk.click("Check the archive")
+    assert panel.progress.is_running
+    desk.click("Cancel")
+    may_begin.set()
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()
+
+    assert panel.checked() is before
+    assert not panel.progress.is_running
 
 
 def test_a_repeatability_is_kept_entered_and_put_on_paper(desk: Desk) -> None:

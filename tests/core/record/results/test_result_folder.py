@@ -581,7 +581,7 @@ def test_a_write_protected_folder_is_reported_and_keeps_the_old_tip_in_force(
     archive.store(result(3.0))
     archive.folder.chmod(0o555)
 
-    assert "permission is denied" in stored_elsewhere(archive, words=obedient)
+    assert "Permission is denied" in stored_elsewhere(archive, words=obedient)
 
     archive.folder.chmod(0o755)
     assert x_in_force(archive) == 1.0

@@ -443,7 +443,7 @@ def test_a_write_that_fails_once_leaves_a_journal_to_go_on_with(
 
         with monkeypatch.context() as patch:
             patch.setattr("lightpen.record.swings.writing.os.fsync", fail)
-            with pytest.raises(FileError, match="the disk is full"):
+            with pytest.raises(FileError, match="The disk is full"):
                 writer.conclude("pass")
         assert append(writer) == 2
 
@@ -461,7 +461,7 @@ def test_what_could_not_be_written_is_not_in_the_record(
     with RecordWriter.create(tmp_path / "swing", header) as writer:
         append(writer)
         monkeypatch.setattr("lightpen.record.swings.writing.os.fsync", fail)
-        with pytest.raises(FileError, match="the disk is full"):
+        with pytest.raises(FileError, match="The disk is full"):
             writer.exclude([1], "tip slipped")
 
     assert open_record(tmp_path / "swing").excluded == {}
