@@ -59,6 +59,9 @@ SIGMA = 0.03  # px
 N_IMAGES, N_FRAMES = 60, 5
 RING = Artefact(ArtefactKind.RING, 31.751)
 LENGTH = Artefact(ArtefactKind.LENGTH, 150.0)
+SPHERE = Artefact(ArtefactKind.SPHERE, 30.0)
+PLATE = Artefact(ArtefactKind.PLATE, 0.0)
+LEAN = 0.4  # rad, of a pen that is not held upright
 ENDS = np.array([[-75.0, -20.0, 0.0], [75.0, -20.0, 0.0]])  # from the cone, mm
 TABLE = np.array([0.0, -40.0, 0.0])  # likewise
 TABLE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.9, -(0.19**0.5)]])
@@ -224,8 +227,9 @@ def ring_session(
     *,
     covered: float = 2 * np.pi,
     n_frames: int = N_FRAMES,
+    lean: float = 0.0,
 ) -> Found:
-    """Verify by a ring with the pen upright."""
+    """Verify by a ring, the pen upright or leant outwards."""
     runs = []
     for i in range(n_runs):
         closed = covered >= 2 * np.pi
@@ -234,7 +238,8 @@ def ring_session(
         places = _on_table(
             RING.certified * np.column_stack([np.cos(angles), np.sin(angles)])
         )
-        postures = held(np.zeros(n), np.zeros(n), rng)
+        ways = angles if lean else np.zeros(n)
+        postures = held(np.full(n, lean), ways, rng)
         points = station.probe(places, postures, rng, n_frames=n_frames)
         runs.append((str(i), points))
     return measure_artefacts("", n_runs * [RING], runs, Conditions(station.instrument))
@@ -248,6 +253,31 @@ def length_session(station: SimulatedStation, rng: np.random.Generator) -> Found
         points = station.probe(places, held(np.zeros(2), np.zeros(2), rng), rng)
         runs.append((str(i), points))
     return measure_artefacts("", 7 * [LENGTH], runs, Conditions(station.instrument))
+
+
+def sphere_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
+    """Verify by a sphere, probed all over its upper side with the pen upright."""
+    n = 25
+    angles, height = 2.4 * np.arange(n), np.linspace(0.3, 1.0, n)
+    across = np.sqrt(1 - height**2)
+    axes = np.vstack([TABLE_AXES, np.cross(*TABLE_AXES)])
+    local = np.column_stack([across * np.cos(angles), across * np.sin(angles), height])
+    places = PAPER_CONE + TABLE + SPHERE.certified / 2 * local @ axes
+    points = station.probe(places, held(np.zeros(n), np.zeros(n), rng), rng)
+    return measure_artefacts(
+        "", [SPHERE], [("", points)], Conditions(station.instrument)
+    )
+
+
+def plate_session(station: SimulatedStation, rng: np.random.Generator) -> Found:
+    """Verify by a plate, probed on a grid with the pen upright."""
+    grid = np.linspace(-60.0, 60.0, 4)
+    flat = np.array([(x, y) for x in grid for y in grid])
+    postures = held(np.zeros(len(flat)), np.zeros(len(flat)), rng)
+    points = station.probe(_on_table(flat), postures, rng)
+    return measure_artefacts(
+        "", [PLATE], [("", points)], Conditions(station.instrument)
+    )
 
 
 def drift_session(
@@ -272,11 +302,14 @@ def _on_table(flat: FloatArray) -> FloatArray:
 Session: TypeAlias = Callable[[SimulatedStation, np.random.Generator], Found]
 
 SESSIONS: dict[str, Session] = {
-    "fixed point": fixed_point_session,
-    "ring, upright": ring_session,
+    "tip check": fixed_point_session,
+    "ring, pen upright": ring_session,
+    "ring, pen leant": partial(ring_session, lean=LEAN),
     "ring, 280 degrees, one image a point": partial(
         ring_session, n_runs=1, n=30, covered=np.radians(280), n_frames=1
     ),
+    "sphere": sphere_session,
     "length": length_session,
+    "plane": plate_session,
     "drift": drift_session,
 }

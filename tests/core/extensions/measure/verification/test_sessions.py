@@ -1,6 +1,6 @@
 """Sessions of simulated stations: what passes, and what is found.
 
-``./run bench power`` has 45 sessions of each task, at 45 stations.
+``./run bench power`` has 300 sessions of each task.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ N_STATIONS = 9
 MIN_PASSED, MIN_FOUND = 0.95, 0.9
 WRONG = 0.02  # mm
 # Sessions at each station; the larger tasks take a fifth of a second.
-N_EACH = {"fixed point": 5, "drift": 5}
-SHOWING_TIP = ["fixed point"]
-SHOWING_NO_TIP = ["ring, upright", "length"]
+N_EACH = {"tip check": 5, "drift": 5}
+SHOWING_TIP = ["tip check"]
+SHOWING_NO_TIP = ["ring, pen upright", "sphere", "length", "plane"]
 
 Stations: TypeAlias = tuple[SimulatedStation, ...]
 
