@@ -9,6 +9,7 @@ from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen_app.look.grades import DECISION_MARKS
+from lightpen_app.look.phrases import Instruction
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -162,10 +163,11 @@ class MeasurePresenter(VerifyPresenter):
         return super()._action()
 
     @override
-    def _banner(self) -> State:
+    def _now(self) -> tuple[Instruction, State]:
+        words, shown = super()._now()
         if self.lacks_plan():
-            return State(self.tr("NO PLAN YET"), "", Sign.RING, Tone.QUIET)
-        return super()._banner()
+            shown = State(self.tr("NO PLAN YET"), "", Sign.RING, Tone.QUIET)
+        return words, shown
 
     @override
     def operator_value(self) -> OperatorValue:

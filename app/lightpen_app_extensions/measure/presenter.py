@@ -144,7 +144,7 @@ class VerifyPresenter(QObject):
 
     def operator_value(self) -> OperatorValue:
         """Return the content of page and operator view."""
-        status, instruction, banner = self._status, self._instruction(), self._banner()
+        status, (instruction, banner) = self._status, self._now()
         setup, state, task = status.setup, status.state, status.task
         if setup is None or state is None or task is None:
             return OperatorValue(instruction.short, instruction.hint, banner)
@@ -251,29 +251,49 @@ class VerifyPresenter(QObject):
 
     # What the operator has to do
 
-    def _instruction(self) -> Instruction:
+    def _now(self) -> tuple[Instruction, State]:
+        """Return the instruction and the state that go with the status."""
         status = self._status
         setup, state = status.setup, status.state
+        wait = Sign.WAIT, Tone.ACTIVE
         if status.reading is ReadingState.IMAGES:
             hint = self.tr("Measuring the points in the recorded images.")
-            return Instruction(self.tr("Reading images"), hint)
+            reading = State(self.tr("READING"), "", *wait, self._verification.progress)
+            return Instruction(self.tr("Reading images"), hint), reading
         if status.refusal is not None:
-            is_possible = status.tip is not None  # once the missing value is entered
-            short = self._missing() if is_possible else self._refused()
-            return Instruction(short, worded(status.refusal))
+            hint = worded(status.refusal)
+            if status.tip is not None:  # an input is missing
+                missing = State(self.tr("NOT READY"), "", Sign.WARNING, Tone.WARN)
+                return Instruction(self._missing(), hint), missing
+            impossible = State(self.tr("NOT POSSIBLE"), "", Sign.CROSS, Tone.BAD)
+            return Instruction(self._refused(), hint), impossible
         if setup is None or state is None:
-            return Instruction(self.tr("Wait"), self.tr("Reading the current tip."))
+            hint = self.tr("Reading the current tip.")
+            reading = State(self.tr("READING"), "", *wait)
+            return Instruction(self.tr("Wait"), hint), reading
         if status.assessment is not None and status.is_done:
-            short = self._verdict(status.assessment)
-            return Instruction(short, worded(status.assessment.next_step))
+            return self._concluded(setup, status.assessment)
         if self._live.connection is not Connection.STREAMING:
             hint = self.tr(
                 "The camera sends no images. Probing continues when they arrive."
             )
-            return Instruction(self.tr("No images"), hint)
+            lacking = State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)
+            return Instruction(self.tr("No images"), hint), lacking
         if status.is_paused:
-            return Instruction(self.tr("Paused"), self.tr("Press Space to continue."))
-        return Instruction(self._short(setup, state), worded(instruction(setup, state)))
+            hint = self.tr("Press Space to continue.")
+            paused = State(self.tr("PAUSED"), "", Sign.PAUSE, Tone.WARN)
+            return Instruction(self.tr("Paused"), hint), paused
+        short, shown = self._probing(setup, state)
+        return Instruction(short, worded(instruction(setup, state))), shown
+
+    def _concluded(
+        self, setup: SessionSetup, found: VerificationAssessment
+    ) -> tuple[Instruction, State]:
+        task, limits = setup.choices.task, setup.choices.limits
+        rule = worded(task.rule_of(setup.choices.options_of(task), limits))
+        why, mark = f"{worded(found.reason)} {rule}", GRADE_MARKS[found.grade]
+        shown = State(self._grade_text(found.grade), why, *mark)
+        return Instruction(self._verdict(found), worded(found.next_step)), shown
 
     def _missing(self) -> str:
         return self.tr("Enter the value")
@@ -292,56 +312,29 @@ class VerifyPresenter(QObject):
             return self.tr("Nothing moved")
         return self.tr("Scale and form verified")
 
-    def _short(self, setup: SessionSetup, state: SessionState) -> str:
-        task, touching = state.task(setup), state.touching
-        if is_held(state):
-            return self.tr("Hold still")
-        if is_at_rest(state):
-            return self.tr("Pick up the pen")
-        if touching.phase is ProbingPhase.KNOWN:
-            return self.tr("Probe elsewhere")
-        if state.fault is not None:
-            is_broken = state.fault.code == BROKEN_OFF.code
-            return self.tr("Not recorded") if is_broken else self.tr("Not counted")
-        if task is None:
-            return ""
-        progress = state.progress(setup, task)
-        is_next = touching.phase is ProbingPhase.RECORDED
-        return worded(task.headline(progress, is_next=is_next))
-
-    def _banner(self) -> State:
-        status = self._status
-        setup, state, task = status.setup, status.state, status.task
-        if status.reading is ReadingState.IMAGES:
-            fraction = self._verification.progress
-            return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE, fraction)
-        if status.refusal is not None and status.tip is not None:  # an input is missing
-            return State(self.tr("NOT READY"), "", Sign.WARNING, Tone.WARN)
-        if status.refusal is not None:
-            return State(self.tr("NOT POSSIBLE"), "", Sign.CROSS, Tone.BAD)
-        if setup is None or state is None:
-            return State(self.tr("READING"), "", Sign.WAIT, Tone.ACTIVE)
-        if task is None and status.assessment is not None:
-            grade = status.assessment.grade
-            leading, limits = setup.choices.task, setup.choices.limits
-            rule = worded(leading.rule_of(setup.choices.options_of(leading), limits))
-            why = f"{worded(status.assessment.reason)} {rule}"
-            return State(self._grade_text(grade), why, *GRADE_MARKS[grade])
-        if self._live.connection is not Connection.STREAMING:
-            return State(self.tr("NO IMAGES"), "", Sign.CROSS, Tone.BAD)
-        if status.is_paused:
-            return State(self.tr("PAUSED"), "", Sign.PAUSE, Tone.WARN)
-        assert task is not None
-        touching = state.touching
-        if touching.phase is ProbingPhase.RECORDED:
-            return State(self.tr("POINT RECORDED"), "", Sign.CHECK, Tone.GOOD)
-        if touching.phase is ProbingPhase.KNOWN:
-            return State(self.tr("PROBED BEFORE"), "", Sign.WARNING, Tone.WARN)
+    def _probing(self, setup: SessionSetup, state: SessionState) -> tuple[str, State]:
+        """Return a few words on what to do, and what is seen of the pen."""
+        task, touching = setup.choices.task, state.touching
+        doubt = Sign.WARNING, Tone.WARN
         if is_held(state):
             fraction = touching.progress(rules_of(setup, state, task))
-            return State(self.tr("STEADY"), "", Sign.RECORD, Tone.ACTIVE, fraction)
-        if state.fault is not None:
-            return State(self.tr("NOT RECORDED"), "", Sign.WARNING, Tone.WARN)
+            active = Sign.RECORD, Tone.ACTIVE, fraction
+            return self.tr("Hold still"), State(self.tr("STEADY"), "", *active)
+        if touching.phase is ProbingPhase.KNOWN:
+            return (
+                self.tr("Probe elsewhere"),
+                State(self.tr("PROBED BEFORE"), "", *doubt),
+            )
+        if state.fault is not None and not is_at_rest(state):
+            is_broken = state.fault.code == BROKEN_OFF.code
+            short = self.tr("Not recorded") if is_broken else self.tr("Not counted")
+            return short, State(self.tr("NOT RECORDED"), "", *doubt)
+        is_next = touching.phase is ProbingPhase.RECORDED
+        short = worded(task.headline(state.progress(setup, task), is_next=is_next))
+        if is_at_rest(state):
+            short = self.tr("Pick up the pen")
+        if is_next:
+            return short, State(self.tr("POINT RECORDED"), "", Sign.CHECK, Tone.GOOD)
         if touching.n_lost or not (touching.held or touching.path):
-            return State(self.tr("WAITING"), "", Sign.WAIT, Tone.QUIET)
-        return State(self.tr("PEN DETECTED"), "", Sign.EYE, Tone.ACTIVE)
+            return short, State(self.tr("WAITING"), "", Sign.WAIT, Tone.QUIET)
+        return short, State(self.tr("PEN DETECTED"), "", Sign.EYE, Tone.ACTIVE)
