@@ -10,7 +10,6 @@ MESSAGES = {
     "record.image-unacknowledged": "{image} is in the folder but not in the journal; its recording was not confirmed, and it is excluded.",
     "cli.part-of-record-missing": "{option} FILE is missing. It may be omitted only for the record of a swing; the record {folder} is incomplete: {missing} is missing. Restore it from a copy, or give --camera FILE and --pen FILE.",
     "cli.number-of-each-run": "{option} has {n_given} values for {n_runs} runs. Give one for all runs, or one for each run.",
-    "cli.reference-alone": "--reference is compared with a tolerance only. Add --tolerance MM.",
     "cli.runs-or-centers": "Give either RUN or --centers FILE.csv, one for each run.",
     "cli.centers-of-rig": "LED centres are of one camera. Give the intrinsics file with --camera, or the images of the rig.",
     "cli.images-or-centers": "Give either IMAGES, --centers FILE.csv or --from-record FILE.",

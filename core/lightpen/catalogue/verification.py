@@ -21,7 +21,6 @@ MESSAGES = {
     "verification.another-under-way": "Another verification is not finished. Finish it or start over, then continue the interrupted one.",
     "verification.not-ready": "A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.",
     "verification.bug": "An internal error occurred, and the verification is paused. Results so far are kept; continue, or start over.",
-    "file.fixed-point": "fixed-point verification",
     "file.length": "length verification",
     "file.drift": "camera drift measurement",
     "file.under-way": "file of an unfinished verification",

@@ -13,7 +13,6 @@ from lightpen.commands.arguments import (
     add_json,
     add_pen_options,
     add_verdict,
-    finite,
 )
 from lightpen.commands.console import (
     centers_at,
@@ -25,7 +24,6 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.entering import add_entering, keep_record, limits_in_force
 from lightpen.comparisons.pen_health import require_one_pen
-from lightpen.comparisons.recorded_tasks import read_fixed_point
 from lightpen.comparisons.records import repeatability_entries, verification_record
 from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
 from lightpen.comparisons.summaries import repeatability_text
@@ -61,27 +59,6 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
         default="joint",
         help="estimator for LED centres",
     )
-    parser.add_argument(
-        "--fixed-point",
-        type=Path,
-        metavar="FILE.json",
-        help=(
-            "fixed-point verification with this tip, to compare its standard deviation"
-        ),
-    )
-    parser.add_argument(
-        "--tolerance",
-        type=above_zero,
-        metavar="MM",
-        help="tolerance width of a coordinate, for Cg and Cgk",
-    )
-    parser.add_argument(
-        "--reference",
-        type=finite,
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="reference tip from a more accurate instrument, mm, for Cgk",
-    )
     usual = VerificationLimits().repeatability
     parser.set_defaults(limits=("repeatability",))
     parser.add_argument(
@@ -98,27 +75,15 @@ def add_repeatability(parser: argparse.ArgumentParser) -> None:
 
 @printing
 def _repeatability(options: argparse.Namespace) -> int:
-    inputs = [*options.results, options.fixed_point, options.camera, options.pen]
+    inputs = [*options.results, options.camera, options.pen]
     require_other_file(options.json, *inputs)
-    if options.reference is not None and options.tolerance is None:
-        raise UsageError("cli.reference-alone")
     tips, first = _tips(options)
     for one, other in combinations(tips, 2):
         if np.array_equal(one.tip_pen, other.tip_pen):
             raise UsageError("repeatability.twice", one=one.name, other=other.name)
     limits = limits_in_force(options, first)
     rule = rule_in_words(limits)
-    found = measure_repeatability(
-        tips,
-        limits,
-        tolerance=options.tolerance,
-        reference=None if options.reference is None else np.array(options.reference),
-        touched=(
-            None
-            if options.fixed_point is None
-            else read_fixed_point(options.fixed_point)
-        ),
-    )
+    found = measure_repeatability(tips, limits)
     print(shown(repeatability_text(found, rule)))
     files = [each for each in inputs if each is not None]
     record = verification_record(

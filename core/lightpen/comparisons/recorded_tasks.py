@@ -2,30 +2,19 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.repeatability import RepeatedPoint
 from lightpen.errors import FileError
 from lightpen.formats.files import LARGEST_RECORD, read_bytes
-from lightpen.formats.own_json import (
-    DamagedError,
-    Vector,
-    ZonedTime,
-    has_checksum,
-    parse_own_json,
-)
+from lightpen.formats.own_json import DamagedError, Vector, has_checksum, parse_own_json
 from lightpen.messages import Message, message
 
-FIXED_POINT = message("file.fixed-point")
 LENGTH = message("file.length")
 DRIFT = message("file.drift")
-
-FIXED_POINT_KIND = "fixed point"  # of the task that verifies it
-MIN_TOUCHES = 3  # of a fixed point
 
 T = TypeVar("T")
 
@@ -37,16 +26,6 @@ class Scale:
     factor: float
     uncertainty: float
     uncertainty_before: float
-
-
-class _Scatter(Struct):
-    points_cam_mm: Annotated[list[Vector], Meta(min_length=MIN_TOUCHES)]
-
-
-class _FixedPoint(Struct):
-    created: ZonedTime
-    calibrated: _Scatter
-    expected_std_mm: Vector
 
 
 class _Scale(Struct):
@@ -61,29 +40,6 @@ class _Length(Struct):
 
 class _Drift(Struct):
     standard_uncertainty_share_mm: Vector
-
-
-def read_fixed_point(path: Path) -> RepeatedPoint:
-    """Read a fixed point that was verified."""
-    return _touched(_read(path, _FixedPoint, FIXED_POINT))
-
-
-def fixed_point_in(record: str) -> RepeatedPoint | None:
-    """Return the fixed point of a checked record in JSON; None for another task."""
-    try:
-        return _touched(
-            parse_own_json(record.encode("utf-8", "surrogateescape"), _FixedPoint)
-        )
-    except DamagedError:
-        return None
-
-
-def _touched(found: _FixedPoint) -> RepeatedPoint:
-    return RepeatedPoint(
-        np.array(found.calibrated.points_cam_mm, dtype=np.float64),
-        np.array(found.expected_std_mm, dtype=np.float64),
-        found.created,
-    )
 
 
 def read_scale(path: Path) -> Scale:

@@ -49,7 +49,7 @@ def verification_record(
 
 def repeatability_entries(found: Repeatability) -> dict[str, Any]:
     """Return the entries of a repeatability study."""
-    study, control = found.capability, found.control
+    control = found.control
     return {
         "mean_mm": found.scatter.mean,
         "std_mm": found.scatter.deviation,
@@ -64,15 +64,6 @@ def repeatability_entries(found: Repeatability) -> dict[str, Any]:
                 "out_of_control": [tip.name for tip in found.out_of_control],
             }
         ),
-        "capability": (
-            None
-            if study is None
-            else {"tolerance_mm": study.tolerance, "cg": study.cg, "cgk": study.cgk}
-        ),
-        "fixed_point_std_mm": (
-            None if found.touched is None else found.touched.deviation
-        ),
-        "points_to": found.points_to,
         "tips": [
             {
                 "name": tip.name,

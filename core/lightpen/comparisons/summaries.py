@@ -4,8 +4,6 @@
 center calibration", Measurement Science Review 13 (2013) 194-199, table 1.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from lightpen.arrays import FloatArray
@@ -14,7 +12,7 @@ from lightpen.comparisons.led_file import ImprovedPen
 from lightpen.comparisons.pen_health import PenHealth
 from lightpen.comparisons.press_test import PressTest
 from lightpen.comparisons.records import BY_SIMPLE_ACCEPTANCE
-from lightpen.comparisons.repeatability import CAPABLE, STUDY, Capability, Repeatability
+from lightpen.comparisons.repeatability import Repeatability
 from lightpen.messages import Message
 
 TITLE, COLUMN = 24, 10  # characters
@@ -48,29 +46,7 @@ def repeatability_text(
     out = found.out_of_control
     if out:
         lines.append("Out of control: " + ", ".join(tip.name for tip in out))
-    if found.touched is not None:
-        lines += [
-            row("Std of a fixed point", found.touched.deviation) + "  (u v w)",
-            row("  expected", found.touched.expected_deviation),
-        ]
-    if found.capability is not None:
-        lines += _capability_lines(found.capability, len(found.tips), row)
     return "\n".join([*lines, "", *verdict_lines(found.assessment, rule)])
-
-
-def _capability_lines(
-    found: Capability, n_tips: int, row: Callable[[str, FloatArray, int], str]
-) -> list[str]:
-    lines = [
-        f"Type-1 gauge study, tolerance {found.tolerance:g} mm wide, {n_tips} repeats"
-        + (f" (a study takes {STUDY} to 50)" if n_tips < STUDY else ""),
-        row("Cg", found.cg, 2),
-    ]
-    if found.cgk is not None:
-        lines.append(row("Cgk", found.cgk, 2))
-    capable = "capable" if found.is_capable else "not capable"
-    lines.append(f"{capable.capitalize()} (all {CAPABLE} or more are asked for)")
-    return lines
 
 
 def pen_health_text(found: PenHealth) -> str:

@@ -1,22 +1,17 @@
 """Trend of a tip: its calibrations in order, with limits."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.archive.chains.chains import records_of
 from lightpen.archive.chains.entries import Kind, StoredEntry
 from lightpen.archive.history.history import TipState, lines
-from lightpen.archive.history.queries import EntryFilter, newest
+from lightpen.archive.history.queries import EntryFilter
 from lightpen.archive.store.database import Database
-from lightpen.arrays import FloatArray
-from lightpen.comparisons.recorded_tasks import FIXED_POINT_KIND, fixed_point_in
 from lightpen.comparisons.repeatability import (
     MIN_TIPS,
     ControlLimits,
     Repeatability,
-    RepeatedPoint,
     TipEstimate,
     control_limits,
     measure_repeatability,
@@ -25,7 +20,6 @@ from lightpen.estimation.reports.verdict import Change, change_since
 from lightpen.model.limits import VerificationLimits
 
 LONGEST = 1000  # calibrations, the newest
-LATEST = 100  # verifications, among which a fixed point is looked for
 VERIFIED = "verified"  # key in the settings of an entry
 LIMIT = "max_uncertainty_mm"  # the same
 
@@ -40,12 +34,6 @@ class Trend:
     tips: tuple[TipEstimate, ...] = ()
     control: ControlLimits | None = None
     max_uncertainty: float | None = None  # limit of U (k = 2) at the newest, mm
-    touched: RepeatedPoint | None = None
-
-    def touched_with(self, entries: Sequence[StoredEntry]) -> RepeatedPoint | None:
-        """Return the fixed point if it was touched with the tip of all entries."""
-        is_of_tip = {*map(_subject, entries)} == {*map(_subject, self.entries)}
-        return self.touched if is_of_tip else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,22 +65,7 @@ def trend_of(database: Database, wanted: EntryFilter) -> Trend:
         tips=tips,
         control=control_limits(np.array([tip.tip_pen for tip in tips])),
         max_uncertainty=_limit(entries[-1]) if entries else None,
-        touched=_last_touched(database, wanted),
     )
-
-
-def _last_touched(database: Database, wanted: EntryFilter) -> RepeatedPoint | None:
-    """Return the fixed point that was touched last with a tip."""
-    tasks = newest(database, replace(wanted, kinds=(Kind.VERIFICATION,)), LATEST)
-    points = (
-        each
-        for each in tasks
-        if each.entry.event.settings.get(VERIFIED) == FIXED_POINT_KIND
-    )
-    last = next(points, None)
-    if last is None:
-        return None
-    return next(map(fixed_point_in, records_of(database, [last]).values()), None)
 
 
 def has_tip(entry: StoredEntry) -> bool:
@@ -121,11 +94,7 @@ def compare(one: StoredEntry, other: StoredEntry) -> Comparison:
 
 
 def repeatability_of(
-    entries: tuple[StoredEntry, ...],
-    limits: VerificationLimits,
-    tolerance: float | None = None,
-    reference: FloatArray | None = None,
-    touched: RepeatedPoint | None = None,
+    entries: tuple[StoredEntry, ...], limits: VerificationLimits
 ) -> Repeatability | None:
     """Return the repeatability; None for fewer than two calibrations or several tips.
 
@@ -134,10 +103,7 @@ def repeatability_of(
     if len(entries) < MIN_TIPS or len({_subject(each) for each in entries}) > 1:
         return None
     in_order = sorted(entries, key=lambda each: each.entry.since)
-    tips = [tip_of(each) for each in in_order]
-    return measure_repeatability(
-        tips, limits, tolerance=tolerance, reference=reference, touched=touched
-    )
+    return measure_repeatability([tip_of(each) for each in in_order], limits)
 
 
 def _subject(entry: StoredEntry) -> tuple[str, str, bool]:

@@ -402,41 +402,6 @@
     </message>
 </context>
 <context>
-    <name>CapabilityRow</name>
-    <message>
-        <source>Capability: tolerance</source>
-        <translation>量具能力：公差</translation>
-    </message>
-    <message>
-        <source>Tolerance of a coordinate</source>
-        <translation>单个坐标的公差</translation>
-    </message>
-    <message>
-        <source>No study</source>
-        <translation>不评定</translation>
-    </message>
-    <message>
-        <source>Reference tip (from a more accurate instrument)</source>
-        <translation>参考测头（由更准确的仪器测得）</translation>
-    </message>
-    <message>
-        <source>Capable: all values are {0} or more.</source>
-        <translation>能力足够：各值均不小于 {0}。</translation>
-    </message>
-    <message>
-        <source>Not capable: {0} is required.</source>
-        <translation>能力不足：要求不小于 {0}。</translation>
-    </message>
-    <message>
-        <source>A study needs {0} to 50 repeats; {1} are available.</source>
-        <translation>评定需要 {0} 至 50 次重复，目前为 {1} 次。</translation>
-    </message>
-    <message>
-        <source>{0} of the reference</source>
-        <translation>参考值的 {0}</translation>
-    </message>
-</context>
-<context>
     <name>ChecksPresenter</name>
     <message>
         <source>Pen</source>
@@ -4168,10 +4133,6 @@ needed</source>
         <translation>趋势中全部 {0} 次标定的重复性</translation>
     </message>
     <message>
-        <source>Fixed point probed {0} times with this tip ({1}): std. deviation along u, v, w {2} mm, expected {3} mm.</source>
-        <translation>用该测头触测固定点 {0} 次（{1}）：沿 u、v、w 的标准差为 {2} mm，预期 {3} mm。</translation>
-    </message>
-    <message>
         <source>Repeatability needs two calibrations of one tip.</source>
         <translation>重复性至少需要同一测头的两次标定。</translation>
     </message>
@@ -7052,10 +7013,6 @@ needed</source>
         <translation>测头已在锥孔中。请保持压紧。</translation>
     </message>
     <message>
-        <source>The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point probed with it by only {of_point:.4f} mm. A calibration error would shift both alike, so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.</source>
-        <translation>测头在各次标定间的分散为 {of_tip:.4f} mm，而用其触测的固定点仅为 {of_point:.4f} mm。标定误差会使两者同样偏移，因此在各次标定之间光笔上有部件移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 测量是否过粗。</translation>
-    </message>
-    <message>
         <source>The probed points of {name} do not show its kind. Probe more points of it, or state its kind: {kinds}.</source>
         <translation>{name} 的测点无法确定其类型。请触测更多点，或指定类型：{kinds}。</translation>
     </message>
@@ -7564,10 +7521,6 @@ needed</source>
         <translation>{name} 已损坏（校验和错误）。请重新拍摄或复制。</translation>
     </message>
     <message>
-        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is stable: the cone or the camera moved between the points, or the tip did not rest in the cone.</source>
-        <translation>固定点的离散为 {of_point:.4f} mm，而各次标定间测头的离散仅 {of_tip:.4f} mm。测头是稳定的：测点之间锥孔或相机移动过，或测头未落稳在锥孔中。</translation>
-    </message>
-    <message>
         <source>A name, the camera images or a file is missing. Complete the earlier steps, then continue the verification.</source>
         <translation>缺少名称、相机图像或文件。请完成前面的步骤，然后继续验证。</translation>
     </message>
@@ -7912,10 +7865,6 @@ needed</source>
         <translation>图像有运动模糊。请放慢摆动。</translation>
     </message>
     <message>
-        <source>Next: average more calibrations, reduce the noise of the images, or use the tip for wider tolerances only.</source>
-        <translation>下一步：对更多次标定取平均，降低图像噪声，或仅将测头用于较宽的公差。</translation>
-    </message>
-    <message>
         <source>Next: capture more images. The images of this swing are retained.</source>
         <translation>下一步：继续采集图像。本次摆动的图像会保留。</translation>
     </message>
@@ -7976,10 +7925,6 @@ needed</source>
         <translation>下一步：以更多图像、向各方向更大倾斜，重做压力试验。</translation>
     </message>
     <message>
-        <source>Next: tighten the tip, inspect the LEDs, calibrate again, and verify the new result.</source>
-        <translation>下一步：拧紧测头，检查光笔的 LED，重新标定，并验证新的结果。</translation>
-    </message>
-    <message>
         <source>Next: use the points probed between the visits.</source>
         <translation>下一步：使用各次触测漂移参考点之间的测点。</translation>
     </message>
@@ -8034,10 +7979,6 @@ needed</source>
     <message>
         <source>None of the {n_images} images shows the board {board}. The whole board must be in the image, in focus, with a bright border; check its type and number of points.</source>
         <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
-    </message>
-    <message>
-        <source>Not capable: the least of Cg and Cgk is {least:.2f}, {needed:.2f} are needed for a tolerance of {tolerance:g} mm.</source>
-        <translation>能力不足：Cg 与 Cgk 的较小值为 {least:.2f}，对 {tolerance:g} mm 的公差需要 {needed:.2f}。</translation>
     </message>
     <message>
         <source>Not enough tilt {sides}. Tilt the pen further. Images needed: about {n_images}.</source>
@@ -9086,10 +9027,6 @@ needed</source>
     <message>
         <source>file that names the newest version</source>
         <translation>给出最新版本的文件</translation>
-    </message>
-    <message>
-        <source>fixed-point verification</source>
-        <translation>固定点验证记录</translation>
     </message>
     <message>
         <source>flatness</source>

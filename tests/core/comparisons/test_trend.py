@@ -98,28 +98,6 @@ def enter_touches(database: Database, w: float, tip: str = "T-10") -> StoredEntr
     return entry
 
 
-def test_the_fixed_point_that_was_touched_last_with_the_tip_stands_beside_its_trend(
-    database: Database,
-) -> None:
-    assert trend_of(database, WANTED).touched is None
-    entries = tuple(enter(database, x) for x in (1.0, 1.1, 1.0))
-    other = enter(database, 1.0, tip="T-11")
-    enter_touches(database, 9.0)
-    enter_touches(database, 0.002)
-    enter_touches(database, 5.0, tip="T-11")
-    trend = trend_of(database, WANTED)
-
-    assert trend.touched is not None
-    np.testing.assert_allclose(trend.touched.deviation, [0, 0, 0.002])
-    assert trend.touched_with((other, *entries)) is None
-    found = repeatability_of(
-        entries, VerificationLimits(), touched=trend.touched_with(entries)
-    )
-    assert found is not None
-    assert found.points_to is not None
-    assert found.points_to.code == "repeatability.rode-with-pen"
-
-
 def test_a_tip_that_was_taken_back_is_not_in_the_trend(database: Database) -> None:
     entry = enter(database, 1.0)
     back = Event(

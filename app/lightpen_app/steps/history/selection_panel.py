@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.chains.entries import StoredEntry
 from lightpen.comparisons.led_file import MIN_JOINT
-from lightpen.comparisons.repeatability import Repeatability, RepeatedPoint
+from lightpen.comparisons.repeatability import Repeatability
 from lightpen.comparisons.trend import (
     Comparison,
     Trend,
@@ -25,7 +25,6 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import moment_text
-from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
@@ -54,10 +53,7 @@ class SelectionPanel(Translated, QWidget):
         self._heads = tuple(text_label(TextSize.LEAD) for _ in range(2))
         self._compared, self._scattered = NumberTable(), NumberTable()
         self._change, self._verdict = SignLabel(), SignLabel()
-        self._touched = text_label(TextSize.BODY, Tone.QUIET)
-        self._touched.setWordWrap(True)
         self._limits = VerificationLimits()
-        self._study = CapabilityRow()
         self._adjust, self._adjusted = PushButton(), SignLabel()
         self.adjusting = JobProgress()
         self._report = PushButton()
@@ -76,8 +72,6 @@ class SelectionPanel(Translated, QWidget):
                 layout.addWidget(widget, row, column)
         for remark in (self._change, self._verdict):
             layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
-        layout.addWidget(self._touched, 3, 1)
-        layout.addWidget(self._study, 4, 1)
         for row, button in enumerate((self._adjust, self._report), 5):
             layout.addWidget(button, row, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addWidget(self._adjusted, 5, 1, Qt.AlignmentFlag.AlignVCenter)
@@ -85,7 +79,6 @@ class SelectionPanel(Translated, QWidget):
         layout.setRowStretch(7, 1)
 
         # Connections
-        self._study.value_changed.connect(self._retranslate)
         self._adjust.clicked.connect(self.adjust_requested)
         self._report.clicked.connect(self.report_requested)
 
@@ -121,14 +114,7 @@ class SelectionPanel(Translated, QWidget):
 
     def repeatability(self) -> Repeatability | None:
         """Return the repeatability; None for fewer than two tips."""
-        trend, study, entries = self._trend, self._study, self.studied()
-        return repeatability_of(
-            entries,
-            self._limits,
-            study.tolerance(),
-            study.reference(),
-            trend.touched_with(entries),
-        )
+        return repeatability_of(self.studied(), self._limits)
 
     def studied(self) -> tuple[StoredEntry, ...]:
         """Return the entries of the repeatability."""
@@ -185,10 +171,6 @@ class SelectionPanel(Translated, QWidget):
 
     def _show_repeatability(self, found: Repeatability | None) -> None:
         self._scattered.setVisible(found is not None)
-        self._study.setVisible(found is not None)
-        self._show_touched(None if found is None else found.touched)
-        n_repeats = 0 if found is None else len(found.tips)
-        self._study.set_value(None if found is None else found.capability, n_repeats)
         self._verdict.set_value(StatusMessage())
         if found is None:
             self._heads[1].setText(
@@ -219,27 +201,6 @@ class SelectionPanel(Translated, QWidget):
         text += " " + worded(rule_in_words(self._limits))
         mark = GRADE_MARKS[Grade(assessment.grade)]
         self._verdict.set_value(StatusMessage(text, *mark))
-
-    def _show_touched(self, touched: RepeatedPoint | None) -> None:
-        """Show the scatter of a fixed point beside the scatter of the tips."""
-        self._touched.setVisible(touched is not None)
-        if touched is None:
-            self._touched.clear()
-            return
-        words = self.tr(
-            "Fixed point probed {0} times with this tip ({1}): std. deviation along "
-            "u, v, w {2} mm, expected {3} mm."
-        )
-        self._touched.setText(
-            words.format(
-                len(touched.points),
-                moment_text(touched.when),
-                *(
-                    ", ".join(mm_text(float(x)) for x in each)
-                    for each in (touched.deviation, touched.expected_deviation)
-                ),
-            )
-        )
 
 
 def _compared_row(found: Comparison, axis: int) -> tuple[str, ...]:

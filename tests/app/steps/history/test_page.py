@@ -15,7 +15,6 @@ from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, QThreadPool
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
-    QCheckBox,
     QComboBox,
     QFileDialog,
     QLabel,
@@ -27,7 +26,6 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
-from tests.app.typed_numbers import type_number
 
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.chains.growth import append
@@ -61,7 +59,6 @@ from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.look.words import unbroken
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.steps.history.archive_panel import ArchivePanel
-from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
@@ -439,61 +436,6 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert "Repeatability of the 2 selected calibrations" in said_in(panel)
     assert "The tip changed by 2.0000 mm since" in said_in(panel)
     assert "2 calibrations do not suffice for a verdict" in said_in(panel)
-
-
-def test_it_is_reported_what_scatter_of_tip_and_fixed_point_points_to(
-    desk: Desk,
-) -> None:
-    desk.enter(5)  # at x of 0, 1, 2, 3 and 4 mm
-    steady = {
-        "program": {"name": "lightpen", "version": "1"},
-        "created": NOON.isoformat(),
-        "verification": "fixed point",
-        "pen": "LP-04",
-        "tip": "T-10",
-        "calibrated": {
-            "points_cam_mm": [[0, 0, 999.99], [0, 0, 1000], [0, 0, 1000.01]]
-        },
-        "expected_std_mm": [0.002, 0.002, 0.008],
-    }
-    keep_verification(desk.workbench.folder, steady, is_simulated=False)
-    desk.workbench.run.logbook.enter_owed()
-    desk.open()
-    desk.show_tab(SELECTION)
-    panel = desk.child(SelectionPanel)
-    desk.until(lambda: panel.repeatability())
-
-    words = said_in(panel)
-    assert "The tip scatters by 1.5811 mm over the calibrations" in words
-    assert "something moved with the pen between the calibrations" in words
-    assert "Next: seat the tip firmly" in words
-    assert "Fixed point probed 3 times with this tip (2026-01-02" in words
-    assert "0.0000, 0.0000, 0.0100 mm" in words
-    desk.enter(2, tip="T-11", first=5)
-    desk.page.entered()
-    desk.until(lambda: len(desk.column(TIP)) == 8)
-    desk.select(0, 1)
-    desk.until(lambda: "Repeatability of the 2 selected" in said_in(panel))
-    assert "Fixed point probed " not in said_in(panel)
-
-
-def test_the_capability_is_studied_with_a_tolerance_and_a_reference(desk: Desk) -> None:
-    desk.enter(3)  # at x of 0, 1 and 2 mm
-    desk.open()
-    desk.show_tab(SELECTION)
-    panel, row = desk.child(SelectionPanel), desk.child(CapabilityRow)
-    desk.until(lambda: panel.repeatability())
-    (message,) = row.findChildren(SignLabel)
-    assert message.value().text == ""
-    tolerance, x, *_ = row.findChildren(NumberField)
-    type_number(tolerance, 9.0)
-    row.findChildren(QCheckBox)[0].click()
-    type_number(x, 1.0)
-
-    assert "Cg: x 0.30" in message.value().text  # 0.2 * 9 / (6 * 1)
-    assert "Cgk: x 0.30" in message.value().text
-    assert "Not capable: 1.33 is required." in message.value().text
-    assert "A study needs 30 to 50 repeats; 3 are available." in message.value().text
 
 
 @pytest.mark.slow

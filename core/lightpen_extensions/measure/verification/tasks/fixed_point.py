@@ -22,7 +22,6 @@ from lightpen.comparisons.assessment import (
     check,
     refused,
 )
-from lightpen.comparisons.recorded_tasks import FIXED_POINT_KIND, MIN_TOUCHES
 from lightpen.comparisons.repeatability import Scatter
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import in_deviations
@@ -64,7 +63,7 @@ from lightpen_extensions.measure.verification.tasks.tip_evidence import (
 )
 
 USUAL_TOUCHES, USUAL_FRAMES = 6, 15  # find a tip that is wrong by 0.02 mm
-MAX_TOUCHES = 50
+MIN_TOUCHES, MAX_TOUCHES = 3, 50
 NEW_POSTURE = float(np.radians(8.0))
 ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
 TILT = 0.6  # rad, to lean the pen by, once round the cone
@@ -375,7 +374,7 @@ def _spread(name: Message, scatter: Scatter) -> list[ResultRow]:
 
 
 FIXED_POINT = VerificationTask(
-    kind=FIXED_POINT_KIND,
+    kind="fixed point",
     summary="the cone, probed in new postures",
     run_help="points in the cone, each in another posture",
     title=message("fixed-point.title"),

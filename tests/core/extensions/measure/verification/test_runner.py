@@ -24,7 +24,7 @@ from lightpen.archive.checks.check import check_archive
 from lightpen.archive.logbook.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.comparisons.recorded_tasks import read_fixed_point, read_scale
+from lightpen.comparisons.recorded_tasks import read_scale
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.estimation.reports.verdict import Grade
@@ -123,13 +123,10 @@ def test_two_cameras_verify_a_tip_together(
 
 @pytest.mark.slow
 def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
-    at_it.touch(*leant(4))
-    point, _ = at_it.status.files
     at_it.come(PART_CHOICES)
     at_it.touch(*round_a_ring(11, 31.751)[:10], *BAR)
     part, _ = at_it.status.files
 
-    assert read_fixed_point(point).points.shape == (4, 3)
     assert read_scale(part).factor == pytest.approx(1.0, abs=1e-3)
 
 
