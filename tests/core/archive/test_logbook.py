@@ -1,5 +1,6 @@
 """Whatever becomes of a swing is entered once, also what a crash left out."""
 
+import errno
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -334,3 +335,19 @@ def test_a_data_folder_that_was_moved_is_whole(data: Path, tmp_path: Path) -> No
 
     assert checked(moved).findings == ()
     assert checked(moved).n_entries == 1
+
+
+def test_a_note_that_cannot_be_removed_is_removed_at_the_next_start(
+    data: Path, logbook: Logbook, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, missing_ok: bool = False) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    FolderArchive(data).store(result(data))
+    with monkeypatch.context() as disk:
+        disk.setattr(Path, "unlink", fail)
+        assert logbook.enter_owed() == ()
+    assert len(owed_files(logbook.chain)) == 1
+    assert logbook.enter_owed() == ()
+    assert owed_files(logbook.chain) == ()
+    assert len(entered(logbook)) == 1

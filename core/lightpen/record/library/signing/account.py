@@ -128,8 +128,9 @@ def owed_files(chain: str) -> tuple[OwedFile, ...]:
 
 
 def forget_owed(chain: str, file: OwedFile) -> None:
-    """Forget a file that was entered, or not written."""
-    (_owed(chain) / f"{file.name}.json").unlink(missing_ok=True)
+    """Forget a file that was entered, or not written; else the next start does."""
+    with suppress(OSError):
+        (_owed(chain) / f"{file.name}.json").unlink()
 
 
 def _folder_files(data: Path) -> list[Path]:
