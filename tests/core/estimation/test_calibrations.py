@@ -28,7 +28,10 @@ LIMITS = SwingLimits(max_uncertainty=0.05, min_images=12)
 AS_STATED = (
     *("usual", "restless", "followed", "loose", "oval_seat"),
     *("by_two_cones", "by_two_cameras"),
-    pytest.param("larger_discs", marks=pytest.mark.slow),
+    *(
+        pytest.param(name, marks=pytest.mark.slow)
+        for name in ("larger_discs", "by_a_late_camera")
+    ),
 )
 
 Calibrated = Callable[[str], Calibration]
@@ -56,16 +59,10 @@ def test_u_covers_the_error_of_the_tip(name: str, calibrated: Calibrated) -> Non
 
 
 @pytest.mark.slow
-def test_a_late_camera_is_named_and_within_u_but_not_accepted(
-    calibrated: Calibrated,
-) -> None:
-    found = calibrated("by_a_late_camera")
-    error = np.abs(found.joint.tip_pen - true_tip("by_a_late_camera"))
-    verdict = judge(found, LIMITS)
+def test_a_late_camera_is_named(calibrated: Calibrated) -> None:
+    verdict = judge(calibrated("by_a_late_camera"), LIMITS)
 
-    # Its lag is no unknown of the fit, so U is large.
-    assert (error < found.budget.expanded_uncertainty[:3]).all()
-    assert (verdict.grade, verdict.reason.code) == (Grade.REPEAT, Code.NOT_SIMULTANEOUS)
+    assert (verdict.grade, verdict.reason.code) == (Grade.CHECK, Code.NOT_SIMULTANEOUS)
     assert verdict.reason.values["camera"] == "right"
 
 

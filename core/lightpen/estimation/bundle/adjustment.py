@@ -23,6 +23,7 @@ from lightpen.estimation.bundle.consistency_findings import (
     find_pen_contradictions,
 )
 from lightpen.estimation.bundle.field_search import SearchedField, search_fields
+from lightpen.estimation.bundle.image_fields import image_fields
 from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.noise_correlation import (
@@ -136,11 +137,14 @@ def _fit_consistent(
     if of_centers is not None:
         fit = partial(fit, noise=of_centers)
         bundle = fit(priors, begin=bundle)
-    found = search_fields(bundle, pixels)
-    fields = tuple(each.field for each in found if each.component.sigma > 0)
+    # With all fields at once: what seat and drift would absorb of one is its own.
+    every = image_fields(pixels, bundle.used, rig.cameras, state.rotations)
+    among = fit(priors, fields=every, begin=bundle)
+    both = zip(every, among.components.fields, strict=True)
+    fields = tuple(each for each, found in both if found.is_supported)
     if fields:
         fit = partial(fit, fields=fields)
-        bundle = fit(priors, begin=bundle)
+        bundle = fit(priors, begin=among)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
     of_pen: tuple[Contradiction, ...] = ()

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.components import NO_COMPONENTS, NONE, Components
-from lightpen.estimation.bundle.image_fields import FieldComponent, size_of
+from lightpen.estimation.bundle.image_fields import size_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.estimation.statistics.variance_components import (
     FITTED,
@@ -57,17 +57,10 @@ def _found_once(
         oval=oval,
         drift=_likely(find(at.drift)),
         fields=tuple(
-            _likely_field(size_of(field, *own(place)))
+            size_of(field, *own(place))
             for field, place in zip(unknowns.fields, at.fields, strict=True)
         ),
     )
-
-
-def _likely_field(found: FieldComponent) -> FieldComponent:
-    """Return the component of a field, held at 0 unless the images support it."""
-    if found.is_supported:
-        return found
-    return found._replace(sigma=0.0, covariance=0.0 * found.covariance)
 
 
 def _found_seat(

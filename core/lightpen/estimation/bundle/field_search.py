@@ -33,7 +33,7 @@ class SearchedField:
     def covariance(self) -> FloatArray:
         """Covariance of (tip, cone) by the possible size of the field, (6, 6)."""
         G = self.by_unknowns
-        return np.asarray(G @ self.component.expected @ G.T)
+        return np.asarray(G @ self.component.covariance @ G.T)
 
 
 def search_fields(bundle: Bundle, pixels: FloatArray) -> tuple[SearchedField, ...]:

@@ -75,8 +75,7 @@ class FieldComponent(NamedTuple):
 
     sigma: float  # standard deviation of maximum likelihood, px
     gain: float  # twice the log likelihood ratio to no field
-    covariance: FloatArray  # (k, k), of the unknowns by ``sigma``
-    expected: FloatArray  # (k, k), the same averaged over the likelihood of sigma
+    covariance: FloatArray  # (k, k), of the unknowns, averaged over the likelihood
 
     @property
     def is_supported(self) -> bool:
@@ -87,9 +86,8 @@ class FieldComponent(NamedTuple):
 def held(field: ImageField) -> FieldComponent:
     """Return the component of a field held at 0, or as its file states it."""
     if field.is_exact:
-        return FieldComponent(1.0, np.inf, field.shapes[0], field.shapes[0])
-    nothing = np.zeros_like(field.shapes[0])
-    return FieldComponent(0.0, 0.0, nothing, nothing)
+        return FieldComponent(1.0, np.inf, field.shapes[0])
+    return FieldComponent(0.0, 0.0, np.zeros_like(field.shapes[0]))
 
 
 def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldComponent:
@@ -102,12 +100,12 @@ def size_of(field: ImageField, S: FloatArray, right: FloatArray) -> FieldCompone
         return held(field)
     sigmas = LARGEST[field.name] * np.geomspace(SMALLEST, 1.0, N_SCALES)
     costs = np.array([_costs(S, right, root, sigmas) for root in field.roots])
-    s, i = np.unravel_index(int(np.argmin(costs)), costs.shape)
-    gain, sigma = -float(costs[s, i]), float(sigmas[i])
+    gain = -float(costs.min())
+    sigma = float(sigmas[int(np.argmin(costs.min(axis=0)))])
     weights = np.exp(-0.5 * (costs + gain)) * (1 - NONE) / costs.size
     weights /= weights.sum() + NONE * np.exp(-0.5 * gain)
-    expected = np.einsum("s,sij->ij", weights @ sigmas**2, np.array(field.shapes))
-    return FieldComponent(sigma, gain, sigma**2 * field.shapes[s], expected)
+    covariance = np.einsum("s,sij->ij", weights @ sigmas**2, np.array(field.shapes))
+    return FieldComponent(sigma, gain, covariance)
 
 
 def _costs(

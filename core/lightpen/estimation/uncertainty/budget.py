@@ -279,9 +279,8 @@ def _of_fields(
         strict=True,
     ):
         if field.name is name:
-            budgeted = found.covariance if found.sigma > 0 else found.expected
             gain = bundle.gain[:, place] @ bundle.prior_information[place, place]
-            covariance = covariance + gain @ budgeted @ gain.T
+            covariance = covariance + gain @ found.covariance @ gain.T
     return covariance
 
 

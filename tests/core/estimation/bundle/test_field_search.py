@@ -70,7 +70,7 @@ def test_a_field_that_is_left_out_moves_the_tip_as_the_search_says(
     atol = 0.1 * np.abs(expected).max()
     np.testing.assert_allclose(change, expected, atol=atol)
     G = found.by_unknowns
-    np.testing.assert_allclose(found.covariance, G @ found.component.expected @ G.T)
+    np.testing.assert_allclose(found.covariance, G @ found.component.covariance @ G.T)
 
 
 @pytest.mark.parametrize("name", FieldName)

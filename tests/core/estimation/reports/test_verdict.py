@@ -314,11 +314,12 @@ def test_a_tip_by_assumptions_alone_passes_only_within_the_limit_with_them() -> 
     swing = swing_poses(150, np.random.default_rng(0))
     result = calibrated(swing, camera=unknown, pen=bare)
     uncertainty = result.budget.weakest_uncertainty
-    stated = calibrated(swing).budget.weakest_uncertainty
+    (discs,) = [each for each in result.budget.shares if each.name == "disc diameter"]
 
-    assert uncertainty > stated
-    between = SwingLimits(max_uncertainty=(stated + uncertainty) / 2)
-    assert judge(result, between).grade is not Grade.PASS
+    assert discs.assumed
+    assert discs.standard_uncertainty[2] > 0.001
+    below = SwingLimits(max_uncertainty=0.99 * uncertainty)
+    assert judge(result, below).grade is not Grade.PASS
     within = SwingLimits(max_uncertainty=1.01 * uncertainty)
     assert judge(result, within).grade is Grade.PASS
 
