@@ -30,7 +30,9 @@ def printed_numbers(code: str, folder: Path) -> list[float]:
     return [float(number) for number in re.findall(NUMBER, done.stdout)]
 
 
-def test_images_in_give_the_tip_within_three_standard_uncertainties(tmp_path: Path) -> None:
+def test_images_in_give_the_tip_within_three_standard_uncertainties(
+    tmp_path: Path,
+) -> None:
     true_tip = write_scene(Scene(n_images=20), tmp_path / "swing")
 
     numbers = printed_numbers(BY_IMAGES, tmp_path)

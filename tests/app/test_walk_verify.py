@@ -101,6 +101,29 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
 
 
 @pytest.mark.slow
+def test_another_check_is_done_on_request_and_the_first_stays_ticked(
+    known: "Walker",
+) -> None:
+    walker = known
+    walker.click_step("Verify")
+    walker.until_says("Probe the cone")
+    walker.click("Let the simulated operator probe")
+    walker.until_says("Tip verified")
+    walker.click("Let the simulated operator probe")  # it puts the pen down
+    checks = walker.window.page().findChild(QListWidget, "task_list")
+    assert isinstance(checks, QListWidget)
+    verified = checks.item(0).text()
+
+    checks.setCurrentRow(1)
+    walker.click("Do now")
+    walker.until(lambda: checks.item(1).text() == "Drift: now")
+
+    assert checks.currentRow() == 1
+    assert checks.item(0).text() == verified
+    assert verified.startswith("Tip check: PASS")
+
+
+@pytest.mark.slow
 def test_a_tip_that_was_accepted_with_doubts_is_verified_under_that_word(
     known: "Walker",
 ) -> None:
