@@ -190,7 +190,7 @@ def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
     shutil.copytree(copy, kept)
     known.click_step("Camera")
     known.click_step("Start")
-    known.until_says("Interrupted verification")
+    known.until_says("Interrupted: 1")
     return known
 
 
@@ -208,7 +208,7 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     kinds = [each["verification"] for each in records(walker)]
     assert kinds == [FIXED_POINT.kind, CONCLUSION]
     walker.click_step("Start")
-    walker.until(lambda: not walker.says("Interrupted verification"))
+    walker.until(lambda: not walker.says("Interrupted: 1"))
 
 
 @pytest.mark.slow
@@ -221,7 +221,7 @@ def test_a_verification_that_was_interrupted_is_closed_after_a_question(
         "Close this verification as abandoned? Its recorded data remains."
     )
     walker.click("Close verification")
-    walker.until(lambda: not walker.says("Interrupted verification"))
+    walker.until(lambda: not walker.says("Interrupted: 1"))
 
     (conclusion,) = records(walker)
     assert conclusion["outcome"] == "abandoned"
