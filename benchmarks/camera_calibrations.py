@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 import cv2
 import numpy as np
 from benchmarks.board_trials import Trial, run_trial
+from benchmarks.held_out_views import held_out_rows
 from benchmarks.rows import Row, numbers, without_data
 from benchmarks.workers import Workers
 
@@ -74,6 +75,7 @@ def camera_calibration_rows(workers: Workers, data: Path | None) -> list[Row]:
             "estimate and the camera, the only errors drawn here",
             tips,
         ),
+        *workers.call(partial(held_out_rows, data)),
         *([] if data is None else workers.call(partial(_time_rows, data))),
     ]
 
