@@ -7,7 +7,6 @@ from typing_extensions import override
 
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen_app.look.grades import DECISION_MARKS
 from lightpen_app.look.phrases import Instruction
 from lightpen_app.look.quantities import number_text
@@ -42,10 +41,6 @@ from lightpen_extensions.measure.verification.tasks.part_course import (
     course,
     feature_so_far,
     planned_at,
-)
-from lightpen_extensions.measure.verification.tasks.probed_point import (
-    StillFrames,
-    measure_touches,
 )
 from lightpen_extensions.measure.verification.tasks.task import Band
 
@@ -174,38 +169,27 @@ class MeasurePresenter(VerifyPresenter):
         value, status = super().operator_value(), self._status
         if status.setup is None or status.state is None or value.fraction is None:
             return value
-        place = self._live_tip(status.setup, status.state)
-        banner = replace(value.state, detail=place or value.state.detail)
         if status.task is PART:  # the hint counts the points
             progress = status.state.progress(status.setup, PART)
+            options = status.setup.choices.options_of(PART)
+            now = feature_so_far(options, progress, status.setup.conditions)
+            live = "" if now is None else self._live_deviation(now, status.state)
+            banner = replace(value.state, detail=live or value.state.detail)
+            value = replace(value, state=banner)
             count = self.tr("Feature {0} of {1}").format(progress.run, progress.n_runs)
             value = replace(value, count=count)
-            if status.setup.choices.options_of(PART).plan is None:
+            if options.plan is None:
                 value = replace(value, count="", fraction=None)
             ended = bands_so_far(status.setup, status.state)[-1:]
             words = (f"{band_name(e)}  {value_text(e)}" for e in ended)
             value = replace(value, time_left="".join(words))
-        return replace(value, state=banner)
+        return value
 
     @override
     def _lead(self) -> str:
         plan = self._service.choices.options_of(PART).plan
         lead = super()._lead()
         return lead if plan is None else PARTED.join((lead, worded(plan.words)))
-
-    def _live_tip(self, setup: SessionSetup, state: SessionState) -> str:
-        """Return the tip with its U at the present pose; empty if it is not seen."""
-        touching = state.touching
-        if not touching.held or touching.n_lost:
-            return ""
-        still = StillFrames((touching.held[-1].frame,))
-        (point,) = measure_touches(setup.instrument, (still,))
-        spread = COVERAGE_FACTOR * point.covariance(setup.instrument).diagonal() ** 0.5
-        numbers = (number_text(x, 2) for x in point.point_cam.tolist())
-        u = number_text(float(spread.max()), 3)
-        place = self.tr("{0}  {1}  {2}  \u00b1 {3} mm (k = 2)").format(*numbers, u)
-        tail = place.rindex("\u00b1")  # from which number and unit stay together
-        return place[:tail] + place[tail:].replace(" ", "\u00a0", 2)
 
     @override
     def _purpose(self) -> str:

@@ -2808,10 +2808,6 @@
         <translation>要素 {0} / {1}</translation>
     </message>
     <message>
-        <source>{0}  {1}  {2}  ± {3} mm (k = 2)</source>
-        <translation>{0}  {1}  {2}  ± {3} mm (k = 2)</translation>
-    </message>
-    <message>
         <source>Measure features of a part with the current tip.</source>
         <translation>用当前测头测量工件的要素。</translation>
     </message>
@@ -6061,14 +6057,6 @@ needed</source>
         <translation>触测要素</translation>
     </message>
     <message>
-        <source>Probe the {kind} {name}: {n_points} of {needed} points.</source>
-        <translation>触测{kind} {name}：{n_points} / {needed} 个点。</translation>
-    </message>
-    <message>
-        <source>Probe {name}: {n_points} of {needed} points.</source>
-        <translation>触测 {name}：{n_points} / {needed} 个点。</translation>
-    </message>
-    <message>
         <source>Probed points in the camera frame / mm</source>
         <translation>相机坐标系中的测点 / mm</translation>
     </message>
@@ -6143,10 +6131,6 @@ needed</source>
     <message>
         <source>Size</source>
         <translation>尺寸</translation>
-    </message>
-    <message>
-        <source>Slide along {name}: {n_points} of {needed} points.</source>
-        <translation>沿 {name} 滑动：{n_points} / {needed} 点。</translation>
     </message>
     <message>
         <source>Standard uncertainty of points in between along u, v, w: {u:.4f}, {v:.4f}, {w:.4f} mm.</source>
@@ -6675,6 +6659,10 @@ needed</source>
     <message>
         <source>the unit of the LED file (its coordinates times {factor:g} are mm)</source>
         <translation>LED 文件的单位（坐标乘以 {factor:g} 为 mm）</translation>
+    </message>
+    <message>
+        <source>the {kind} {name}</source>
+        <translation>{kind} {name}</translation>
     </message>
     <message>
         <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the LED file is of this pen, and that LEDs are numbered from 1.</source>
@@ -8049,10 +8037,6 @@ needed</source>
         <translation>模拟平板</translation>
     </message>
     <message>
-        <source>Slide along the {kind} {name}: {n_points} of {needed} points.</source>
-        <translation>沿{kind} {name} 滑动：{n_points} / {needed} 点。</translation>
-    </message>
-    <message>
         <source>Swing {number} does not show the LEDs of the first. Give swings of one pen with all its LEDs in view.</source>
         <translation>摆动 {number} 中看到的不是第一次摆动的 LED。请提供同一光笔且所有 LED 均可见的摆动。</translation>
     </message>
@@ -8231,6 +8215,14 @@ needed</source>
     <message>
         <source>Press test: bending {bending:.3f} ± {uncertainty:.3f} mm: the stylus, its thread or the seat gives way. U of what the tip measures includes this.</source>
         <translation>压力试验：弯曲 {bending:.3f} ± {uncertainty:.3f} mm：测杆、其螺纹或锥座发生变形。用该测头测量的 U 已包含此项。</translation>
+    </message>
+    <message>
+        <source>Probe {what}: {n_points} of {needed} points.</source>
+        <translation>触测{what}：{n_points} / {needed} 个点。</translation>
+    </message>
+    <message>
+        <source>Slide along {what}: {n_points} of {needed} points.</source>
+        <translation>沿{what}滑动：{n_points} / {needed} 点。</translation>
     </message>
     <message>
         <source>Standard deviation {axis}</source>

@@ -9,7 +9,7 @@ a touch the pen must move on before the next one begins. Live, a pen that rests
 somewhere when probing begins must leave that place before its first touch.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -179,16 +179,15 @@ def take_all(
     return state
 
 
-def taken_again(
-    instrument: Instrument, rules: ProbingRules, state: ProbingState, still: StillFrames
+def with_taken(
+    instrument: Instrument, state: ProbingState, held: Sequence[StillFrames]
 ) -> ProbingState:
-    """Return the touches with an earlier one added again, if it counts as new."""
-    frame = still.frames[0]
-    tip_cam = frame.rotation @ instrument.tip_pen + frame.translation
-    place = TipObservation(frame, tip_cam, np.zeros((3, 3)))
-    if not _is_new(rules, state, place):
-        return state
-    return replace(state, taken=(*state.taken, still), places=(*state.places, place))
+    """Return the state with the touches of an earlier run."""
+    places = []
+    for frame in (still.frames[0] for still in held):
+        tip_cam = frame.rotation @ instrument.tip_pen + frame.translation
+        places.append(TipObservation(frame, tip_cam, np.zeros((3, 3))))
+    return replace(state, taken=tuple(held), places=tuple(places))
 
 
 def touch_frame(name: str, detection: PenDetection) -> ProbingFrame:

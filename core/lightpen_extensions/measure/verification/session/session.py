@@ -17,7 +17,7 @@ from lightpen_extensions.measure.verification.probing.probing import (
     ProbingEventKind,
     ProbingRules,
     advance_touch,
-    taken_again,
+    with_taken,
 )
 from lightpen_extensions.measure.verification.probing.sources import require_leds_fit
 from lightpen_extensions.measure.verification.session.choices import VerificationChoices
@@ -120,21 +120,16 @@ def run_again(
 def touch_again(
     setup: SessionSetup, state: SessionState, held: Sequence[StillFrames]
 ) -> SessionState:
-    """Return the session with earlier touches of the current run.
+    """Return the session with the touches of its current run.
 
     A touch that would end the run is omitted, as the run was not ended.
     """
-    task = state.task(setup)
-    if task is None:
-        return state
-    for still in held:
-        rules = rules_of(setup, state, task)
-        touching = taken_again(setup.instrument, rules, state.touching, still)
-        if touching is state.touching:
-            continue
-        touched = with_touch(setup, replace(state, touching=touching), task)
-        if not _suffices(setup, touched, task):
-            state = touched
+    instrument, task = setup.instrument, state.task(setup)
+    touching = with_taken(instrument, state.touching, held)
+    touches = measure_touches(instrument, held)
+    state = replace(state, touching=touching, touches=touches)
+    while task is not None and state.touches and _suffices(setup, state, task):
+        state = without_last_touch(state)
     return state
 
 

@@ -382,24 +382,13 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     planned = planned_at(options, len(progress.runs))
     if planned is None:
         return message("part.no-plan")
-    name, n_points, needed = planned.name, len(progress.points), planned.n_touches
-    is_scan = bool(planned.scan and n_points)
-    if planned.kind is None or planned.kind.value in name.casefold():
-        if is_scan:
-            return message(
-                "part.slide-named", name=name, n_points=n_points, needed=needed
-            )
-        return message(
-            "part.instruction-named", name=name, n_points=n_points, needed=needed
-        )
-    kind = NAMES[planned.kind]
-    if is_scan:
-        return message(
-            "part.slide", kind=kind, name=name, n_points=n_points, needed=needed
-        )
-    return message(
-        "part.instruction", kind=kind, name=name, n_points=n_points, needed=needed
-    )
+    what: Message = message("measuring.named", name=planned.name)
+    if planned.kind is not None and planned.kind.value not in planned.name.casefold():
+        what = message("part.of-kind", kind=NAMES[planned.kind], name=planned.name)
+    n_points, needed = len(progress.points), planned.n_touches
+    if planned.scan and n_points:
+        return message("part.slide", what=what, n_points=n_points, needed=needed)
+    return message("part.instruction", what=what, n_points=n_points, needed=needed)
 
 
 def _scans(options: PartOptions, run: int) -> bool:

@@ -28,7 +28,7 @@ from lightpen_extensions.measure.verification.probing.probing import (
     advance_touch,
     approach_of,
     at_rest,
-    taken_again,
+    with_taken,
 )
 from lightpen_extensions.measure.verification.tasks.probed_point import (
     ProbingFrame,
@@ -342,24 +342,13 @@ def test_only_the_newest_places_of_the_tip_are_kept(instrument: Instrument) -> N
     assert len(left.path) == 1  # the last place of what was held
 
 
-@pytest.mark.parametrize(
-    ("off", "degrees", "counts"),
-    [(2.9, 5.9, False), (3.1, 0.0, True), (0.0, 6.1, True)],
-)
-def test_an_earlier_touch_counts_again_unless_its_place_is_known(
-    instrument: Instrument, off: float, degrees: float, counts: bool
-) -> None:
-    rules = ProbingRules(min_turn=np.radians(6.0), min_distance=3.0)
-    known = observation(instrument)
-    before = ProbingState(places=(known,))
-    again = observation(instrument, off, degrees)
-    after = taken_again(instrument, rules, before, StillFrames((again.frame,)))
+def test_touches_of_an_earlier_run_have_their_places(instrument: Instrument) -> None:
+    again = observation(instrument, 3.1, 0.0)
+    after = with_taken(instrument, ProbingState(), [StillFrames((again.frame,))])
 
-    assert (after is not before) == counts
-    assert len(after.taken) == counts
-    if counts:
-        np.testing.assert_allclose(after.places[-1].tip_cam, again.tip_cam)
-        np.testing.assert_array_equal(after.places[-1].noise, np.zeros((3, 3)))
+    assert len(after.taken) == 1
+    np.testing.assert_allclose(after.places[-1].tip_cam, again.tip_cam)
+    np.testing.assert_array_equal(after.places[-1].noise, np.zeros((3, 3)))
 
 
 def test_at_rest_nothing_is_held_and_the_way_there_is_forgotten(
