@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QSize
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 from tests.app.room import clipped_words, scrolled_sideways
 
@@ -19,6 +19,7 @@ from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.fitted_window import FRAME, fitted_place
+from lightpen_app.widgets.page_scroll import DialogScroll
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.boards.board_window import BoardWindow
 from lightpen_app_extensions.stream.stream_dialog import StreamDialog
@@ -71,6 +72,23 @@ def test_a_dialog_fits_a_small_screen_and_clips_no_words(
     assert clipped_words(dialog) == ()
     assert scrolled_sideways(dialog) == ()
     dialog.close()
+
+
+def test_all_limits_are_seen_without_scrolling_where_the_screen_has_room(
+    qtbot: QtBot,
+) -> None:
+    dialog = LimitsDialog()
+    qtbot.addWidget(dialog)
+    dialog.show()
+
+    scroll = dialog.findChild(DialogScroll)
+    assert isinstance(scroll, DialogScroll)
+    room = dialog.screen().availableGeometry().size()
+    assert room.height() <= 800
+    qtbot.waitUntil(lambda: scroll.verticalScrollBar().maximum() == 0)
+    assert dialog.size().boundedTo(room - FRAME) == dialog.size()
+    buttons = dialog.findChildren(QPushButton)
+    assert all(button.icon().isNull() for button in buttons)
 
 
 def test_the_picture_of_a_tip_is_seen_whole_in_a_small_dialog(

@@ -49,6 +49,8 @@ def find_and_accept(walker: "Walker", step: str) -> None:
     # The swing is as the clock has it: without files U is near the usual limit.
     walker.enter("Max. expanded uncertainty U (k = 2)", "0.03")
     walker.click("Continue to the camera")
+    walker.tab_to("Image source")
+    walker.press(Qt.Key.Key_Down)
     walker.until_says("Live")
     if step == "LEDs":  # the camera is known
         walker.click("Use its files")

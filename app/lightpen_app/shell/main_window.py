@@ -48,7 +48,7 @@ from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
 from lightpen_resources import RESOURCES
 
-LEAST_SIZE = QSize(104 * GRID, 60 * GRID)  # for the wizard; fits 1280 x 800 at 150 %
+LEAST_SIZE = QSize(98 * GRID, 60 * GRID)  # fits 800 x 600, and 1280 x 800 at 150 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
 PAINTED_MS = 50  # after the first paint, before slow work starts
 OPTIONS = "options"  # cause of a notification

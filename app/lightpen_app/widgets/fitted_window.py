@@ -8,15 +8,18 @@ from typing_extensions import override
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.translated import WidgetMixin
 
-FRAME = QSize(GRID, 5 * GRID)  # of a window, at most; not known before it is shown
+# Of a window, at most; not known before it is shown.
+SIDE, TITLE_BAR = GRID // 2, 4 * GRID
+FRAME = QSize(2 * SIDE, TITLE_BAR + 2 * SIDE)
 
 
 def fitted_place(place: QRect, available: QRect) -> QRect:
     """Return the place of a window without its frame, within what a screen has."""
-    size = place.size().boundedTo(available.size() - FRAME)
-    last = available.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
-    left = max(available.left(), min(place.left(), last.x()))
-    top = max(available.top(), min(place.top(), last.y()))
+    inner = available.adjusted(SIDE, TITLE_BAR, -SIDE, -2 * SIDE)
+    size = place.size().boundedTo(inner.size())
+    last = inner.bottomRight() - QPoint(size.width() - 1, size.height() - 1)
+    left = max(inner.left(), min(place.left(), last.x()))
+    top = max(inner.top(), min(place.top(), last.y()))
     return QRect(QPoint(left, top), size)
 
 
@@ -31,8 +34,11 @@ def fit_screen(window: QWidget) -> None:
         window.setGeometry(fitted)
 
 
+MOVED = Qt.WidgetAttribute.WA_Moved  # it has been placed before
+
+
 class FittedWindow(WidgetMixin):
-    """Mixin before the base of a window: keeps it within the screen when shown."""
+    """Mixin before the base of a window: opens over its parent, within the screen."""
 
     # Keys that close the window, for a dialog in addition to Qt's.
     CLOSING_KEYS: tuple[Qt.Key, ...] = ()
@@ -40,8 +46,14 @@ class FittedWindow(WidgetMixin):
     @override
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        if not event.spontaneous():
-            fit_screen(self)
+        if event.spontaneous():
+            return
+        parent = self.parentWidget()
+        if parent is not None and not self.testAttribute(MOVED):
+            place = self.geometry()
+            place.moveCenter(parent.window().geometry().center())
+            self.setGeometry(place)
+        fit_screen(self)
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -1,11 +1,12 @@
 """The part of a page that scrolls when the window is small."""
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QScrollArea, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import vertical_layout
+from lightpen_app.widgets.fitted_window import fit_screen
 
 
 class PageScroll(QScrollArea):
@@ -71,7 +72,26 @@ class PageScroll(QScrollArea):
 
 
 class DialogScroll(PageScroll):
-    """The fields of a dialog, scrolled only if the screen is too small."""
+    """The fields of a dialog, scrolled only if the screen is too small.
+
+    Qt opens a dialog with two thirds of the screen at most.
+    """
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if not event.spontaneous():
+            size = self.window().size()
+            QTimer.singleShot(0, self, lambda: self._grow(size))
+
+    def _grow(self, size: QSize) -> None:
+        window, bar = self.window(), self.verticalScrollBar()
+        while bar.maximum() and window.size() == size:
+            window.resize(size.width(), size.height() + bar.maximum())
+            fit_screen(window)
+            if window.height() <= size.height():
+                return
+            size = window.size()
 
     @override
     def sizeHint(self) -> QSize:

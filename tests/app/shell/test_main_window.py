@@ -31,7 +31,7 @@ from lightpen_app.shell.page_area import NoticeBar
 from lightpen_app.shell.sidebar import Subject
 from lightpen_app.shell.step_list import StepButton, StepState
 from lightpen_app.widgets.fitted_text import FittedText
-from lightpen_app.widgets.fitted_window import fitted_place
+from lightpen_app.widgets.fitted_window import FittedWindow, fitted_place
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction, Page, step_titles
 from lightpen_app.widgets.question_bar import Question, QuestionBar
@@ -874,7 +874,7 @@ def test_the_window_is_gone_before_it_waits_for_what_is_under_way(shell: Shell) 
 def test_the_window_comes_back_where_it_was(
     shell: Shell, qtbot: QtBot, settings: Settings
 ) -> None:
-    shell.window.setGeometry(20, 30, 760, 640)
+    shell.window.setGeometry(20, 40, 760, 640)
     place = shell.window.geometry()
     shell.window.close()
 
@@ -902,10 +902,10 @@ def test_a_window_of_another_screen_comes_back_within_this_one(
 @pytest.mark.parametrize(
     ("place", "fitted"),
     [
-        ((10, 50, 700, 400), (10, 50, 700, 400)),
-        ((10, 50, 1280, 800), (8, 50, 952, 470)),
-        ((-300, 0, 700, 400), (0, 30, 700, 400)),
-        ((900, 500, 700, 400), (260, 140, 700, 400)),
+        ((10, 70, 700, 400), (10, 70, 700, 400)),
+        ((10, 50, 1280, 800), (4, 62, 952, 470)),
+        ((-300, 0, 700, 400), (4, 62, 700, 400)),
+        ((900, 500, 700, 400), (256, 132, 700, 400)),
     ],
 )
 def test_a_place_is_changed_only_as_far_as_the_screen_asks_for(
@@ -914,6 +914,25 @@ def test_a_place_is_changed_only_as_far_as_the_screen_asks_for(
     available = QRect(0, 30, 960, 510)  # below a panel
 
     assert fitted_place(QRect(*place), available) == QRect(*fitted)
+
+
+def test_a_window_opens_over_its_parent_and_stays_where_it_is_moved(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    class Window(FittedWindow, QWidget):
+        pass
+
+    shell.window.setGeometry(60, 80, 640, 480)
+    window = Window(shell.window, Qt.WindowType.Window)
+    window.resize(300, 200)
+    window.show()
+    assert window.geometry().center() == shell.window.geometry().center()
+
+    window.move(90, 100)
+    place = window.geometry()
+    window.hide()
+    window.show()
+    assert window.geometry() == place
 
 
 def test_a_double_click_on_the_main_button_leads_one_step_on(shell: Shell) -> None:

@@ -83,15 +83,15 @@ class NamesForm(Translated, QWidget):
         self._add(place, self._station, at=(0, 0))
         self._add(place, self._operator, at=(0, 1))
         probe = _panel(self._probe)
-        rows = {
-            ItemKind.PEN: self._add_row(probe, self._pen, at=(0, 0)),
-            ItemKind.CONE: self._add_row(probe, self._cone, at=(0, 1)),
-            ItemKind.TIP: self._add_row(probe, self._tip, at=(1, 0)),
-        }
+        for kind, listed_edit, cell in (
+            (ItemKind.PEN, self._pen, (0, 0)),
+            (ItemKind.CONE, self._cone, (0, 1)),
+            (ItemKind.TIP, self._tip, (1, 0)),
+        ):
+            row = self._add_row(probe, listed_edit, at=cell)
+            row.addWidget(self._lists[kind])
         self._add(probe, self._ball, at=(1, 1))
         self._add(probe, self._nominal_tip, at=(2, 0, 1, 2))
-        for kind in SWUNG:  # the Tab key leads through all names first
-            rows[kind].addWidget(self._lists[kind])
 
         # Connections
         self._station.value_edited.connect(self.value_edited)

@@ -54,7 +54,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         self._save = self._buttons.button(standard.Save)
 
         # Layout
-        layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
+        layout = vertical_layout(self, self._lead, margins=3 * GRID)
         fields, scroll = QWidget(), DialogScroll()
         grid = grid_layout(fields, spacing=(2 * GRID, GRID // 2))
         for column in (0, 2):
@@ -68,7 +68,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         fill(layout, (scroll, 1))
         fill(layout, self._signing, self._supervisor, self._new_password)
         fill(layout, self._fault, self._buttons)
-        self.setMinimumWidth(100 * GRID)
+        self.setMinimumWidth(98 * GRID)
 
         # Connections
         self._supervisor.value_edited.connect(self._refresh)

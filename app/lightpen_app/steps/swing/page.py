@@ -13,6 +13,8 @@ from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing
 from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.steps.swing.page_state import (
+    COMMANDS,
+    PAUSES,
     SOUNDS,
     SideAction,
     SwingPresenter,
@@ -32,14 +34,6 @@ from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped
 PLOTTING_MS = 40  # from one plot to the next
-PAUSES = {SideAction.PAUSE, SideAction.RESUME}
-COMMANDS = {
-    SideAction.PAUSE: SwingWorkflow.pause,
-    SideAction.RESUME: SwingWorkflow.resume,
-    SideAction.STOP_COMPUTING: SwingWorkflow.cancel,
-    SideAction.COMPUTE: SwingWorkflow.solve,
-    SideAction.CAPTURE_MORE: SwingWorkflow.capture_more,
-}
 
 
 class SwingPage(Page):
@@ -111,6 +105,11 @@ class SwingPage(Page):
             )
         else:
             self._finish()
+
+    @override
+    def show_missing_input(self) -> None:
+        if self._run.status.state is not None:
+            self._simulator.invite()  # Enter, before there is an image to finish with
 
     @override
     def is_hands_free(self) -> bool:

@@ -14,6 +14,7 @@ from lightpen.swing.capture.rules import stillness
 from lightpen.swing.capture.shortfall import Shortfall, measure_shortfall, missing
 from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.status import SwingStatus
+from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.look.time_left import TimeLeft
@@ -53,6 +54,16 @@ class SideAction(Enum):
     STOP_COMPUTING = auto()
     COMPUTE = auto()
     CAPTURE_MORE = auto()
+
+
+PAUSES = {SideAction.PAUSE, SideAction.RESUME}
+COMMANDS = {
+    SideAction.PAUSE: SwingWorkflow.pause,
+    SideAction.RESUME: SwingWorkflow.resume,
+    SideAction.STOP_COMPUTING: SwingWorkflow.cancel,
+    SideAction.COMPUTE: SwingWorkflow.solve,
+    SideAction.CAPTURE_MORE: SwingWorkflow.capture_more,
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -75,6 +75,11 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         tilt, direction, turn = posture.tilt, posture.direction, posture.turn
         self._command(lambda operator: operator.lean(tilt, direction, turn))
 
+    def invite(self) -> None:
+        """Let the operator swing, as the button invites to."""
+        if self._live.operator is not None and not self.follows():
+            self._follow.setChecked(True)
+
     def follows(self) -> bool:
         """Return whether the operator follows the swing."""
         return self._follow.isChecked()

@@ -307,6 +307,17 @@ def test_a_record_that_cannot_be_made_is_reported_and_tried_again(
     until(qtbot, lambda: desk.value.instruction == "Hold the pen in view")
 
 
+def test_enter_presses_the_filled_button_before_there_is_an_image(
+    qtbot: QtBot, desk: Desk
+) -> None:
+    desk.window.go_to(1)
+    until(qtbot, lambda: desk.run.status.state is not None)
+
+    desk.type(Key.Key_Return)
+
+    until(qtbot, lambda: desk.state.n_kept > 0)
+
+
 def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> None:
     desk.window.go_to(1)
     until(qtbot, lambda: "choose Seat" in desk.value.hint)
