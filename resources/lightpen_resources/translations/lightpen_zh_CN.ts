@@ -5797,10 +5797,6 @@ needed</source>
         <translation>LED 不匹配</translation>
     </message>
     <message>
-        <source>LEDs {first} and {second} are {distance:.2f} mm apart, too close for discs of {diameter:g} mm. Check their coordinates and the diameter.</source>
-        <translation>LED {first} 和 {second} 相距 {distance:.2f} mm，对 {diameter:g} mm 的发光面来说太近。请检查坐标和直径。</translation>
-    </message>
-    <message>
         <source>LEDs {one} and {other} are exchanged in the LED file</source>
         <translation>LED 文件中 LED {one} 与 {other} 互换</translation>
     </message>
@@ -6167,6 +6163,10 @@ needed</source>
     <message>
         <source>The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Number them so.</source>
         <translation>LED 编号顺序错误：{places}。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请照此编号。</translation>
+    </message>
+    <message>
+        <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. If the coordinates are in metres or inches, state the unit, for example in the header: x_m, y_m, z_m.</source>
+        <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的圆盘。若坐标单位为米或英寸，请注明单位，例如在表头写：x_m, y_m, z_m。</translation>
     </message>
     <message>
         <source>The archive contains entries of another chain, {chain}.</source>
@@ -8197,6 +8197,10 @@ needed</source>
         <translation>其畸变不是 OpenCV 或 Kannala-Brandt 的模型：请用标定板图像标定相机，可在此处，或采用其中一种模型。</translation>
     </message>
     <message>
+        <source>LEDs {first} and {second} are {distance:.2f} mm apart, too close for discs of {diameter:g} mm. Check the unit of the coordinates (mm, cm or in), and the diameter.</source>
+        <translation>LED {first} 和 {second} 相距 {distance:.2f} mm，对 {diameter:g} mm 的发光面来说太近。请检查坐标的单位（mm、cm 或英寸）和直径。</translation>
+    </message>
+    <message>
         <source>Lean the pen as the dial shows</source>
         <translation>按姿态盘所示倾斜光笔</translation>
     </message>
@@ -9415,10 +9419,6 @@ needed</source>
     <message>
         <source>The LEDs found do not match the sketch in any order. Check that the sketch is of this pen, right-handed, in millimetres and accurate to 5 mm.</source>
         <translation>找到的 LED 以任何顺序都与草图不符。请检查草图是否属于此光笔、为右手系、单位为毫米且精度为 5 mm。</translation>
-    </message>
-    <message>
-        <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. If the coordinates are in metres, state the unit, for example in the header: x_m, y_m, z_m.</source>
-        <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的圆盘。若坐标单位为米，请注明单位，例如在表头写：x_m, y_m, z_m。</translation>
     </message>
     <message>
         <source>The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. Check that the coordinates are in millimetres, also in the header, or state their unit.</source>

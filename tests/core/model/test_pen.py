@@ -238,7 +238,7 @@ def test_points_of_another_shape_are_a_mistake_of_the_caller() -> None:
     [
         (LEDS[:3], "needs 4 to 100 LEDs; the file has 3"),
         (np.zeros((101, 3)), "the file has 101"),
-        (LEDS / 1000, r"span only 0\.18 mm, .* in metres, state"),
+        (LEDS / 1000, r"span only 0\.18 mm, .* in metres or inches, state"),
         (LEDS * 1000, r"span 180 m; .* state their unit"),
         (LEDS + np.array([2e6, 0, 0]), r"LED 9 is 2000\.03 m from the origin"),
         (LEDS * 1e300, "from the origin, which is implausible"),

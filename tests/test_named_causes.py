@@ -1,0 +1,174 @@
+"""`lightpen calibrate` names why LEDs are not where the files have them."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.pen_files import write_pen
+from lightpen.model.pen import Pen
+from lightpen_extensions.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+# In no known layout, so that its file is not refused at once.
+LEDS = np.array(
+    [
+        *([-30.0, 10.0, -20.0], [25.0, 30.0, 0.0], [-10.0, 55.0, -35.0]),
+        *([30.0, 85.0, -15.0], [-25.0, 110.0, 5.0], [5.0, 140.0, -30.0]),
+        *([28.0, 165.0, 0.0], [-20.0, 180.0, -12.0]),
+    ]
+)
+PEN = Pen(LEDS, np.tile([0.0, 0.0, 1.0], (8, 1)), 10.0, led_sigma=0.002)
+LAST = np.array(CAMERA.image_size) - 1.0
+
+Run = Callable[..., CompletedProcess[str]]
+Calibrated = Callable[[Pen, FloatArray], tuple[str, dict[str, Any]]]
+
+
+@pytest.fixture(scope="module")
+def pixels() -> FloatArray:
+    return seen_of(PEN)
+
+
+@pytest.fixture
+def calibrated(lightpen: Run, tmp_path: Path) -> Calibrated:
+    """Return a function that calibrates from centres and gives output and record."""
+
+    def run(pen: Pen, pixels: FloatArray) -> tuple[str, dict[str, Any]]:
+        write_camera(CAMERA, tmp_path / "camera.yaml")
+        write_pen(pen, tmp_path / "leds.json")
+        rows = [
+            f"{i + 1},{led + 1},{x!r},{y!r}"
+            for (i, led), (x, y) in zip(
+                np.ndindex(pixels.shape[:2]),
+                pixels.reshape(-1, 2).tolist(),
+                strict=True,
+            )
+            if np.isfinite(x)
+        ]
+        centers, record = tmp_path / "centers.csv", tmp_path / "record.json"
+        centers.write_text("\n".join(["frame,led,x_px,y_px", *rows]), encoding="utf-8")
+        outcome = lightpen(
+            *("calibrate", "--centers", centers, "--camera", tmp_path / "camera.yaml"),
+            *("--pen", tmp_path / "leds.json", "--json", record),
+        )
+        fields = json.loads(record.read_bytes()) if record.exists() else {}
+        return outcome.stdout + outcome.stderr, fields
+
+    return run
+
+
+def seen_of(pen: Pen) -> FloatArray:
+    rng = np.random.default_rng(4)
+    swing = swing_poses(60, rng)
+    return simulate_centers(CAMERA, pen, swing.rotations, swing.translations, 0.03, rng)
+
+
+def with_leds(leds: FloatArray) -> Pen:
+    return replace(PEN, leds=leds)
+
+
+def exchanged(one: int, other: int) -> Pen:
+    leds = PEN.leds.copy()
+    leds[[one - 1, other - 1]] = leds[[other - 1, one - 1]]
+    return with_leds(leds)
+
+
+def moved(led: int, by: float) -> Pen:
+    leds = PEN.leds.copy()
+    leds[led - 1] += [0.0, by, by]
+    return with_leds(leds)
+
+
+@pytest.mark.parametrize(
+    ("pen", "named"),
+    [
+        (exchanged(2, 3), "LEDs 2 and 3 are exchanged"),
+        (with_leds(PEN.leds * [-1, 1, 1]), "mirror image of the pen (sign of x"),
+        (with_leds(PEN.leds * [1, -1, 1]), "mirror image of the pen (sign of x"),
+        (with_leds(PEN.leds * [1, 1, -1]), "mirror image of the pen (sign of z)"),
+        (with_leds(PEN.leds[:, [1, 0, 2]]), "mirror image of the pen (sign of x"),
+        (with_leds(PEN.leds / 25.4), "in metres or inches, state the unit"),
+        (with_leds(PEN.leds / 10), "too close for discs of 10 mm. Check the unit"),
+        (moved(7, 1.0), "LED 7 is"),
+    ],
+)
+def test_a_mistake_in_the_led_file_is_named(
+    pen: Pen, named: str, pixels: FloatArray, calibrated: Calibrated
+) -> None:
+    told, fields = calibrated(pen, pixels)
+
+    assert named in " ".join(told.split())
+    assert fields.get("verdict", {}).get("grade") != "pass"
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda seen: seen * [-1, 1] + [LAST[0], 0], "mirrored left to right"),
+        (lambda seen: seen * [1, -1] + [0, LAST[1]], "mirrored top to bottom"),
+        (lambda seen: seen[..., ::-1], "x and y of the LED centres are exchanged"),
+        (lambda seen: (seen - 0.5) / 2, "the images are binned by 2"),
+        (lambda seen: seen - [300, 200], "the images are cropped"),
+    ],
+)
+def test_a_change_of_the_images_is_named(
+    change: Callable[[FloatArray], FloatArray],
+    named: str,
+    pixels: FloatArray,
+    calibrated: Calibrated,
+) -> None:
+    told, fields = calibrated(PEN, change(pixels))
+
+    assert named in " ".join(told.split())
+    assert fields.get("verdict", {}).get("grade") != "pass"
+
+
+def test_five_dark_leds_are_no_seat_that_varies(calibrated: Calibrated) -> None:
+    dark = seen_of(paper_pen())
+    dark[:, [1, 3, 4, 6, 8]] = np.nan
+
+    _, fields = calibrated(paper_pen(), dark)
+
+    assert fields["images"]["used"] > 50
+    codes = {each["code"] for each in fields["warnings"]}
+    assert not {code for code in codes if "seat" in code}
+
+
+def test_many_rejected_centres_are_to_be_checked_with_share_and_leds(
+    calibrated: Calibrated,
+) -> None:
+    rng, spoilt = np.random.default_rng(5), seen_of(paper_pen())
+    bad = rng.random(spoilt.shape[:2]) < np.where(np.arange(10) == 3, 0.95, 0.05)
+    spoilt[bad] += rng.normal(0, 3, (int(bad.sum()), 2))
+
+    told, fields = calibrated(paper_pen(), spoilt)
+
+    verdict = fields["verdict"]
+    assert (verdict["grade"], verdict["code"]) == ("check", "verdict.centres-rejected")
+    assert 10 < verdict["values"]["percent"] < 20
+    assert "LED 4" in told
+
+
+def test_a_pass_of_centres_alone_tells_what_they_do_not_show(
+    pixels: FloatArray, calibrated: Calibrated
+) -> None:
+    for pen in (PEN, with_leds(1.003 * PEN.leds), replace(PEN, diameter=5.0)):
+        told, fields = calibrated(pen, pixels)
+
+        assert fields["verdict"]["grade"] == "pass"
+        told = " ".join(told.split())
+        assert "The scale of the LED file is not checked by this calibration" in told
+        assert "nor is its disc diameter" in told
