@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
+from typing_extensions import override
 
 from lightpen.archive.chains.entries import Event, Kind
 from lightpen.archive.chains.growth import append
@@ -54,6 +55,7 @@ from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import Preparation
+from lightpen_app.face import Service
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.look.words import unbroken
@@ -101,12 +103,21 @@ def names(tip: str) -> Names:
     return Names("Hall 2", "Ann", "LP-04", tip, "C-1", 10.0)
 
 
+class VerifiedKinds(Service):
+    """An extension that knows the kinds of two tasks."""
+
+    @override
+    def event_text(self, event: Event) -> str:
+        kind = event.settings.get("verified")
+        return {"part": "Part", "fixed point": "Tip check"}.get(str(kind), "")
+
+
 class Desk:
     """Somebody at the step History of a data folder."""
 
     def __init__(self, workbench: Workbench, qtbot: QtBot) -> None:
         self.workbench, self.qtbot = workbench, qtbot
-        self.page = HistoryPage(workbench)
+        self.page = HistoryPage(workbench, (VerifiedKinds(workbench),))
         self.notices: list[str] = []
         self.statuses: list[str] = []
         notifications = workbench.notifications
