@@ -26,15 +26,15 @@ from benchmarks.rows import Row
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.formats.images import find_images
-from lightpen.intrinsics.adjustment import fit_board_poses
-from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
-from lightpen.intrinsics.boards import parse_board
-from lightpen.intrinsics.calibration import calibrate_camera
-from lightpen.intrinsics.distortion import FEW, rms_together
-from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.start import start_board_poses, start_camera
-from lightpen.intrinsics.views import Views
 from lightpen.model.camera import Camera
+from lightpen_extensions.boards.adjustment import fit_board_poses
+from lightpen_extensions.boards.board_fit import N_SHAPE, BoardState
+from lightpen_extensions.boards.boards import parse_board
+from lightpen_extensions.boards.calibration import calibrate_camera
+from lightpen_extensions.boards.distortion import FEW, rms_together
+from lightpen_extensions.boards.observing import observe_board
+from lightpen_extensions.boards.start import start_board_poses, start_camera
+from lightpen_extensions.boards.views import Views
 
 N_PARTS = 5
 N_SETS = 6  # as photographed

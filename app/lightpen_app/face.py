@@ -2,18 +2,21 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.archive.chains.entries import Event
 from lightpen.record.swings.names import Names
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:  # they take long to be imported
+    from lightpen.archive.chains.entries import Event
+    from lightpen.record.exports.formats import ExportFormat
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,11 @@ class Service(QObject):
         """Return its preconditions of a swing."""
         return ()
 
-    def event_text(self, event: Event) -> str:
+    def export_formats(self) -> "tuple[ExportFormat, ...]":
+        """Return formats in which a calibration can be saved."""
+        return ()
+
+    def event_text(self, event: "Event") -> str:
         """Return the kind of its entry in the archive; empty for an entry of others."""
         return ""
 
@@ -163,9 +170,14 @@ def verify_step(services: Services) -> str:
     return next(filter(None, (each.verify_step for each in services)), "")
 
 
-def event_text(services: Services, event: Event) -> str:
+def event_text(services: Services, event: "Event") -> str:
     """Return the kind of an entry of an extension; empty for an entry of main."""
     return next(filter(None, (each.event_text(event) for each in services)), "")
+
+
+def export_formats(services: Services) -> "tuple[ExportFormat, ...]":
+    """Return the formats that extensions add to those of main."""
+    return tuple(form for each in services for form in each.export_formats())
 
 
 def can_discover(services: Services) -> bool:

@@ -3,6 +3,7 @@
 from lightpen_app.face import Face
 from lightpen_app_extensions.boards.service import BoardsService
 from lightpen_app_extensions.discover.service import DiscoverService
+from lightpen_app_extensions.exports.service import ExportsService
 from lightpen_app_extensions.measure.face import MeasureFace
 from lightpen_app_extensions.stream.service import StreamService
 
@@ -10,5 +11,6 @@ FACES: tuple[Face, ...] = (  # each after what it needs
     MeasureFace,
     BoardsService,
     DiscoverService,
+    ExportsService,
     StreamService,
 )

@@ -6,7 +6,7 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_export(parser: ArgumentParser) -> None:
-    from lightpen.commands.export import add_export
+    from lightpen_extensions.exports.command import add_export
 
     add_export(parser)
 

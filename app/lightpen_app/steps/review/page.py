@@ -58,7 +58,7 @@ class ReviewPage(Page):
 
         # Widgets
         place = workbench.save_place
-        self._view = view = ReviewView(self._run, place, bool(verify))
+        self._view = view = ReviewView(self._run, place, services)
         self._accepted = QTimer(self, singleShot=True)
         self._reading = QTimer(self, singleShot=True)
         self._methods: MethodsPanel | None = None

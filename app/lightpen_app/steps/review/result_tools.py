@@ -1,11 +1,12 @@
 """Buttons for the result: copy the tip, save it, press test."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QWidget
 
-from lightpen.record.exports.formats import FORMATS, ExportFormat
+from lightpen.record.exports.formats import TABLE_FORMATS, ExportFormat
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.tooltips import set_tooltip
@@ -21,13 +22,12 @@ class Export:
     has_plots: bool = False
 
 
-TABLES = tuple(each for each in FORMATS if each.name in ("json", "csv", "images"))
+TABLES = TABLE_FORMATS[:3]  # without the text that is pasted
 ALL, PLOTS = Export(TABLES, has_plots=True), Export((), has_plots=True)
-EXPORTS = (ALL, *(Export((each,)) for each in FORMATS), PLOTS)
 
 
 class ResultTools(Translated, QWidget):
-    """Three buttons; that to save has a menu."""
+    """Three buttons; that to save has a menu, also with formats of extensions."""
 
     folder_requested = Signal()  # open the folder of the swing
     copy_requested = Signal()  # copy the tip to the clipboard
@@ -35,15 +35,18 @@ class ResultTools(Translated, QWidget):
     report_requested = Signal()  # show the printed report
     press_requested = Signal()  # start the press test
 
-    def __init__(self) -> None:
+    def __init__(self, formats: Sequence[ExportFormat] = ()) -> None:
         super().__init__()
+        single = (Export((each,)) for each in (*TABLE_FORMATS, *formats))
 
         # Widgets
         self._copy = PushButton()
         self._save = PushButton()
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
-        self._actions = [(export, menu.addAction("")) for export in EXPORTS]
+        self._actions = [
+            (export, menu.addAction("")) for export in (ALL, *single, PLOTS)
+        ]
         menu.addSeparator()
         menu.setToolTipsVisible(True)
         self._report, self._folder = menu.addAction(""), menu.addAction("")

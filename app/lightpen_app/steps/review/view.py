@@ -4,6 +4,7 @@ from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen_app.face import Services, export_formats, verify_step
 from lightpen_app.look.layouts import (
     fill,
     horizontal_layout,
@@ -41,10 +42,10 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     very_large_from = QSize(190 * GRID, 100 * GRID)  # px; then it has the postures
 
     def __init__(
-        self, run: SwingRun, place: SavePlace, can_verify: bool = False
+        self, run: SwingRun, place: SavePlace, services: Services = ()
     ) -> None:
         super().__init__()
-        self._can_verify = can_verify
+        self._can_verify = bool(verify_step(services))
 
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
@@ -58,7 +59,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.repeat, self.capture_more = PushButton(), PushButton()
         self.accept, self.verify = PushButton(), PushButton()
         self.take_back = PushButton()
-        self.tools = ResultTools()
+        self.tools = ResultTools(export_formats(services))
         self.next_tips = NextTipsRow()
         self.tabs = DetailTabs(run, place)
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()

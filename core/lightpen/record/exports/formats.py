@@ -1,34 +1,23 @@
-"""The formats in which a calibration is exported, in one table.
+"""A calibration as the record and as tables; extensions add formats of other programs.
 
-Another format is a function from `CalibrationFile` to text and an entry of `FORMATS`,
-which the command ``lightpen export`` and the menu of the wizard offer. All state the
-tip, its origin (live, recorded, simulated), its grade and its status, see
+A format is a function from `CalibrationFile` to text. All state the tip, its origin
+(live, recorded, simulated), its grade and its status, see
 `lightpen.record.calibrations.export_status`; the record as JSON has no place for a
-status of the library. Transforms keep the axes of the pen: the tip is the origin of a
-frame parallel to the pen frame.
+status of the library.
 """
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-
-import yaml
 
 from lightpen.estimation.reports.verdict import AXES
 from lightpen.formats.csv_cells import csv_table
 from lightpen.formats.file_format import FileFormat
 from lightpen.formats.json_records import record_bytes
-from lightpen.local_time import local_time
-from lightpen.messages import Message, message, printable
+from lightpen.messages import Message, message
 from lightpen.model.laboratory import Laboratory
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.export_status import status_of
-from lightpen.record.exports.dcc import dcc_text
-
-MILLIMETRES = 1000.0  # in a metre, the unit of ROS
-N_DECIMALS = 6  # of a length in mm in a file for statistics
-PEN_FRAME, TIP_FRAME = "pen", "tip"
 
 
 @dataclass(frozen=True)
@@ -50,7 +39,7 @@ class ExportFormat(FileFormat):
         return self.encoded(file, laboratory)
 
 
-def _remark(file: CalibrationFile) -> str:
+def export_remark(file: CalibrationFile) -> str:
     """Return origin, grade, acceptance and status, for a comment."""
     accepted, status = file.accepted, status_of(file)
     return (
@@ -106,124 +95,15 @@ def _images(file: CalibrationFile) -> str:
 def _text(file: CalibrationFile) -> str:
     """Return x, y, z in mm, separated by tabs, and a comment."""
     tip = "\t".join(map(repr, file.calibration.tip_pen_mm))
-    return _lines(tip, f"# {_remark(file)}")
+    return as_lines(tip, f"# {export_remark(file)}")
 
 
-def _slicer(file: CalibrationFile) -> str:
-    """Return an ITK transform that 3D Slicer reads as pen_from_tip.
-
-    ITK's axes point left and to the back where Slicer's point right and to the front,
-    and Slicer takes its transforms to go from the parent: of a shift only the last
-    entry changes sign.
-    """
-    x, y, z = file.calibration.tip_pen_mm
-    return _itk_shift((x, y, -z), "for 3D Slicer alone", _remark(file))
-
-
-def _itk(file: CalibrationFile) -> str:
-    """Return an ITK transform that maps points from the tip frame to the pen frame."""
-    words = "TransformPoint maps from the tip frame to the pen frame, mm"
-    return _itk_shift(file.calibration.tip_pen_mm, words, _remark(file))
-
-
-def _itk_shift(shift: Sequence[float], *remarks: str) -> str:
-    return _lines(
-        "#Insight Transform File V1.0",
-        *(f"# {remark}" for remark in remarks),
-        "#Transform 0",
-        "Transform: AffineTransform_double_3_3",
-        f"Parameters: 1 0 0 0 1 0 0 0 1 {' '.join(map(repr, shift))}",
-        "FixedParameters: 0 0 0",
-    )
-
-
-def _plus(file: CalibrationFile) -> str:
-    """Return the ``CoordinateDefinitions`` of a device set of PLUS.
-
-    ``Error`` is the residual of the pivot calibration, mm, as fCal writes it.
-    """
-    x, y, z = file.calibration.tip_pen_mm
-    when = file.when.strftime("%m%d%y_%H%M%S")
-    matrix = f"1 0 0 {x!r} 0 1 0 {y!r} 0 0 1 {z!r} 0 0 0 1"
-    error = f"{file.calibration.rms_mm:.{N_DECIMALS}f}"
-    return _lines(
-        f"<!-- {_remark(file)} -->",
-        "<CoordinateDefinitions>",
-        f'  <Transform From="StylusTip" To="Stylus" Matrix="{matrix}"',
-        f'    Error="{error}" Date="{when}" />',
-        "</CoordinateDefinitions>",
-    )
-
-
-def _ros(file: CalibrationFile) -> str:
-    """Return a ``geometry_msgs/TransformStamped`` of ROS as YAML, in metres."""
-    metres = [x / MILLIMETRES for x in file.calibration.tip_pen_mm]
-    seconds = file.when.timestamp()
-    stamp = {"sec": int(seconds), "nanosec": int(seconds % 1 * 1e6) * 1000}
-    transform = {
-        "header": {"stamp": stamp, "frame_id": PEN_FRAME},
-        "child_frame_id": TIP_FRAME,
-        "transform": {
-            "translation": dict(zip(AXES, metres, strict=True)),
-            "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
-        },
-    }
-    comment = f"# {_remark(file)}\n"
-    return comment + yaml.safe_dump(transform, sort_keys=False)
-
-
-def _qdas(file: CalibrationFile) -> str:
-    """Return a file of Q-DAS (AQDEF): x, y and z of the tip, and U of each.
-
-    Each calibration is one value of six characteristics of a part, the pen with its
-    tip, so that the files of many make the series. Operator, station and pen are those
-    of the catalogues of operators, machines and gauges. Where the tip has a limit of
-    change, the specification limits lie that far from the tip as found.
-    """
-    calibration, names, change = file.calibration, file.names, file.change
-    pen, tip = printable(names.pen), printable(names.tip)
-    values = [*calibration.tip_pen_mm, *calibration.expanded_uncertainty_mm]
-    titles = map("".join, product(("Tip ", "U (k=2) of tip "), AXES))
-    nominal = calibration.nominal_tip_mm or (None,) * 3
-    limits: list[tuple[float, float] | None] = [None] * 3
-    if change is not None and change.limit_mm is not None:
-        limit = change.limit_mm
-        limits = [(x - limit, x + limit) for x in change.as_found_mm]
-    limits += [(0.0, calibration.verdict.limits.max_uncertainty_mm)] * 3
-    lines = [
-        f"K0100 {len(values)}",
-        f"K1001 {pen}",
-        f"K1002 Light pen {pen}, tip {tip}",
-        f"K1003 {tip}",
-        f"K1900 {_remark(file)}",
-        f"K4062/1 {printable(names.station)}",
-        f"K4063/1 Station {printable(names.station)}",
-        f"K4072/1 {pen}",
-        f"K4073/1 Light pen {pen}",
-        f"K4092/1 {printable(names.operator)}",
-    ]
-    each = zip(titles, (*nominal, None, None, None), limits, strict=True)
-    for i, (title, target, bounds) in enumerate(each, start=1):
-        lines += [f"K2001/{i} {i}", f"K2002/{i} {title}"]
-        lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} mm"]
-        if target is not None:
-            lines.append(f"K2101/{i} {target:.{N_DECIMALS}f}")
-        if bounds is not None:
-            lower, upper = bounds
-            lines.append(f"K2110/{i} {lower:.{N_DECIMALS}f}")
-            lines.append(f"K2111/{i} {upper:.{N_DECIMALS}f}")
-    when = f"{local_time(file.when):%d.%m.%Y/%H:%M:%S}"
-    for i, value in enumerate(values, start=1):
-        lines += [f"K0001/{i} {value:.{N_DECIMALS}f}", f"K0002/{i} 0"]  # 0: valid
-        lines += [f"K0004/{i} {when}", f"K0008/{i} 1", f"K0010/{i} 1", f"K0012/{i} 1"]
-    return _lines(*lines)
-
-
-def _lines(*lines: str) -> str:
+def as_lines(*lines: str) -> str:
+    """Return lines as a text that ends with a line break."""
     return "\n".join(lines) + "\n"
 
 
-FORMATS = (
+TABLE_FORMATS = (
     ExportFormat(
         "json",
         message("export.json"),
@@ -244,32 +124,5 @@ FORMATS = (
     ),
     ExportFormat(
         "text", message("export.text"), "_tip.txt", _text, message("content.text")
-    ),
-    ExportFormat(
-        "slicer",
-        message("export.slicer"),
-        "_tip.tfm",
-        _slicer,
-        message("content.slicer"),
-    ),
-    ExportFormat(
-        "itk", message("export.itk"), "_itk.tfm", _itk, message("content.itk")
-    ),
-    ExportFormat(
-        "plus", message("export.plus"), "_plus.xml", _plus, message("content.plus")
-    ),
-    ExportFormat(
-        "ros", message("export.ros"), "_tip.yaml", _ros, message("content.ros")
-    ),
-    ExportFormat(
-        "qdas", message("export.qdas"), "_tip.dfq", _qdas, message("content.qdas")
-    ),
-    ExportFormat(
-        "dcc",
-        message("export.dcc"),
-        "_dcc.xml",
-        dcc_text,
-        message("content.dcc"),
-        needs_laboratory=True,
     ),
 )

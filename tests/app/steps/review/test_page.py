@@ -46,7 +46,6 @@ from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
-from lightpen.record.exports.formats import FORMATS
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.results import Result
@@ -89,6 +88,8 @@ from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.exports.service import ExportsService
+from lightpen_extensions.exports.formats import FORMATS
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
 from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.scene_files import write_sample_files
@@ -223,7 +224,7 @@ class Bed:
     def show(self) -> ReviewPage:
         """Show the page."""
         with undressed():
-            page = ReviewPage(self.workbench)
+            page = ReviewPage(self.workbench, (ExportsService(self.workbench),))
         self.pages.append(page)
         self.qtbot.addWidget(page)
         page.resize(1000, 600)

@@ -15,7 +15,7 @@ from lightpen.record.exports.exports import (
     exported_solution,
     save_new,
 )
-from lightpen.record.exports.formats import FORMATS
+from lightpen.record.exports.formats import TABLE_FORMATS
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import solve_record
@@ -59,7 +59,7 @@ def test_a_solved_swing_is_exported_as_the_command_line_records_it(
     out = tmp_path / "y.json"
     lightpen("calibrate", solution.source.folder, "--json", out)
 
-    (form,) = [each for each in FORMATS if each.name == "json"]
+    (form,) = [each for each in TABLE_FORMATS if each.name == "json"]
     saved = json.loads(form.content(exported))
     printed = json.loads(out.read_bytes())
     for each in (saved, printed):

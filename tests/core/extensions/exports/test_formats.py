@@ -27,13 +27,13 @@ from lightpen.record.calibrations.export_status import (
     status_of,
     with_status,
 )
-from lightpen.record.exports.formats import FORMATS
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
+from lightpen_extensions.exports.formats import FORMATS
 
 ACCEPTED = datetime(2026, 8, 14, 9, 30, tzinfo=UTC)
 TIP, U = [-1.5, -90.25, -23.875], [0.001, 0.0025, 0.002]

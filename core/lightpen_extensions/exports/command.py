@@ -14,7 +14,7 @@ from lightpen.messages import printable
 from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.calibrations.export_status import with_status
-from lightpen.record.exports.formats import FORMATS
+from lightpen_extensions.exports.formats import FORMATS
 
 LABORATORY = {
     "laboratory": "name of the laboratory",

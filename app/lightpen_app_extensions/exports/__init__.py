@@ -1,0 +1,1 @@
+"""Tips for other programs in the window."""
