@@ -7,7 +7,6 @@ is then as precise as a fit of the rim, at the cost of one pass over a small win
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from math import pi, sqrt
 from typing import NamedTuple, TypeAlias
 
@@ -24,7 +23,6 @@ from lightpen.detection.region_moments import (
     DiscMoments,
     Value,
     is_ellipse,
-    moments_of_region,
     moments_of_rim,
 )
 
@@ -43,10 +41,7 @@ FLAT = 0.5  # width of the rim over the radius up to which a disc has a plateau
 UNEVEN_CENTER = 0.002  # of the radius: the outline is 0.01 px off at a sharp rim
 CORRECTED_CENTER = 0.007  # of the radius, where shading is corrected to first order
 NOISE_SIGMAS = 3.0
-WIDE_EDGE = 4.5  # px; sharp discs have 2 to 3
 SHARPER = 0.7  # times as wide is a rim that light of the inside widens
-HOLE = 1.05  # times the area that is lit, of a ring with its middle; noise has less
-FULLY = 250  # of 255, the crest of a ring
 MIN_OUTLINE = 0.97  # of the area of an ellipse with the same second moments
 
 
@@ -70,9 +65,8 @@ class Disc(NamedTuple):
     and noise explain how it differs from an ellipse; a sliver of 1 px off a disc of
     42 px, which shifts the centre by 0.13 px, is beyond that. `others` are further
     regions in the box that was requested. `is_even` shows that its light is as even as
-    its outline supposes, `is_balanced` that no side is brighter. `rim` is the start of
-    the fit by which `with_rims` measures an unevenly lit disc; `filled` returns the
-    moments of a ring with its dark middle filled, if that makes it whole.
+    its outline supposes. `rim` is the start of the fit by which `with_rims` measures a
+    disc whose outline may not show it.
     """
 
     moments: DiscMoments
@@ -80,37 +74,16 @@ class Disc(NamedTuple):
     cut_level: float
     box: PixelBox
     is_whole: bool
-    is_even: bool = True
-    is_balanced: bool = True
-    leaves_image: bool = False
-    leaves_window: bool = False
-    others: tuple[PixelBox, ...] = ()
-    rim: EdgeStart | None = None
-    filled: Callable[[], DiscMoments | None] | None = None
+    is_even: bool
+    leaves_image: bool
+    leaves_window: bool
+    others: tuple[PixelBox, ...]
+    rim: EdgeStart | None
 
     @property
     def cut_height(self) -> float:
         """Height of the outline, 0 at the background, 1 at the plateau."""
         return (self.cut_level - self.levels.background) / self.levels.contrast
-
-
-def with_start(
-    disc: Disc, soft: MatLike, frame: PixelBox, ramp: float, noise: float
-) -> Disc:
-    """Return a disc with what `with_rims` needs, if its outline does not show it.
-
-    ``soft`` is its soft-thresholded window within ``frame``.
-    """
-    if disc.is_even and disc.moments.edge_width < WIDE_EDGE:
-        return disc
-    filled = None
-    if not disc.is_whole and _has_dark_middle(disc.moments, soft, frame):
-        relative_noise = noise / disc.levels.contrast
-        filled = partial(_filled, disc.moments, soft, frame, ramp, relative_noise)
-        # The outline of a ring that is as bright all round needs no fit of its rim.
-        if disc.is_balanced and (moments := filled()):
-            return disc._replace(moments=moments, is_whole=True)
-    return disc._replace(rim=_rim_start(soft, frame), filled=filled)
 
 
 Starts: TypeAlias = Callable[[], Sequence[EdgeStart]]  # at discs of the image before
@@ -122,29 +95,23 @@ def with_rims(image: Image, discs: Sequence[Disc], before: Starts = list) -> lis
     Fits begin at the discs of the image ``before``.
     """
     found = list(discs)
-    unclear = [i for i, disc in enumerate(discs) if disc.rim or disc.filled]
-    if not unclear:
+    unclear = [i for i, disc in enumerate(discs) if disc.rim]
+    starts = [disc.rim for disc in discs if disc.rim]
+    if not starts:
         return found
-    starts = [disc.rim for disc in discs if disc.rim is not None]
-    rims = iter(fit_edges(image, _nearest(starts, before())))
-    for i in unclear:
-        disc = discs[i]
-        rim = next(rims) if disc.rim else None
+    for i, rim in zip(
+        unclear, fit_edges(image, _nearest(starts, before())), strict=True
+    ):
         # An apparently blurred disc may be a sharp dome that is dark at its rim.
-        wide = disc.moments.edge_width if disc.is_even else float("inf")
-        moments = None
+        wide = discs[i].moments.edge_width if discs[i].is_even else float("inf")
         if rim and rim.is_whole and GAUSSIAN_RISE * rim.sigma < SHARPER * wide:
-            moments = moments_of_rim(rim)
-        elif disc.filled:
-            moments = disc.filled()
-        if moments:
-            found[i] = disc._replace(is_whole=True, moments=moments)
+            found[i] = discs[i]._replace(is_whole=True, moments=moments_of_rim(rim))
     return found
 
 
 def _nearest(starts: list[EdgeStart], before: Sequence[EdgeStart]) -> list[EdgeStart]:
     """Return the starts of edge fits: as the nearest previous discs, if any."""
-    if not starts or not before:
+    if not before:
         return starts
     here, there = (
         np.array([start.center for start in some]) for some in (starts, before)
@@ -205,43 +172,19 @@ def assessed(
     return moments, is_whole, is_even & is_balanced, is_balanced
 
 
-def _has_dark_middle(moments: DiscMoments, soft: MatLike, frame: PixelBox) -> bool:
-    x, y = round(moments.x) - frame.left, round(moments.y) - frame.top
-    reach = round(moments.radius / 2)
-    rows, columns = (slice(max(at - reach, 0), at + reach + 1) for at in (y, x))
-    return bool(soft[rows, columns].min(initial=255) < FULLY)
+def rim_start(contour: MatLike, corner: tuple[int, int]) -> EdgeStart | None:
+    """Return the start of the edge fit of a region, if it is like an ellipse.
 
-
-def _filled(
-    moments: DiscMoments,
-    soft: MatLike,
-    frame: PixelBox,
-    ramp: float,
-    relative_noise: float,
-) -> DiscMoments | None:
-    """Return the moments with enclosed holes filled, if that makes an ellipse."""
-    _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
-    contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)
-    filled = moments_of_region(cv2.max(soft, crest), frame, ramp)
-    if filled is None or filled.area <= HOLE * moments.area:
-        return None
-    return filled if is_ellipse(filled, relative_noise) else None
-
-
-def _rim_start(soft: MatLike, frame: PixelBox) -> EdgeStart | None:
-    """Return the start of the edge fit of a region, if it is like an ellipse."""
-    contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    m = cv2.moments(contours[0])
-    if len(contours) > 1 or m["m00"] < MIN_AREA:
+    Its contour is in px from a corner.
+    """
+    m = cv2.moments(contour)
+    if m["m00"] < MIN_AREA:
         return None
     xx, xy, yy = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
     determinant = xx * yy - xy**2
     if determinant <= 0 or m["m00"] < MIN_OUTLINE * 4 * pi * sqrt(determinant):
         return None
-    center = np.array(
-        [frame.left + m["m10"] / m["m00"], frame.top + m["m01"] / m["m00"]]
-    )
+    center = np.array([m["m10"] / m["m00"], m["m01"] / m["m00"]]) + corner
     return EdgeStart(center, np.array([[xx, xy], [xy, yy]]))
 
 

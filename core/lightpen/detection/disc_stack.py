@@ -14,8 +14,8 @@ from lightpen.detection.disc_moments import (
     Disc,
     Levels,
     assessed,
+    rim_start,
     window_levels,
-    with_start,
 )
 from lightpen.detection.pixel_box import PixelBox, Reals, stacked
 from lightpen.detection.region_moments import HIGH, LOW, DiscMoments, moments_by_sums
@@ -25,6 +25,9 @@ MAX_LOW = 0.3
 MAX_FLOOR = 0.85  # higher, the noise of the plateau makes the outline
 MIN_RAMP = 0.2  # least high - low, fraction of the contrast
 MIN_SIGMAS = 6.0  # least contrast in terms of the noise
+HOLE = 1.05  # times the light of a ring, with its middle filled; noise has less
+FULLY = 250  # of 255, the crest of a ring
+WIDE_EDGE = 4.5  # px; sharp discs have 2 to 3
 MARGIN = 5  # px around a box: the foot of the rim and some background
 ALIKE = 2  # times the smallest of a stack, at most, is its largest box
 
@@ -102,9 +105,16 @@ def _measured(
     flat = cv2.convertScaleAbs(scaled.reshape(-1, light.shape[2]))
     soft = np.asarray(flat, np.uint8).reshape(light.shape)
     regions = _regions(soft, frames, boxes)
-    inner = cv2.erode(flat, BESIDE)
+    inner = np.asarray(cv2.erode(flat, BESIDE)).reshape(soft.shape) == 255
+    are_rings = np.zeros(len(boxes), dtype=bool)
+    for k, (region, _, _) in regions.items():
+        middle = region.grown(-region.size // 4, image.shape)
+        middle = middle.moved(-frames[k].left, -frames[k].top)
+        if middle.of(soft[k]).min(initial=255) < FULLY:
+            are_rings[k] = _fill(soft[k])
+    inner[are_rings] = False  # shows no shading
     layers = np.empty((4, *soft.shape), np.float32)
-    layers[0], layers[1] = soft, np.asarray(inner).reshape(soft.shape) == 255
+    layers[0], layers[1] = soft, inner
     np.multiply(light, layers[1], out=layers[2])
     light -= _of_each(background)
     np.minimum(layers[0], 1, out=layers[3])
@@ -119,36 +129,39 @@ def _measured(
     enough = moments.are_enough & (plateau - background >= MIN_SIGMAS * noise)
     enough &= floor <= background + MAX_FLOOR * contrast
     are_even &= are_whole
+    # The outline of a ring that is as bright all round needs no fit of its rim.
+    are_clear = (are_even & (moments.edge_width < WIDE_EDGE)) | (
+        are_rings & are_whole & are_balanced
+    )
     found: list[Disc | None] = [None] * len(boxes)
-    columns = (np.stack(moments, axis=1), levels, low, are_whole, are_even)
-    of_each = zip(*(each.tolist() for each in (*columns, are_balanced)), strict=True)
-    for k, (row, of_window, cut, whole, even, balanced) in enumerate(of_each):
+    columns = (np.stack(moments, axis=1), levels, low, are_whole, are_even, are_clear)
+    of_each = zip(*(column.tolist() for column in columns), strict=True)
+    for k, (row, of_window, cut, is_whole, is_even, is_clear) in enumerate(of_each):
         if not enough[k]:
             continue
-        region, *others = regions[k]
+        region, contour, others = regions[k]
         sides = zip(region, frames[k], (0, 0, *image.shape[::-1]), strict=True)
         reached = [there == end for here, there, end in sides if here == there]
-        disc = Disc(
+        needs_rim = not is_clear and not reached
+        corner = frames[k].left, frames[k].top - k * light.shape[1]
+        found[k] = Disc(
             *(DiscMoments(*row), Levels(*of_window), cut, region),
-            is_whole=whole and not reached,
-            is_even=even and not reached,
-            is_balanced=balanced,
+            is_whole=is_whole and not reached,
+            is_even=is_even and not reached,
             leaves_image=any(reached),
             leaves_window=not all(reached),
-            others=tuple(others),
+            others=others,
+            rim=rim_start(contour, corner) if needs_rim else None,
         )
-        if not reached:
-            disc = with_start(disc, soft[k], frames[k], float(ramp[k]), noise)
-        found[k] = disc
     return found
 
 
 def _regions(
     soft: Image, frames: Sequence[PixelBox], boxes: Sequence[PixelBox]
-) -> dict[int, list[PixelBox]]:
-    """Return the regions of windows, first those that the boxes were drawn around.
+) -> dict[int, tuple[PixelBox, MatLike, tuple[PixelBox, ...]]]:
+    """Return the regions that boxes were drawn around, with contours in the stack.
 
-    The others vanish from ``soft``; they are returned if they are in the box.
+    Others vanish from ``soft``, and are the third if they are in the box.
     """
     height, width = soft.shape[1:]
     found: dict[int, list[tuple[PixelBox, MatLike]]] = {}
@@ -158,20 +171,33 @@ def _regions(
     for contour in contours:
         x, y, right, down = cv2.boundingRect(contour)
         k, y = divmod(y, height)
+        x, y = x + frames[k].left, y + frames[k].top
         region = PixelBox(x, y, x + right, y + down)
-        region = region.moved(frames[k].left, frames[k].top)
         found.setdefault(k, []).append((region, contour))
     regions = {}
     for k, here in found.items():
-        (first, contour), *others = sorted(here, key=lambda r: -r[0].overlap(boxes[k]))
-        if others:
+        if len(here) > 1:
+            here.sort(key=lambda region: -region[0].overlap(boxes[k]))
             alone: Image = np.zeros_like(soft[k])
             at = (0, -k * height)
-            cv2.drawContours(alone, [contour], 0, 255, cv2.FILLED, offset=at)
+            cv2.drawContours(alone, [here[0][1]], 0, 255, cv2.FILLED, offset=at)
             soft[k] &= alone
-        boxed = (o for o, _ in others if boxes[k].holds_center_of(o))
-        regions[k] = [first, *(other for other in boxed if other.size >= MIN_SIZE)]
+        boxed = (other for other, _ in here[1:] if boxes[k].holds_center_of(other))
+        others = tuple(other for other in boxed if other.size >= MIN_SIZE)
+        regions[k] = (*here[0], others)
     return regions
+
+
+def _fill(soft: Image) -> bool:
+    """Fill the dark middle of a ring in a window; return whether there was one."""
+    _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
+    contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)
+    filled = cv2.max(soft, crest)
+    if filled.sum() < HOLE * soft.sum():
+        return False
+    soft[:] = filled
+    return True
 
 
 def _of_each(values: FloatArray) -> Reals:

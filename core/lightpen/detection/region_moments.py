@@ -8,12 +8,9 @@ from collections.abc import Mapping
 from math import pi
 from typing import Any, NamedTuple, TypeAlias
 
-import cv2
 import numpy as np
-from cv2.typing import MatLike
 
 from lightpen.detection.edge_fit import EdgeFit
-from lightpen.detection.pixel_box import PixelBox
 
 # Narrower than this samples the rim too coarsely: 20 to 80 % doubles the error.
 LOW = 0.1
@@ -115,18 +112,6 @@ def moments_of_rim(rim: EdgeFit) -> DiscMoments:
     x, y = rim.center.tolist()
     edge_width = GAUSSIAN_RISE * rim.sigma
     return DiscMoments(area, x, y, var_x, cov_xy, var_y, 1.0, 0.0, edge_width)
-
-
-def moments_of_region(
-    soft: MatLike, frame: PixelBox, ramp: float
-) -> DiscMoments | None:
-    """Return the moments of a soft-thresholded region; None if small or narrow."""
-    sums = cv2.moments(soft)
-    if sums["m00"] < 255.0:
-        return None
-    squares = cv2.norm(soft, cv2.NORM_L2SQR)
-    found = moments_by_sums(sums, squares, frame.left, frame.top, ramp)
-    return found if found.are_enough else None
 
 
 def moments_by_sums(
