@@ -13,7 +13,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.following import follow_spots
-from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.hypotheses import MAX_SHIFT
 from lightpen.detection.labelling.labels import (
     Labels,
@@ -170,12 +169,6 @@ def detect_pen(
             followed = _followed(spots, camera, pen, before, there)
             if followed is not None:
                 return followed
-            labels = track_spots(
-                spots, camera, pen, before.rotation, before.translation
-            )
-            if np.count_nonzero(labels.whole) >= certain_leds(pen):
-                detection = detections_of([spots], [labels], camera)[0]
-                return _fitted(detection, camera, pen)
         seen = None if before is None else before.spots
         spots = detect_spots(image, mask, full_scale=full_scale, before=seen)
         labels = _label(spots, camera, pen, before)

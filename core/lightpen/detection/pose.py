@@ -71,13 +71,13 @@ class Poses:
 
     def of(self, chosen: IntArray) -> "Poses":
         """Return the poses of some images."""
-        return Poses(
-            self.rotations[chosen],
-            self.translations[chosen],
-            self.covariances[chosen],
-            self.residuals[chosen],
-            self.weights[chosen],
-            self.sigma,
+        return replace(
+            self,
+            rotations=self.rotations[chosen],
+            translations=self.translations[chosen],
+            covariances=self.covariances[chosen],
+            residuals=self.residuals[chosen],
+            weights=self.weights[chosen],
         )
 
 

@@ -100,17 +100,9 @@ class Spots:
     @classmethod
     def none(cls) -> Self:
         """Return the spots of an image without any."""
-        nothing = np.zeros(0)
-        return cls(
-            centers=np.zeros((0, 2)),
-            shapes=np.zeros((0, 2, 2)),
-            areas=nothing,
-            contrasts=nothing,
-            edge_widths=nothing,
-            flaws=np.zeros(0, dtype=np.int64),
-            sigmas=nothing,
-            offsets=np.zeros((0, 2)),
-        )
+        values, places, shapes = np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2))
+        flaws = np.zeros(0, dtype=np.int64)
+        return cls(places, shapes, values, values, values, flaws, values, places)
 
     def __len__(self) -> int:
         return len(self.centers)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, permutations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -64,38 +63,10 @@ def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation
     return _constellation(leds, normals, pen.diameter, min(certain, pen.n_leds))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def _constellation(
-    leds: bytes, normals: bytes, diameter: float, min_leds: int
+    led_bytes: bytes, normal_bytes: bytes, diameter: float, min_leds: int
 ) -> Constellation:
-    pattern = _pattern(leds, normals)
-    kept = pattern.n_laid >= min_leds
-    return Constellation(
-        leds=pattern.leds,
-        normals=pattern.normals,
-        radius=diameter / 2,
-        min_leds=min_leds,
-        triples=pattern.triples,
-        sides=pattern.sides,
-        self_rotations=pattern.self_rotations[kept],
-        self_translations=pattern.self_translations[kept],
-    )
-
-
-class _Pattern(NamedTuple):
-    """Pattern of a pen, independent of its discs and of the LEDs needed."""
-
-    leds: FloatArray
-    normals: FloatArray
-    triples: IntArray
-    sides: FloatArray
-    self_rotations: FloatArray
-    self_translations: FloatArray
-    n_laid: IntArray  # (M,), LEDs that each motion lays onto LEDs
-
-
-@lru_cache(maxsize=16)
-def _pattern(led_bytes: bytes, normal_bytes: bytes) -> _Pattern:
     leds, normals = (
         np.frombuffer(each).reshape(-1, 3) for each in (led_bytes, normal_bytes)
     )
@@ -105,8 +76,9 @@ def _pattern(led_bytes: bytes, normal_bytes: bytes) -> _Pattern:
     if not triangles.any():
         raise ValueError("`pen` must not have all its LEDs on one line.")
     triples, sides = triples[triangles], sides[triangles]
-    return _Pattern(
-        leds, normals, triples, sides, *_self_motions(leds, normals, triples, sides)
+    motions = _self_motions(leds, normals, triples, sides, min_leds)
+    return Constellation(
+        leds, normals, diameter / 2, min_leds, triples, sides, *motions
     )
 
 
@@ -125,9 +97,13 @@ def _heights(corners: FloatArray) -> FloatArray:
 
 
 def _self_motions(
-    leds: FloatArray, normals: FloatArray, triples: IntArray, sides: FloatArray
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return the motions, except identity, that map LEDs to LEDs."""
+    leds: FloatArray,
+    normals: FloatArray,
+    triples: IntArray,
+    sides: FloatArray,
+    min_leds: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the motions, except identity, that map enough LEDs to LEDs."""
     known = {tuple(triple) for triple in triples.tolist()}
     bases = np.array([t for t in combinations(range(len(leds)), 3) if t in known])
     heights = _heights(leds[bases])
@@ -148,10 +124,9 @@ def _self_motions(
     alike = np.einsum("mli,mli->ml", turned, normals[partner]) > ALIKE_NORMALS
     partner = np.where(alike, partner, -1)
     moving = (partner >= 0) & (partner != np.arange(len(leds)))
-    n_laid = (partner >= 0).sum(axis=1)
-    enough = (n_laid >= min(FEWEST_LEDS, len(leds))) & moving.any(axis=1)
+    enough = ((partner >= 0).sum(axis=1) >= min_leds) & moving.any(axis=1)
     first: dict[tuple[int, ...], int] = {}
     for which in np.flatnonzero(enough).tolist():
         first.setdefault(tuple(partner[which].tolist()), which)
     kept = np.array(list(first.values()), dtype=np.int64)
-    return R[kept], t[kept], n_laid[kept]
+    return R[kept], t[kept]

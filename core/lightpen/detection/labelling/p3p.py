@@ -63,7 +63,7 @@ def _ranges(rays: FloatArray, points: FloatArray) -> tuple[IntArray, FloatArray]
     # The pencil of [1], eq. 12, over a23.
     first = np.stack([one, -b12, zero, 1 - a12, a12 * b23, -a12])
     second = np.stack([one, zero, -b13, -a13, a13 * b23, 1 - a13])
-    c0, c3 = _determinant(first), _determinant(second)
+    c0, c3 = (_inner(_adjoint(s), s) / 3 for s in (first, second))  # determinants
     # A symmetric triangle can make one of the two degenerate: the root is then at
     # infinity, unless they change places.
     swap = np.abs(c0) > np.abs(c3)
@@ -201,15 +201,6 @@ def _adjoint(s: FloatArray) -> FloatArray:
             s01 * s02 - s00 * s12,
             s00 * s11 - s01 * s01,
         ]
-    )
-
-
-def _determinant(s: FloatArray) -> FloatArray:
-    s00, s01, s02, s11, s12, s22 = s
-    return np.asarray(
-        s00 * (s11 * s22 - s12 * s12)
-        - s01 * (s01 * s22 - s02 * s12)
-        + s02 * (s01 * s12 - s02 * s11)
     )
 
 
