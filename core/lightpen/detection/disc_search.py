@@ -42,7 +42,7 @@ MAX_DIAMETER = 0.5  # of the shorter side of the image
 
 MIN_ROUNDNESS = 0.85  # half a disc has 0.95, a square 0.955, two touching discs 0.89
 MAX_AXIS_RATIO = 4.0
-MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
+MIN_RELATIVE_CONTRAST = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,20 +245,17 @@ def _measured(
             if disc is not None:
                 seen.add(disc.box)
                 more += [each for each in disc.others if each.size < box.size]
-            if disc is not None and _stands_out(scene, disc):
-                found.append(disc)
-            elif scene.hides_light(box, level):
+                height = disc.levels.plateau - scene.background
+                # Less contrast is the texture of something bright.
+                if disc.levels.contrast > MIN_RELATIVE_CONTRAST * height:
+                    found.append(disc)
+                    continue
+            if scene.hides_light(box, level):
                 hidden.append(box)
         # Two regions that each lead to the other would loop for ever.
         boxes = [box for box in dict.fromkeys(more) if box not in seen]
         seen |= set(boxes)
     return found, hidden
-
-
-def _stands_out(scene: Survey, disc: Disc) -> bool:
-    """Return whether a disc is more than the texture of something bright."""
-    height = disc.levels.plateau - scene.background
-    return bool(disc.levels.contrast > MIN_RELATIVE_CONTRAST * height)
 
 
 def _resembles_disc(disc: Disc) -> bool:

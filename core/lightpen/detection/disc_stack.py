@@ -208,9 +208,10 @@ def _sums(layers: Reals) -> list[dict[str, FloatArray]]:
     """Return the sums over windows (4, N, H, W), (N,); of the first central moments."""
     height, width = layers.shape[2:]
     middle = width // 2  # from where powers stay small
-    x, y = _powers(width, middle), _powers(height, middle).T
+    rows = (layers.reshape(-1, width) @ _powers(width, middle)).reshape(-1, height, 4)
+    m = (_powers(height, middle).T @ rows).astype(np.float64)
     # Places are the power of y, and of x.
-    m = np.moveaxis((y @ (layers @ x)).astype(np.float64), (2, 3), (0, 1))
+    m = m.reshape(*layers.shape[:2], 4, 4).transpose(2, 3, 0, 1)
     m00 = np.maximum(m[0, 0], 1.0)
     m10, m01 = m[0, 1] + middle * m00, m[1, 0] + middle * m00
     sums = [
@@ -224,10 +225,10 @@ def _sums(layers: Reals) -> list[dict[str, FloatArray]]:
         "mu20": m20 - u * u * area,
         "mu11": m11 - u * v * area,
         "mu02": m02 - v * v * area,
-        "mu30": m[0, 3] - 3 * u * m20 + 2 * u**3 * area,
+        "mu30": m[0, 3] - 3 * u * m20 + 2 * u * u * u * area,
         "mu21": m[1, 2] - 2 * u * m11 - v * m20 + 2 * u * u * v * area,
         "mu12": m[2, 1] - 2 * v * m11 - u * m02 + 2 * v * v * u * area,
-        "mu03": m[3, 0] - 3 * v * m02 + 2 * v**3 * area,
+        "mu03": m[3, 0] - 3 * v * m02 + 2 * v * v * v * area,
     }
     return sums
 

@@ -152,12 +152,12 @@ def _skewness(
     m: Mapping[str, Value], var_x: Value, cov_xy: Value, determinant: Value
 ) -> Value:
     """Norm of the third moments after whitening, the root of Mardia's skewness."""
-    slope = cov_xy / var_x
-    sx = np.sqrt(var_x)
-    sy = np.sqrt(determinant / var_x)
+    slope, vx, vy = cov_xy / var_x, var_x, determinant / var_x
     m30, m21, m12, m03 = (m[k] / m["m00"] for k in ("mu30", "mu21", "mu12", "mu03"))
-    w30 = m30 / sx**3
-    w21 = (m21 - slope * m30) / (sx**2 * sy)
-    w12 = (m12 - 2 * slope * m21 + slope**2 * m30) / (sx * sy**2)
-    w03 = (m03 - 3 * slope * m12 + 3 * slope**2 * m21 - slope**3 * m30) / sy**3
-    return np.sqrt(w30**2 + 3 * (w21**2 + w12**2) + w03**2)
+    # Of x, and of y less slope times x, which does not vary with x.
+    n21 = m21 - slope * m30
+    n12 = m12 - slope * (m21 + n21)
+    n03 = m03 - slope * (2 * m12 + n12 - slope * m21)
+    squares = m30 * m30 / (vx * vx) + 3 * n21 * n21 / (vx * vy)
+    squares = squares + 3 * n12 * n12 / (vy * vy)
+    return np.sqrt(squares / vx + n03 * n03 / (vy * vy * vy))

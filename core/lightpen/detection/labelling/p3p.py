@@ -142,18 +142,19 @@ def _simple_root(
 
 def _split(conic: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the two planes (3, H) of a degenerate cone, nan where they are complex."""
+    each = np.arange(conic.shape[1])
     adjoint = _adjoint(conic)
     diagonal = adjoint[[0, 3, 5]]
     strongest = np.argmin(diagonal, axis=0)
-    columns = adjoint[PLACES[strongest].T, _each(conic)]
-    x, y, z = columns / np.sqrt(-diagonal[strongest, _each(conic)])
+    columns = adjoint[PLACES[strongest].T, each]
+    x, y, z = columns / np.sqrt(-diagonal[strongest, each])
     s00, s01, s02, s11, s12, s22 = conic
     product = np.stack(
         [s00, s01 - z, s02 + y, s01 + z, s11, s12 - x, s02 - y, s12 + x, s22]
     )
     row, column = np.divmod(np.argmax(np.abs(product), axis=0), 3)
-    rows = product[3 * row + np.arange(3)[:, None], _each(conic)]
-    columns = product[column + 3 * np.arange(3)[:, None], _each(conic)]
+    rows = product[3 * row + np.arange(3)[:, None], each]
+    columns = product[column + 3 * np.arange(3)[:, None], each]
     return rows, columns
 
 
@@ -184,10 +185,6 @@ def _cut(planes: FloatArray, cones: FloatArray) -> FloatArray:
     directions[np.tile(j, 2), both] = s
     directions[np.tile(k, 2), both] = np.tile(f, 2) + np.tile(g, 2) * s
     return directions
-
-
-def _each(matrices: FloatArray) -> IntArray:
-    return np.arange(matrices.shape[1])
 
 
 def _adjoint(s: FloatArray) -> FloatArray:
