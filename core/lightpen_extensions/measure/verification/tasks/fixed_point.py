@@ -391,7 +391,7 @@ FIXED_POINT = VerificationTask(
     hand=lambda options, run, step: HandGoal(
         tilt=TILT, direction=2 * pi * step / options.n_touches
     ),
-    n_points=lambda options: options.n_touches,
+    n_points=lambda options, run: options.n_touches,
     n_frames=lambda options: options.n_frames,
     instruction=lambda options, progress: message("session.touch-cone"),
     screen=_screen,

@@ -365,17 +365,9 @@ def _bands(found: Part, conditions: Conditions) -> tuple[Band, ...]:
     )
 
 
-def _fraction(options: PartOptions, progress: TaskProgress) -> float:
-    planned = planned_at(options, len(progress.runs))
-    if planned is None:
-        return 0.0
-    return min(len(progress.points) / planned.n_touches, 1.0)
-
-
-def _count(options: PartOptions, progress: TaskProgress) -> Message:
-    planned = planned_at(options, len(progress.runs))
-    needed = 0 if planned is None else planned.n_touches
-    return message("task.points", n_points=len(progress.points), needed=needed)
+def _n_points(options: PartOptions, run: int) -> int:
+    planned = planned_at(options, run)
+    return 0 if planned is None else planned.n_touches
 
 
 def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
@@ -427,10 +419,8 @@ PART = VerificationTask(
     bands=_bands,
     judges_points=False,
     hand=hand_goal,
-    n_points=lambda options: 1,
+    n_points=_n_points,
     n_runs=lambda options: max(len(course(options)), 1),
-    fraction=_fraction,
-    count=_count,
     instruction=_instruction,
     newness=lambda options: (ANY, NEW_PLACE),
     scans=_scans,

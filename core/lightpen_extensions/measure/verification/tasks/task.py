@@ -172,14 +172,12 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     instruction: Callable[[OptionsT, TaskProgress], Message]
     # Turn, rad, or distance, mm, that makes a point new; both 0 once lifted
     newness: Callable[[OptionsT], tuple[float, float]]
-    n_points: Callable[[OptionsT], int]  # of a run
+    n_points: Callable[[OptionsT, int], int]  # of a run, from 0
     # Images of a point; None for as many as are chosen for all tasks
     n_frames: Callable[[OptionsT], int | None] = lambda _: None
     options: type[OptionsT]
     other_run: Message | None = None  # what to do for the first point of another
     n_runs: Callable[[OptionsT], int] = lambda _: 1
-    fraction: Callable[[OptionsT, TaskProgress], float] | None = None
-    count: Callable[[OptionsT, TaskProgress], Message] | None = None
     screen: Callable[[OptionsT, Conditions, TaskProgress], Screening] = (
         lambda options, conditions, progress: keep_all(len(progress.points))
     )
@@ -209,21 +207,14 @@ class VerificationTask(Generic[OptionsT, FoundT]):
 
     def done(self, options: OptionsT, progress: TaskProgress) -> float:
         """Return the completed fraction of the current run, 0 to 1."""
-        if self.fraction is not None:
-            return self.fraction(options, progress)
-        return min(len(progress.points) / self.n_points(options), 1.0)
+        needed = self.n_points(options, len(progress.runs))
+        return min(len(progress.points) / needed, 1.0) if needed else 0.0
 
     def counted(self, options: OptionsT, progress: TaskProgress) -> Message:
         """Return the progress of the current task: probed points and points in all."""
-        count = (
-            message(
-                "task.points",
-                n_points=len(progress.points),
-                needed=self.n_points(options),
-            )
-            if self.count is None
-            else self.count(options, progress)
-        )
+        n_points, run = len(progress.points), len(progress.runs)
+        needed = self.n_points(options, run)
+        count = message("task.points", n_points=n_points, needed=needed)
         if progress.n_runs == 1:
             return count
         return message(
