@@ -24,7 +24,7 @@ from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
 from lightpen.live.sources import SourceEnvironment
-from lightpen.logs import end_log, write_log_to
+from lightpen.logs import end_log, log_file, write_log_to
 from lightpen.messages import printable
 from lightpen.record.library.signing.keys import KEYS
 from lightpen_app.crash import CrashHook, versions
@@ -35,6 +35,7 @@ from lightpen_app.look.sounds import MutedSounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.shell.sidebar import subject_of
+from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.wizard_pages import make_pages, page_titles
 from lightpen_app.work.garbage import GarbageCollector
 from lightpen_app.work.job import Job
@@ -110,6 +111,7 @@ class Wizard(QObject):
             model.changed.connect(self._show_subject)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
+        self.window.log_requested.connect(self._open_log)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
 
     def show(self) -> None:
@@ -143,6 +145,10 @@ class Wizard(QObject):
             notices.notify("other-windows", words, Tone.WARN)
         else:
             notices.withdraw("other-windows")
+
+    def _open_log(self) -> None:
+        folder = log_file(self.workbench.folder).parent
+        self.workbench.notifications.show_status(open_folder(folder))
 
     def _on_preferences_changed(self, preferences: Preferences) -> None:
         before, self._preferences = self._preferences, preferences

@@ -150,7 +150,7 @@ def test_a_recorded_swing_gives_its_tip(
     # A solver that knows the images' model comes as near as 3.1 um.
     assert np.linalg.norm(tip - true_tip) <= 0.004
     walker.click("Accept")
-    walker.until_says("IN USE")
+    walker.until_says("ACCEPTED")
     assert walker.says("RECORDED")
     result = result_on_disk(walker)
     assert result.origin is Origin.RECORDED

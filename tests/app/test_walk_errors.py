@@ -82,13 +82,24 @@ def n_kept(walker: "Walker") -> int:
 
 
 @pytest.mark.slow
-def test_about_tells_the_versions_and_licences(prepared: "Walker") -> None:
+def test_about_tells_the_versions_and_licences_and_opens_the_log(
+    prepared: "Walker", monkeypatch: pytest.MonkeyPatch
+) -> None:
     reported: list[str] = []
+    opened: list[Path] = []
+    place = "lightpen_app.application.open_folder"
+
+    def note(folder: Path) -> str:
+        opened.append(folder)
+        return ""
+
+    monkeypatch.setattr(place, note)
 
     def read_and_close() -> None:
         about = QApplication.activeModalWidget()
         if about is not None and about.isActiveWindow():
             reported.extend(prepared.texts(about))
+            prepared.click_on(prepared.control("Open the log", about))
             prepared.press(Key.Key_Escape)
 
     timer = QTimer(prepared.window, interval=20)
@@ -100,6 +111,7 @@ def test_about_tells_the_versions_and_licences(prepared: "Walker") -> None:
 
     for part in ("PySide6 ", "Qt, PySide6 and psycopg: LGPL 3", "FFmpeg", "Noto Sans"):
         assert any(part in text for text in reported), part
+    assert opened == [prepared.workbench.folder / "logs"]
 
 
 # Anything else

@@ -100,7 +100,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
         walker.click("Review")
     walker.until(walker.main_button().isEnabled)
     walker.click("Accept")
-    walker.until_says("IN USE")
+    walker.until_says("ACCEPTED")
 
     result = walker.workbench.run.status.result
     assert result is not None

@@ -51,7 +51,7 @@ _SHORTS: dict[Code, str] = {
     Code.TIP_ELSEWHERE: QT_TRANSLATE_NOOP("phrases", "Tip not in place"),
     Code.IMAGES_READ: QT_TRANSLATE_NOOP("phrases", "Loading"),
     Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Paused"),
-    Code.SOLVING: QT_TRANSLATE_NOOP("phrases", "Capture complete"),
+    Code.SOLVING: QT_TRANSLATE_NOOP("phrases", "Capture ended"),
     Code.TOO_FEW_IMAGES: QT_TRANSLATE_NOOP("phrases", "More images"),
     Code.TOO_LITTLE_TILT: QT_TRANSLATE_NOOP("phrases", "Tilt further"),
     Code.NOT_UPRIGHT: QT_TRANSLATE_NOOP("phrases", "Hold it upright"),
@@ -288,7 +288,7 @@ def origin_text(origin: Origin | None) -> str:
 def accepted_phrase(origin: Origin | None) -> Instruction:
     """Return the text on an accepted tip."""
     if origin is not Origin.SIMULATED:
-        return Instruction(_translated(QT_TRANSLATE_NOOP("phrases", "IN USE")))
+        return Instruction(_translated(QT_TRANSLATE_NOOP("phrases", "ACCEPTED")))
     return Instruction(
         _translated(QT_TRANSLATE_NOOP("phrases", "PRACTICE SAVED")),
         _translated(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 
 from lightpen_app.look.layouts import vertical_layout
@@ -12,6 +12,8 @@ from lightpen_app.widgets.fitted_window import FittedWindow
 
 class About(FittedWindow, QDialog):
     """Names, versions and licences; the text can be copied into a report."""
+
+    log_requested = Signal()  # open the folder of the log
 
     def __init__(
         self, versions: Mapping[str, str], parent: QWidget | None = None
@@ -43,6 +45,8 @@ class About(FittedWindow, QDialog):
                 | Qt.TextInteractionFlag.TextSelectableByKeyboard
             )
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        role = QDialogButtonBox.ButtonRole.ActionRole
+        log = buttons.addButton(self.tr("Open the log"), role)
 
         # Layout
         parts = (heading, purpose, self._versions, licences, buttons)
@@ -50,3 +54,4 @@ class About(FittedWindow, QDialog):
 
         # Connections
         buttons.rejected.connect(self.reject)
+        log.clicked.connect(self.log_requested)

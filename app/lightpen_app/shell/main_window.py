@@ -72,6 +72,7 @@ class MainWindow(ResponsiveLayout, QMainWindow):
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
     completed = Signal()  # the window was painted, and all pages are made
     preferences_changed = Signal(object)  # Preferences: the user chose otherwise
+    log_requested = Signal()  # open the folder of the log
     # Whether anybody may be looking at live images now.
     attention_changed = Signal(bool)
     # Pages are shut down; receivers shut down shared objects and wait for them.
@@ -596,7 +597,9 @@ class MainWindow(ResponsiveLayout, QMainWindow):
         self._notifications.notify(OPTIONS, words.format(folder), Tone.ACTIVE)
 
     def _on_about_chosen(self) -> None:
-        About(versions(), self).exec()
+        about = About(versions(), self)
+        about.log_requested.connect(self.log_requested)
+        about.exec()
 
     def _confirmed(self, question: str) -> bool:
         box = QMessageBox(self)

@@ -15,6 +15,10 @@
         <source>Lightpen: MIT licence. Qt, PySide6 and psycopg: LGPL 3. FFmpeg, which some installations of OpenCV contain: LGPL 2.1. Fonts: cut from Noto Sans and Noto Sans CJK, SIL Open Font License 1.1.</source>
         <translation>Lightpen：MIT 许可证。Qt、PySide6 和 psycopg：LGPL 3。FFmpeg（部分 OpenCV 安装包含）：LGPL 2.1。字体：取自 Noto Sans 和 Noto Sans CJK，SIL 开放字体许可证 1.1。</translation>
     </message>
+    <message>
+        <source>Open the log</source>
+        <translation>打开日志</translation>
+    </message>
 </context>
 <context>
     <name>ActionBar</name>
@@ -1161,6 +1165,10 @@
     <message>
         <source>Entry type</source>
         <translation>类型</translation>
+    </message>
+    <message>
+        <source>any day</source>
+        <translation>任意日期</translation>
     </message>
     <message>
         <source>All</source>
@@ -3771,6 +3779,10 @@ needed</source>
     <message>
         <source>Calibration report...</source>
         <translation>标定报告...</translation>
+    </message>
+    <message>
+        <source>Other formats</source>
+        <translation>其他格式</translation>
     </message>
     <message>
         <source>Copy tip</source>
@@ -10616,6 +10628,10 @@ needed</source>
         <translation>竖直握住</translation>
     </message>
     <message>
+        <source>Capture ended</source>
+        <translation>采集结束</translation>
+    </message>
+    <message>
         <source>File does not fit</source>
         <translation>文件不符</translation>
     </message>
@@ -10706,10 +10722,6 @@ needed</source>
     <message>
         <source>Loading</source>
         <translation>载入中</translation>
-    </message>
-    <message>
-        <source>Capture complete</source>
-        <translation>采集完毕</translation>
     </message>
     <message>
         <source>Tilt further</source>
@@ -10936,8 +10948,8 @@ needed</source>
         <translation>朝向自己偏右</translation>
     </message>
     <message>
-        <source>IN USE</source>
-        <translation>已启用</translation>
+        <source>ACCEPTED</source>
+        <translation>已接受</translation>
     </message>
     <message>
         <source>PRACTICE SAVED</source>

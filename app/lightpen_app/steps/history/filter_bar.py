@@ -102,6 +102,8 @@ class FilterBar(Translated, QWidget):
         for label, field, text in zip(self._labels, self._fields, words, strict=True):
             label.setText(text)
             field.setAccessibleName(text)
+        for day in (self._begin, self._end):
+            day.setPlaceholderText(self.tr("any day"))
         for choice in self._choices:
             choice.setItemText(0, self.tr("All"))
         for i, kind in enumerate(Kind, start=1):

@@ -37,19 +37,25 @@ class ResultTools(Translated, QWidget):
 
     def __init__(self, formats: Sequence[ExportFormat] = ()) -> None:
         super().__init__()
-        single = (Export((each,)) for each in (*TABLE_FORMATS, *formats))
+        single = [Export((each,)) for each in (*TABLE_FORMATS, *formats)]
 
         # Widgets
         self._copy = PushButton()
         self._save = PushButton()
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
-        self._actions = [
-            (export, menu.addAction("")) for export in (ALL, *single, PLOTS)
+        menu.setToolTipsVisible(True)
+        self._report = menu.addAction("")
+        usual = [each for each in single if each.formats[0].name == "csv"]
+        others = [each for each in single if each not in usual]
+        self._actions = [(export, menu.addAction("")) for export in (*usual, ALL)]
+        self._others = menu.addMenu("")
+        self._others.setToolTipsVisible(True)
+        self._actions += [
+            (export, self._others.addAction("")) for export in (*others, PLOTS)
         ]
         menu.addSeparator()
-        menu.setToolTipsVisible(True)
-        self._report, self._folder = menu.addAction(""), menu.addAction("")
+        self._folder = menu.addAction("")
         self._save.setMenu(menu)
         self._press = PushButton()
 
@@ -91,6 +97,7 @@ class ResultTools(Translated, QWidget):
     def _retranslate(self) -> None:
         self._press.setText(self.tr("Press test"))
         self._report.setText(self.tr("Calibration report..."))
+        self._others.setTitle(self.tr("Other formats"))
         self._folder.setText(self.tr("Open folder"))
         set_tooltip(self._folder, self.tr("Open the folder of the swing"))
         self._copy.setText(self.tr("Copy tip"))

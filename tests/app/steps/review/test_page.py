@@ -704,7 +704,7 @@ def test_a_tip_to_be_checked_is_accepted_with_a_reason_and_stays_amber(
     assert result.change is not None
     assert result.change.difference_mm[0] == pytest.approx(0.42)
     state = banner(page)
-    assert (state.word, state.tone) == ("IN USE", Tone.WARN)
+    assert (state.word, state.tone) == ("ACCEPTED", Tone.WARN)
     assert "New ball mounted." in state.detail
     assert page.is_doubtful()
 
@@ -873,8 +873,9 @@ def test_the_folder_of_the_swing_is_opened(
 
 def choose(page: ReviewPage, what: str) -> None:
     """Choose from the menu of the button that saves."""
-    (menu,) = button(page, "Save...").findChildren(QMenu)
-    (action,) = [each for each in menu.actions() if each.text() == what]
+    menus = button(page, "Save...").findChildren(QMenu)
+    actions = [each for menu in menus for each in menu.actions()]
+    (action,) = [each for each in actions if each.text() == what]
     action.trigger()
 
 
@@ -917,8 +918,11 @@ def test_all_formats_are_offered_and_a_certificate_asks_for_the_laboratory(
 ) -> None:
     workbench = bed.solve()
     page = bed.show()
-    (menu,) = button(page, "Save...").findChildren(QMenu)
-    actions = {action.text(): action for action in menu.actions()}
+    menus = button(page, "Save...").findChildren(QMenu)
+    actions = {each.text(): each for menu in menus for each in menu.actions()}
+    first = [each.text() for each in menus[0].actions() if each.text()]
+    assert first[0] == "Calibration report..."
+    assert first[3:] == ["Other formats", "Open folder"]
     assert {f"{each.label}..." for each in FORMATS} <= set(actions)
 
     actions["Digital Calibration Certificate (XML)..."].trigger()
@@ -1404,7 +1408,7 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     assert result is not None
     np.testing.assert_array_equal(result.tip_pen, tip(workbench))
     state = banner(page)
-    assert state.word == "IN USE"
+    assert state.word == "ACCEPTED"
     assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M}" in state.detail
     assert page.is_complete()
     assert page.unsaved() == ""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog
 
 from lightpen.model.origin import Origin
 from lightpen.swing.image_sources import SourceChoice
@@ -119,6 +119,8 @@ def test_a_station_is_set_up_by_pen_and_tip_and_simulates_nothing(
     assert (names.pen, names.tip, names.cone) == ("", "", "C-1")
     assert names.station != "Trial"
     assert not walker.tells("SIMULATED")
+    boxes = [box.text() for box in walker.window.findChildren(QCheckBox)]
+    assert "As in the LED file" in boxes  # without numbers of another pen
     walker.type("LP-9")
     walker.enter("Probe tip", "T-9")
     walker.press(Qt.Key.Key_Return)

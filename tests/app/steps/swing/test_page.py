@@ -350,7 +350,7 @@ def test_no_key_is_needed_from_the_seat_to_the_verdict(at_verdict: Desk) -> None
             "Starts in 3",
             "Tilt RIGHT",
         ),
-        *("Capture complete",),
+        *("Capture ended",),
     ):
         assert desk.has_reported(instruction), instruction
     verdict = desk.run.status.verdict
