@@ -151,10 +151,8 @@ def fit_pose(
         )
         R = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
         t = np.asarray(moved, dtype=np.float64).reshape(3)
-    start = R[None], t[None]
-    return fit_poses(
-        camera, pen, pixels[None], *start, sigmas=sigmas[None], is_near=True
-    )
+    one = pixels[None], R[None], t[None]
+    return fit_poses(camera, pen, *one, sigmas=sigmas[None], is_near=True)
 
 
 def relative_sigmas(sigmas: FloatArray) -> FloatArray | None:

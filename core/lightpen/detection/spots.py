@@ -270,11 +270,13 @@ def _as_spots(
     larger = moments.area > (median(whole) if whole else 0.0)
     smaller = moments.area <= (median(whole) if whole else np.inf)
     unwhole = ~are_whole & ~leave
-    flaws = SpotFlaw.MERGED * ((heights > MERGED_LEVEL) | (unwhole & larger))
-    flaws |= SpotFlaw.CUT * (leave | (unwhole & smaller))
-    flaws |= SpotFlaw.SATURATED * (levels[:, 2] >= SATURATED_LEVEL * full_scale)
-    flaws |= SpotFlaw.BLURRED * (moments.edge_width > BLURRED_EDGE)
-    flaws |= SpotFlaw.DIM * (contrasts < DIM_SIGMAS * noise)
+    have_flaws = (  # in the order of `SpotFlaw`
+        (heights > MERGED_LEVEL) | (unwhole & larger),
+        leave | (unwhole & smaller),
+        levels[:, 2] >= SATURATED_LEVEL * full_scale,
+        moments.edge_width > BLURRED_EDGE,
+        contrasts < DIM_SIGMAS * noise,
+    )
     centers = np.stack([moments.x, moments.y], axis=1)
     regions = centers.copy()
     for i, disc in enumerate(discs):
@@ -287,7 +289,7 @@ def _as_spots(
         areas=moments.area,
         contrasts=contrasts / full_scale,
         edge_widths=moments.edge_width,
-        flaws=flaws,
+        flaws=np.array([*SpotFlaw]) @ np.stack(have_flaws),
         sigmas=np.full(len(discs), EXACT_SIGMA),
         offsets=regions - centers,
         has_smears=has_smears,
