@@ -24,7 +24,7 @@ from lightpen_extensions.measure.verification.session.choices import Verificatio
 from lightpen_extensions.measure.verification.session.session_state import (
     SessionSetup,
     SessionState,
-    numbered,
+    numbered_runs,
     without_touches,
 )
 from lightpen_extensions.measure.verification.tasks.part import PART
@@ -215,7 +215,7 @@ def _with_run(setup: SessionSetup, state: SessionState, task: AnyTask) -> Sessio
     options = setup.choices.options_of(task)
     if len(runs) >= task.n_runs(options):
         return _done(setup, state, task, runs)
-    (task.check or task.measure)(numbered(runs), setup.conditions, options)
+    (task.check or task.measure)(numbered_runs(runs), setup.conditions, options)
     return replace(without_touches(state), runs=runs)
 
 
@@ -224,5 +224,5 @@ def _done(
 ) -> SessionState:
     """Measure a task."""
     options = setup.choices.options_of(task)
-    found = task.measure(numbered(runs), setup.conditions, options)
+    found = task.measure(numbered_runs(runs), setup.conditions, options)
     return replace(without_touches(state), runs=(), done=task, found=found)

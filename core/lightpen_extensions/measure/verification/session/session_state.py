@@ -156,13 +156,13 @@ def _bands_of(
     """Return the values of some runs; none as long as they do not determine any."""
     conditions = Conditions(instrument, limits, ball_diameter)
     try:
-        found = task.measure(numbered(runs), conditions, options)
+        found = task.measure(numbered_runs(runs), conditions, options)
     except CalibrationError:
         return ()
     return tuple(task.bands(found, conditions))
 
 
-def numbered(runs: Sequence[Points]) -> Runs:
+def numbered_runs(runs: Sequence[Points]) -> Runs:
     """Return runs with their names."""
     return [(f"#{i}", points) for i, points in enumerate(runs, start=1)]
 

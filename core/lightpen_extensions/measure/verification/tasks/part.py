@@ -253,7 +253,9 @@ def _judged_size(results: Sequence[CharacteristicResult]) -> VerificationAssessm
             "artefact.off", name=words, error=error, uncertainty=u, limit=limit
         )
         return refused(off, CHECK_FILES)
-    least = max(results, key=lambda each: each.value.uncertainty / each.margin)
+    # Form by noisy points is an upper bound: it says nothing against a size.
+    sizes = [e for e in results if e.planned.quantity in QUANTITIES] or results
+    least = max(sizes, key=lambda each: each.value.uncertainty / each.margin)
     if least.value.uncertainty > least.margin:
         reason = message(
             "artefact.uncertain",

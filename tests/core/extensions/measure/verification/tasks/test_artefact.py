@@ -118,6 +118,20 @@ def test_a_certificate_that_is_less_certain_than_the_limit_proves_nothing(
     assert found.assessment.grade is Grade.CHECK
 
 
+def test_noise_of_the_form_does_not_put_a_proven_size_in_doubt(
+    instrument: Instrument, touching: Touching, ring: Callable[..., FloatArray]
+) -> None:
+    points = touching(ring())  # of single images
+    first = measured(RING, Conditions(instrument), points).part.results
+    (form,) = (e.value for e in first if e.planned.certified == 0.0)
+    assert form.value < form.uncertainty
+    narrow = VerificationLimits(form=(form.value + form.uncertainty) / 2)
+
+    found = measured(RING, Conditions(instrument, narrow), points)
+
+    assert found.assessment.grade is Grade.SCALE
+
+
 def test_no_artefact_says_that_a_wrong_tip_passes(
     instrument: Instrument, touching: Touching, ring: Callable[..., FloatArray]
 ) -> None:
