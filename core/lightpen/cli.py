@@ -50,6 +50,7 @@ NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # Advice for the command line, by the message codes of the core.
 ADVICE = {
     "pen-file.no-units": "Name them so: --units mm.",
+    "poses.several-tools": "Name it so: --tool NAME.",
     "pen-file.contradicting-units": "It is given by --units.",
     "pen.too-large": "Name them so: --units um.",
     "pen.too-small": "Name them so: --units m.",

@@ -162,6 +162,7 @@ FOREIGN = (
     (r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):", "Halcon", _BY_IMAGES),
     (r"#\s*polynomial coefficients for the DIRECT", "OCamCalib", _BY_IMAGES),
     (r"<document[^>]*>\s*<chunk", "Metashape", _OF_PROJECT),
+    (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
     (r"\AMATLAB 5\.0 MAT-file", "MATLAB (.mat)", _AS_TEXT),
     (r"\A(\x89HDF|.{512}\x89HDF)", "HDF5 (.mat, .h5)", _AS_TEXT),
     (r"\A(\x93NUMPY|PK\x03\x04.{26,40}\.npy)", "numpy", _AS_TEXT),

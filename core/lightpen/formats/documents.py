@@ -177,9 +177,10 @@ def _yaml_document(events: Iterator[Any], name: str) -> Tree:
     tree: Tree = None
     for event in events:
         if isinstance(event, yaml.DocumentStartEvent):
-            if tree is not None:
+            found = _yaml_node(next(events), events, 0, name)
+            if tree is not None and found:
                 raise FileError("yaml.several-documents", name=name)
-            tree = _yaml_node(next(events), events, 0, name)
+            tree = tree or found
     return tree
 
 

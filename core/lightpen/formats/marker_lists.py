@@ -5,6 +5,7 @@ as mappings with x y z, position and normal; in a mapping, each point has its ow
 """
 
 import io
+import re
 import zipfile
 from typing import NamedTuple
 
@@ -21,7 +22,8 @@ LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
 LISTS = (
     ("marker_positions", "m"),  # rpg_monocular_pose_estimator
     ("TrackedObject/ModelPoints", ""),  # Rift
-    ("lighthouse_config/modelPoints", ""),  # Vive
+    ("lighthouse_config/modelPoints", "m"),  # Vive
+    *(("ModelPoints", ""), ("modelPoints", "m")),
     *((name, "") for name in ("markers", "MarkerPositions", "points", "leds")),
     *((f"{body}/markers", "") for body in ("RigidBody", "rigid_body", "asset", "tool")),
 )
@@ -30,6 +32,11 @@ _NORMALS = ("normal", "direction", "dir")
 _AXES = ("x", "y", "z")
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")  # xlsx and ods; xls
 _ROM = b"NDI\x00"
+_FOREIGN = (  # how files begin that cannot be read
+    (rb"\s*<", "XML (Motive, Vicon)"),
+    (rb"\s*Format Version,", "Motive (CSV)"),
+    (rb"\s*\[\w+\]\s*\n\s*\w+\s*=", "INI (Atracsys)"),
+)
 
 
 class Markers(NamedTuple):
@@ -45,10 +52,13 @@ def is_workbook(data: bytes) -> bool:
     return data.startswith(_WORKBOOKS)
 
 
-def refuse_rom(data: bytes, name: str) -> None:
-    """Refuse a tool definition file of NDI, by name."""
+def refuse_foreign_list(data: bytes, name: str) -> None:
+    """Refuse the file of a program whose points cannot be read, by name."""
     if data.startswith(_ROM):
         raise FileError("pen-file.rom", name=name)
+    for start, program in _FOREIGN:
+        if re.match(start, data.removeprefix(b"\xef\xbb\xbf")):
+            raise FileError("pen-file.foreign", name=name, program=program)
 
 
 def workbook_text(data: bytes, name: str) -> str:

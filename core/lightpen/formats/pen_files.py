@@ -56,7 +56,7 @@ from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text, writ
 from lightpen.formats.marker_lists import (
     is_workbook,
     markers_of,
-    refuse_rom,
+    refuse_foreign_list,
     workbook_text,
 )
 from lightpen.formats.pen_content import (
@@ -189,7 +189,7 @@ def _read(path: Path, units: str | None) -> PenContent:
             "pen-file.unknown-unit", unit=quoted(units), known=", ".join(UNITS)
         )
     data, name = read_bytes(path, PEN_FILE, PEN_FILE_LIMIT), printable(path.name)
-    refuse_rom(data, name)
+    refuse_foreign_list(data, name)
     if is_workbook(data):
         return from_table(parse_table(workbook_text(data, name), name), units)
     text = read_text(path, PEN_FILE, PEN_FILE_LIMIT)

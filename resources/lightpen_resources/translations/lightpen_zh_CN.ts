@@ -6857,6 +6857,10 @@ needed</source>
         <translation>{name} 的数值类型为 {value_type}；需要 8 或 16 位灰度值。请不经转换保存图像。</translation>
     </message>
     <message>
+        <source>{name} has {count} distortion coefficients with k4 of Metashape, a thin prism or a tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again without these terms.</source>
+        <translation>{name} 有 {count} 个畸变系数，含 Metashape 的 k4、薄棱镜或倾斜传感器项；支持 4、5 或 8 个。请不用这些项重新标定相机。</translation>
+    </message>
+    <message>
         <source>{name} has {count} parameters of the model {model}, which has {names}. Export the file again.</source>
         <translation>{name} 有模型 {model} 的 {count} 个参数，该模型的参数为 {names}。请重新导出文件。</translation>
     </message>
@@ -6883,6 +6887,10 @@ needed</source>
     <message>
         <source>{name} is a camera of {program} with the lens model {model}, which cannot be read. {remedy}</source>
         <translation>{name} 是 {program} 的相机，镜头模型为 {model}，无法读取。{remedy}</translation>
+    </message>
+    <message>
+        <source>{name} is a file of the kind {program}, whose markers cannot be read. Write them as a table: led,x_mm,y_mm,z_mm.</source>
+        <translation>{name} 是 {program} 类文件，其标志点无法读取。请将其写成表格：led,x_mm,y_mm,z_mm。</translation>
     </message>
     <message>
         <source>{name} is a tool definition of NDI, whose coordinates cannot be read. Write the markers that 6D Architect shows as a table: led,x_mm,y_mm,z_mm.</source>
@@ -7495,10 +7503,6 @@ needed</source>
     <message>
         <source>{name} has {counted}; 4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 k6). Export the file again.</source>
         <translation>{name} 有 {counted}；需要 4、5 或 8 个 (k1 k2 p1 p2 k3 k4 k5 k6)。请重新导出文件。</translation>
-    </message>
-    <message>
-        <source>{name} has {count} distortion coefficients with a thin prism or a tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again without these terms.</source>
-        <translation>{name} 有 {count} 个畸变系数，含薄棱镜或倾斜传感器项；支持 4、5 或 8 个。请不用这些项重新标定相机。</translation>
     </message>
     <message>
         <source>{name} has {first} and {second}, which mean the same. Keep the right one.</source>

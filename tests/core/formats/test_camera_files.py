@@ -870,3 +870,24 @@ def test_more_numbers_than_any_matrix_has_are_refused(tmp_path: Path) -> None:
     xml += "<image_width>2</image_width><image_height>2</image_height></a>"
 
     assert "20000 numbers; at most 10000" in refusal(tmp_path, xml)
+
+
+def test_a_camera_info_that_was_echoed_ends_with_an_empty_document(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "camera_info.yaml"
+    path.write_text(
+        "height: 720\nwidth: 1280\ndistortion_model: plumb_bob\n"
+        "d: [-0.08, 0.1, 0.0001, -0.0002, 0.01]\n"
+        "k: [900.0, 0.0, 635.5, 0.0, 900.0, 352.25, 0.0, 0.0, 1.0]\n---\n"
+    )
+
+    assert read_camera(path).intrinsics[:4].tolist() == [900.0, 900.0, 635.5, 352.25]
+
+
+def test_the_results_of_the_toolbox_of_bouguet_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "Calib_Results.m"
+    path.write_text("fc = [ 900 ; 900 ];\ncc = [ 635 ; 352 ];\nkc = [ 0 ; 0 ];\n")
+
+    with pytest.raises(FileError, match=r"Bouguet.*jsonencode"):
+        read_camera(path)

@@ -256,3 +256,21 @@ def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
 
     with pytest.raises(FileError, match=r"8700339\.rom is a tool definition of NDI"):
         read_pen(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "program"),
+    [
+        ("<?xml version='1.0'?>\n<RigidBodies><Marker X='1'/></RigidBodies>", "XML"),
+        ("Format Version,1.23,Length Units,Millimeters\n\n,,Marker\n", "Motive"),
+        ("[geometry]\ncount=4\nid=5\n[fiducial0]\nx=1\n", "Atracsys"),
+    ],
+)
+def test_lists_that_cannot_be_read_are_named(
+    text: str, program: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "leds.txt"
+    path.write_text(text)
+
+    with pytest.raises(FileError, match=rf"{program}.*led,x_mm,y_mm,z_mm"):
+        read_pen(path)
