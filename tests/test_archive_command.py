@@ -12,7 +12,6 @@ import pytest
 from tests.core.archive.conftest import accepted
 
 from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.logbook.lazy_logbook import SERVER
 from lightpen.archive.logbook.logbook import Logbook
 from lightpen.archive.store.database import open_file
 from lightpen.commands.supervisor import PASSWORD
@@ -21,6 +20,7 @@ from lightpen.record.library.entered_files import ARCHIVE, entered_files
 from lightpen.record.library.signing.keys import key_folder
 from lightpen.record.library.supervision import Signature, read_supervision
 from lightpen.record.library.supervision_changes import set_password
+from lightpen_extensions.plant.address import SERVER
 
 Run = Callable[..., CompletedProcess[str]]
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from lightpen.archive.logbook.lazy_logbook import SERVER
 from lightpen.cli import _parser
+from lightpen_extensions.plant.address import SERVER
 from lightpen_program import EXTENSIONS
 
 _, COMMANDS = _parser([], None, EXTENSIONS)

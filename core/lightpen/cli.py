@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Collection, Sequence
 from contextlib import suppress
+from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
@@ -169,7 +170,12 @@ def _parser(
         "archive, 2 wrong usage or unreadable input; with --exit-by-verdict 3 REPEAT "
         "and 4 CHECK.",
     )
-    parser.set_defaults(verbose=False, log_level=None, log_folder=None)
+    parser.set_defaults(
+        verbose=False,
+        log_level=None,
+        log_folder=None,
+        replicate=next((e.replicate for e in extensions if e.replicate), None),
+    )
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
 
@@ -188,7 +194,11 @@ def _parser(
             each.add_options(command)
     data_folder = usual_data_folder if desktop is None else desktop.data_folder
     for name, help_text, add_options in (
-        ("archive", "check, list, export and import entries", add_archive),
+        (
+            "archive",
+            "check, list, export and import entries",
+            partial(add_archive, extensions=extensions),
+        ),
         ("tips", "manage the library of pens, tips and cones", add_tips),
     ):
         command = added(name, help_text)

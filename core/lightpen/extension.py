@@ -1,8 +1,14 @@
 """What an extension adds to the program."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, _SubParsersAction
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from lightpen.archive.logbook.logbook import Replicate
+
+SubParsers: TypeAlias = "_SubParsersAction[ArgumentParser]"
 
 
 @dataclass(frozen=True)
@@ -21,3 +27,6 @@ class Extension:
 
     key: str
     commands: tuple[Subcommand, ...] = ()
+    # Adds actions to ``lightpen archive``, and options to its action ``check``.
+    add_archive_actions: Callable[[SubParsers, ArgumentParser], None] | None = None
+    replicate: "Replicate | None" = None  # delivers entries to a server

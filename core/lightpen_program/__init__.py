@@ -9,6 +9,7 @@ from lightpen_extensions.boards.extension import BOARDS
 from lightpen_extensions.discover.extension import DISCOVER
 from lightpen_extensions.exports.extension import EXPORTS
 from lightpen_extensions.measure.extension import MEASURE
+from lightpen_extensions.plant.extension import PLANT
 from lightpen_extensions.simulator.extension import SIMULATOR
 from lightpen_extensions.stream.extension import STREAM
 
@@ -18,6 +19,7 @@ EXTENSIONS: tuple[Extension, ...] = (
     DISCOVER,
     BOARDS,
     EXPORTS,
+    PLANT,
     STREAM,
 )
 

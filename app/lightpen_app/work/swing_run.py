@@ -1,15 +1,13 @@
 """The runner of a swing as a Qt object with signals."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook, server_address
-from lightpen.errors import FileError
+from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.swing.capture.state import SwingEvent
 from lightpen.swing.runner import SwingRunner
@@ -39,10 +37,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
     ) -> None:
         super().__init__(SwingStatus(), notifications, parent)
         self._folder = folder
-        address = ""
-        with suppress(FileError):  # `Settings.fault` reports it
-            address = server_address()
-        self.logbook = LazyLogbook(folder, address)  # any thread may use it
+        self.logbook = LazyLogbook(folder)  # any thread may use it
         self.archive = FolderArchive(folder)
         self.follower: GuidedOperator | None = None  # leads a simulated hand
         self.runner = SwingRunner(

@@ -1,11 +1,13 @@
 """``lightpen archive``: check, list, deliver, fetch and export entries."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import platformdirs
 
 from lightpen.commands.arguments import DataFolder, add_data, whole_number
+from lightpen.extension import Extension
 
 USUAL_LENGTH = 50  # entries that are listed
 
@@ -15,7 +17,11 @@ def usual_data_folder() -> Path:
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
-def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
+def add_archive(
+    parser: argparse.ArgumentParser,
+    data_folder: DataFolder,
+    extensions: Sequence[Extension] = (),
+) -> None:
     """Add ``lightpen archive``."""
     parser.set_defaults(run=_run)
     actions = parser.add_subparsers(required=True, metavar="ACTION", dest="action")
@@ -24,26 +30,10 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     )
     listed = actions.add_parser("list", help="print the newest entries")
     export = actions.add_parser("export", help="export all entries to a file")
-    delivered = actions.add_parser(
-        "deliver", help="deliver the entries to the server set by LIGHTPEN_ARCHIVE"
-    )
-    fetched = actions.add_parser(
-        "fetch", help="restore entries and files of this folder from the server"
-    )
-    actions.add_parser(
-        "server-sql", help="print the SQL that sets up a PostgreSQL server"
-    )
-    check.add_argument(
-        "--server",
-        action="store_true",
-        help="check the copy on the server set by LIGHTPEN_ARCHIVE, too",
-    )
-    fetched.add_argument(
-        "--chain",
-        default="",
-        metavar="NAME",
-        help="start of the chain to restore, where the server has several",
-    )
+    check.set_defaults(check_copy=None)
+    for each in extensions:
+        if each.add_archive_actions is not None:
+            each.add_archive_actions(actions, check)
     renewed = actions.add_parser(
         "new-key", help="introduce another station key, if the present one was lost"
     )
@@ -53,8 +43,9 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         help="supervisor who approves it, if the data folder has a supervisor "
         "password; the password is requested, or read from LIGHTPEN_PASSWORD",
     )
-    for action in (check, listed, export, delivered, fetched, renewed):
-        add_data(action, data_folder)
+    for name, action in actions.choices.items():
+        if name != "server-sql":
+            add_data(action, data_folder)
     export.add_argument("file", type=Path, metavar="FILE", help="entries (.jsonl)")
     for name in ("pen", "tip", "station"):
         listed.add_argument(

@@ -7,21 +7,15 @@ from pathlib import Path
 
 from lightpen.archive.chains.entries import SHORT
 from lightpen.archive.checks.check import check_file
+from lightpen.archive.history.entries_file import export_entries
 from lightpen.archive.history.history import Line, lines
 from lightpen.archive.history.listing import entries_csv
 from lightpen.archive.history.queries import EntryFilter, newest
-from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.replication.comparison import check_server
-from lightpen.archive.replication.exchange import deliver, export_entries
-from lightpen.archive.replication.fetching import fetch
-from lightpen.archive.replication.server import open_server
-from lightpen.archive.replication.server_setup import server_sql
-from lightpen.archive.store.database import Database, look_into, open_file
+from lightpen.archive.store.database import Database, look_into
 from lightpen.commands.arguments import data_of
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.supervisor import supervisor_signature
-from lightpen.errors import UsageError
 from lightpen.local_time import local_now, local_time
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.supervision_changes import renew_station_key
@@ -39,12 +33,10 @@ def _check(options: argparse.Namespace) -> int:
         with progress("Checking") as report:
             checked = check_file(data / ARCHIVE, data, report)
         findings, delivery = checked.findings, ""
-        if options.server:
-            with _looked_into(data) as database, _server() as server:
-                there = check_server(database, server)
-            findings += there.findings
-            delivery = f" On the server: {there.n_entries} entries"
-            delivery += f", {there.n_waiting} not delivered yet."
+        if options.check_copy is not None:  # of an extension
+            with _looked_into(data) as database:
+                found, delivery = options.check_copy(database)
+            findings += found
         for finding in findings:
             print(shown(str(finding)))
         for note in checked.notes:
@@ -77,30 +69,6 @@ def _export(options: argparse.Namespace) -> None:
 
 
 @printing
-def _deliver(options: argparse.Namespace) -> None:
-    with closing(Logbook(data_of(options))) as logbook, _server() as server:
-        for fault in logbook.enter_owed():
-            print(shown(str(fault)))
-        copied = deliver(logbook.database, logbook.chain, server)
-    print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
-
-
-@printing
-def _fetch(options: argparse.Namespace) -> None:
-    data = data_of(options)
-    with _opened(data) as database, _server() as server:
-        fetched = fetch(database, data, server, options.chain)
-    print(f"{fetched.n_entries} entries and {fetched.n_files} files were restored.")
-    for place in fetched.lost:
-        print(shown(f"Not on the server: {place}"))
-
-
-@printing
-def _server_sql(options: argparse.Namespace) -> None:
-    print(server_sql(), end="")
-
-
-@printing
 def _new_key(options: argparse.Namespace) -> None:
     data = data_of(options)
     with closing(Logbook(data)) as logbook:
@@ -115,10 +83,7 @@ ACTIONS: dict[str, Command] = {
     "check": _check,
     "list": _list,
     "export": _export,
-    "deliver": _deliver,
     "new-key": _new_key,
-    "fetch": _fetch,
-    "server-sql": _server_sql,
 }
 
 
@@ -126,24 +91,6 @@ ACTIONS: dict[str, Command] = {
 def _looked_into(data: Path) -> Iterator[Database]:
     with closing(look_into(data / ARCHIVE)) as database:
         yield database
-
-
-@contextmanager
-def _server() -> Iterator[Database]:
-    address = server_address()
-    if not address:
-        raise UsageError("archive.no-server", variable=SERVER)
-    with closing(open_server(address)) as server:
-        yield server
-
-
-@contextmanager
-def _opened(data: Path) -> Iterator[Database]:
-    database = open_file(data / ARCHIVE)
-    try:
-        yield database
-    finally:
-        database.close()
 
 
 def _line(line: Line) -> str:

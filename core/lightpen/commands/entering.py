@@ -104,11 +104,10 @@ def keep_record(
             _print_overdue(folder, names)
         return
     # Imported here: it takes 0.2 s.
-    from lightpen.archive.logbook.lazy_logbook import server_address
     from lightpen.archive.logbook.logbook import Logbook
 
     kept = keep_verification(data, record, is_simulated=is_simulated)
-    with closing(Logbook(data, server_address())) as logbook:
+    with closing(Logbook(data, options.replicate)) as logbook:
         for fault in logbook.enter_owed():
             print(shown(str(fault)))
     if not is_simulated:

@@ -16,7 +16,6 @@ from lightpen.archive.chains.entries import ChainHead, Kind, StoredEntry, chaine
 from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.history.history import messages_on
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.replication.server import open_server
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.local_time import local_now
 from lightpen.record.calibrations.calibrations import read_calibration
@@ -31,6 +30,7 @@ from lightpen.record.library.supervision import (
 from lightpen.record.library.supervision_changes import renew_station_key, set_password
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
+from lightpen_extensions.plant.server import open_server
 
 
 @pytest.fixture

@@ -18,11 +18,12 @@ from lightpen.archive.chains.chains import chain_names, entries_of, records_of
 from lightpen.archive.chains.entries import FileHash
 from lightpen.archive.chains.growth import append, copy_entries, own_chain
 from lightpen.archive.checks.check import check_file
-from lightpen.archive.replication.exchange import deliver, export_entries
-from lightpen.archive.replication.server import open_server
+from lightpen.archive.history.entries_file import export_entries
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import ArchiveError, NameTakenError
 from lightpen.record.library.entered_files import ARCHIVE
+from lightpen_extensions.plant.exchange import deliver
+from lightpen_extensions.plant.server import open_server
 
 
 def test_an_export_has_every_entry_with_its_record(

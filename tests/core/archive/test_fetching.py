@@ -14,9 +14,6 @@ from tests.core.archive.test_logbook import result
 from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.replication.exchange import deliver
-from lightpen.archive.replication.fetching import FetchResult, fetch
-from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import StationLimits
@@ -26,6 +23,9 @@ from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.library.tip_library import ListedCone, read_library
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen_extensions.plant.exchange import deliver
+from lightpen_extensions.plant.fetching import FetchResult, fetch
+from lightpen_extensions.plant.server import open_server
 
 
 @pytest.fixture

@@ -10,9 +10,10 @@ from tests.core.archive.conftest import Station
 
 from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.checks.check import check_archive
-from lightpen.archive.replication.exchange import deliver, export_entries
-from lightpen.archive.replication.fetching import fetch
+from lightpen.archive.history.entries_file import export_entries
 from lightpen.errors import ArchiveError
+from lightpen_extensions.plant.exchange import deliver
+from lightpen_extensions.plant.fetching import fetch
 
 MOVE = text(
     "UPDATE archive_entries SET number = number + 1"

@@ -12,10 +12,10 @@ from tests.core.archive.conftest import Station
 from lightpen.archive.chains.chains import entries_of
 from lightpen.archive.checks.check import check_archive
 from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
-from lightpen.archive.replication import replication
-from lightpen.archive.replication.exchange import deliver
-from lightpen.archive.replication.replication import Replicator
-from lightpen.archive.replication.server import open_server
+from lightpen_extensions.plant import replication
+from lightpen_extensions.plant.exchange import deliver
+from lightpen_extensions.plant.replication import Replicator
+from lightpen_extensions.plant.server import open_server
 
 PATIENCE_S = 60.0
 N_EACH = 30

@@ -12,10 +12,10 @@ from lightpen.archive.chains.chains import entries_of, records_of
 from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
 from lightpen.archive.chains.growth import copy_entries
 from lightpen.archive.checks.check import check_archive
-from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.tables import ENTRIES
 from lightpen.errors import ArchiveError
 from lightpen.record.library.signing.keys import key_folder, make_station_key
+from lightpen_extensions.plant.server import open_server
 
 
 def head_of(station: Station) -> ChainHead:

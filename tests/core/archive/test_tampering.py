@@ -21,10 +21,6 @@ from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
 from lightpen.archive.chains.rows import columns_of
 from lightpen.archive.checks.check import check_file
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.replication.comparison import check_server
-from lightpen.archive.replication.exchange import deliver
-from lightpen.archive.replication.fetching import fetch
-from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import look_into, open_file
 from lightpen.errors import ArchiveError, FileError
 from lightpen.model.limits import StationLimits
@@ -34,6 +30,10 @@ from lightpen.record.library.supervision import Signature
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen.record.library.tip_library import ListedCone
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen_extensions.plant.comparison import check_server
+from lightpen_extensions.plant.exchange import deliver
+from lightpen_extensions.plant.fetching import fetch
+from lightpen_extensions.plant.server import open_server
 
 N_RESULTS, N_ENTRIES = 3, 6  # with a cone, a password and limits
 SWING = f"{RECORDS}/swing"

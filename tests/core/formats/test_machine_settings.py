@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from lightpen import __version__
-from lightpen.archive.logbook.lazy_logbook import SERVER, server_address
 from lightpen.errors import FileError
 from lightpen.formats.machine_settings import (
     MachineSettings,
@@ -16,6 +15,7 @@ from lightpen.formats.machine_settings import (
     read_update,
 )
 from lightpen.model.laboratory import Laboratory
+from lightpen_extensions.plant.address import SERVER, server_address
 
 ADDRESS = "postgresql://archive.plant/lightpen"
 

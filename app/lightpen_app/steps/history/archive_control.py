@@ -8,8 +8,8 @@ from typing import TypeVar
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
+from lightpen.archive.history.entries_file import export_entries
 from lightpen.archive.history.listing import save_entries
-from lightpen.archive.replication.exchange import export_entries
 from lightpen_app.steps.history.archive_panel import ArchivePanel, SaveFormat
 from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.widgets.save_dialog import ask_file

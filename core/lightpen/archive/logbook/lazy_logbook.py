@@ -1,6 +1,5 @@
 """A logbook that is opened at the first entry."""
 
-import os
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -8,27 +7,19 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from lightpen.archive.store.uses import closed
-from lightpen.formats.machine_settings import machine_settings
 from lightpen.messages import Message
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.solving import Solution
 
 if TYPE_CHECKING:
-    from lightpen.archive.logbook.logbook import Logbook
-
-SERVER = "LIGHTPEN_ARCHIVE"  # names the variable with the address of a server
-
-
-def server_address() -> str:
-    """Return the server address by environment variable or machine settings."""
-    return os.environ.get(SERVER, "") or machine_settings().archive_server
+    from lightpen.archive.logbook.logbook import Logbook, Replicate
 
 
 class LazyLogbook:
     """Logbook that is opened at its first use, so that the program starts sooner."""
 
-    def __init__(self, data: Path, server: str = "") -> None:
-        self._data, self._server = data, server
+    def __init__(self, data: Path, replicate: "Replicate | None" = None) -> None:
+        self._data, self._replicate = data, replicate
         self._lock = Lock()
         self._opened: Logbook | None = None
         self._is_closed = False
@@ -39,6 +30,10 @@ class LazyLogbook:
         logbook = cls(Path())
         logbook._is_closed = True
         return logbook
+
+    def replicate_by(self, replicate: "Replicate") -> None:
+        """Have entries replicated, if it is not open yet."""
+        self._replicate = replicate
 
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None
@@ -82,5 +77,5 @@ class LazyLogbook:
                 # Imported here: it takes 0.25 s.
                 from lightpen.archive.logbook.logbook import Logbook
 
-                self._opened = Logbook(self._data, self._server)
+                self._opened = Logbook(self._data, self._replicate)
             return self._opened

@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from threading import Lock
+from typing import Protocol, TypeAlias
 
 from msgspec import structs
 
@@ -31,7 +32,6 @@ from lightpen.archive.events.event_extraction import (
     event_of_unreadable,
 )
 from lightpen.archive.events.station_events import event_of_station, is_station_file
-from lightpen.archive.replication.replication import Replicator
 from lightpen.archive.store.database import Database, open_file
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.formats.files import FOLDER, sha256, unreadable
@@ -61,14 +61,31 @@ class ReplicationState:
     fault: Message | None  # of the last attempt
 
 
+class Replication(Protocol):
+    """What delivers the entries to a server, as soon as it answers."""
+
+    n_delivered: int | None  # None until the server answered first
+    fault: Message | None  # why the last attempt failed
+
+    def wake(self) -> None:
+        """Deliver soon."""
+
+    def close(self, timeout_s: float) -> None:
+        """Finish the current transfer, within a time limit, and end."""
+
+
+Replicate: TypeAlias = Callable[[Database, str], Replication | None]
+"""Begins to deliver a chain of an archive; None where there is no server."""
+
+
 class Logbook:
     """Enters the events of a data folder in its archive; thread-safe.
 
     Several programs may have one of the same folder, which need not exist. All is
-    delivered to the server at an address, if there is one, as soon as it answers.
+    delivered to a server, if ``replicate`` finds one.
     """
 
-    def __init__(self, data: Path, server: str = "") -> None:
+    def __init__(self, data: Path, replicate: Replicate | None = None) -> None:
         self._data = data
         self._results = FolderArchive(data)
         self._lock = Lock()
@@ -79,9 +96,9 @@ class Logbook:
             self.database.close()
             raise
         self._renew_lost_key()
-        self._replicator: Replicator | None = None
-        if server:
-            self._replicator = Replicator(self.database, self.chain, server)
+        self._replicator: Replication | None = None
+        if replicate is not None:
+            self._replicator = replicate(self.database, self.chain)
 
     def enter_owed(
         self, report: Callable[[float], None] = lambda fraction: None

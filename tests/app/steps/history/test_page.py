@@ -84,6 +84,7 @@ from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.plant.replication import Replicator
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
@@ -319,7 +320,9 @@ def test_a_server_that_cannot_be_reached_is_reported_without_the_password(
 ) -> None:
     folder = desk.workbench.folder
     away = "postgresql://plant:secret-word@127.0.0.1:1/plant"
-    desk.workbench.run.logbook = LazyLogbook(folder, away)
+    desk.workbench.run.logbook = LazyLogbook(
+        folder, lambda database, chain: Replicator(database, chain, away)
+    )
     desk.enter(1)
     desk.open()
     desk.show_tab(WHOLE)

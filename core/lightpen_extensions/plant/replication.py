@@ -11,11 +11,11 @@ serve, and a line that is kept may be dead without either end knowing.
 from contextlib import closing
 from threading import Event, Thread
 
-from lightpen.archive.replication.exchange import deliver
-from lightpen.archive.replication.server import open_server
 from lightpen.archive.store.database import Database
 from lightpen.errors import ArchiveError
 from lightpen.messages import Message
+from lightpen_extensions.plant.exchange import deliver
+from lightpen_extensions.plant.server import open_server
 
 AGAIN_S = 30.0  # after a server did not answer
 LOOK_S = 300.0  # interval of looking for entries of other programs
@@ -24,7 +24,7 @@ LOOK_S = 300.0  # interval of looking for entries of other programs
 class Replicator:
     """Replicates the chain of a data folder to a server in its own thread.
 
-    For the address see `lightpen.archive.replication.server.open_server`. The server
+    For the address see `lightpen_extensions.plant.server.open_server`. The server
     has ``n_delivered`` entries, None until it answered first; the fault is why the
     last attempt failed.
     """

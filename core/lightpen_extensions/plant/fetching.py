@@ -19,12 +19,12 @@ from lightpen.archive.chains.chains import (
 )
 from lightpen.archive.chains.entries import SHORT, StoredEntry
 from lightpen.archive.chains.growth import copy_entries
-from lightpen.archive.replication.comparison import first_difference
 from lightpen.archive.store.database import Database
 from lightpen.errors import ArchiveError, NameTakenError
 from lightpen.formats.files import create_whole
 from lightpen.messages import message
 from lightpen.record.library.numbered_files import make_folder, reserve_number
+from lightpen_extensions.plant.comparison import first_difference
 
 _UNSAFE = {"..", "."}
 

@@ -1,7 +1,4 @@
-"""Delivery of entries to a server, and their export to a file.
-
-Entries are delivered in their order, and what is there already is passed over: a
-delivery that was cut off is simply made again.
+"""All entries of an archive in a file.
 
 An exported archive is text. Its first line names the format, and each of the others
 holds one entry with its record, but for the last: it says how many entries there are,
@@ -11,48 +8,15 @@ and the checksum of all lines before it.
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from lightpen.archive.chains.chains import (
-    batch_of,
-    chain_head,
-    chain_names,
-    entries_of,
-    records_of,
-)
-from lightpen.archive.chains.growth import copy_entries
-from lightpen.archive.replication.comparison import require_same
+from lightpen.archive.chains.chains import chain_names, entries_of, records_of
 from lightpen.archive.store.database import Database
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.system_reasons import strerror
 
 FORMAT = 1
-DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
-
-
-@dataclass(frozen=True)
-class Delivery:
-    """Numbers of entries that a server got now, and had before."""
-
-    n_new: int
-    n_known: int
-
-
-def deliver(database: Database, chain: str, server: Database) -> Delivery:
-    """Copy the entries of a chain that a server lacks.
-
-    Raises `ArchiveError` if it does not answer, is ahead of this chain, or holds other
-    entries of it.
-    """
-    require_same(database, chain, server)
-    known = last = chain_head(server, chain).number
-    n_new = 0
-    while batch := batch_of(database, chain, last)[:DELIVERED]:
-        n_new += copy_entries(server, chain, batch, records_of(database, batch))
-        last = batch[-1].entry.number
-    return Delivery(n_new, known)
 
 
 def export_entries(database: Database, path: Path) -> int:

@@ -1,0 +1,1 @@
+"""The server of a plant in the window."""

@@ -1,1 +1,0 @@
-"""Copies of chains on a server and in other archives."""

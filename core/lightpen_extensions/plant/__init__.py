@@ -1,0 +1,1 @@
+"""The server of a plant: entries delivered, compared and fetched."""
