@@ -13,6 +13,11 @@ from lightpen_resources import SOURCE_LANGUAGE, TRANSLATIONS, languages
 
 # Each language is named in itself, for users who cannot read the others.
 OWN_NAME = str(QT_TRANSLATE_NOOP("language", "English"))
+# Of Qt's file dialog, which its own Chinese translation lacks.
+_OF_QT = (
+    QT_TRANSLATE_NOOP("QFileDialog", "&Look in:"),
+    QT_TRANSLATE_NOOP("QFileDialog", "Files of &type:"),
+)
 
 
 def own_name(language: str) -> str:

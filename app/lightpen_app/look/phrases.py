@@ -10,14 +10,14 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.messages import COMMA, Message
+from lightpen.messages import Message
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture
 from lightpen.swing.capture.state import Pause, Phase
 from lightpen.swing.preparation import MissingInput
 from lightpen.swing_messages import MOST_SIDES, SIDES, Code
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 
 CONTEXT = "phrases"
@@ -305,8 +305,7 @@ def _by_own_sides(message: Message, heading: float) -> Message:
     assert isinstance(sides, tuple)
     turned = round(heading / (2 * math.pi / N_DIRECTIONS))
     own = sorted((SIDES.index(side) - turned) % N_DIRECTIONS for side in sides)
-    comma = worded(COMMA)
-    words = comma.join(_translated(_SIDES[side]) for side in own)
+    words = listed(_translated(_SIDES[side]) for side in own)
     return replace(message, values={**message.values, "sides": words})
 
 

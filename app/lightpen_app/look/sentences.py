@@ -1,9 +1,11 @@
 """Messages of the core in the selected language."""
 
+from collections.abc import Iterable
+
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.formats.stored_messages import StoredMessage
-from lightpen.messages import Message
+from lightpen.messages import COMMA, Message
 
 CONTEXT = "core"
 
@@ -13,6 +15,11 @@ def worded(message: Message | StoredMessage | None) -> str:
     if isinstance(message, StoredMessage):
         return message.worded(translated)
     return "" if message is None else message.text(translated)
+
+
+def listed(words: Iterable[str]) -> str:
+    """Return words with the comma of the language between them."""
+    return worded(COMMA).join(words)
 
 
 def translated(template: str) -> str:

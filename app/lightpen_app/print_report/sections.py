@@ -17,7 +17,7 @@ from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind
 from lightpen_app.look.phrases import grade_text, origin_text
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.print_report.blocks import (
     MM,
@@ -207,7 +207,7 @@ def laboratory_blocks(laboratory: Laboratory | None) -> Iterable[Block]:
     yield from facts(
         [
             (translate("paper", "Laboratory"), stated(known.name)),
-            (translate("paper", "Place"), stated(", ".join(filter(None, place)))),
+            (translate("paper", "Place"), stated(listed(filter(None, place)))),
             (translate("paper", "Procedure"), stated(known.procedure)),
         ],
         n_columns=1,
@@ -312,7 +312,7 @@ def _status(calibration_file: CalibrationFile) -> str:
         return translate("paper", "practice")
     if calibration_file.due is None:
         return stated("")
-    return ", ".join(status_words(calibration_file)) or translate("paper", "valid")
+    return listed(status_words(calibration_file)) or translate("paper", "valid")
 
 
 def status_words(calibration_file: CalibrationFile) -> tuple[str, ...]:

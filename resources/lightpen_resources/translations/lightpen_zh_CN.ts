@@ -3580,6 +3580,17 @@ needed</source>
     </message>
 </context>
 <context>
+    <name>QFileDialog</name>
+    <message>
+        <source>&amp;Look in:</source>
+        <translation>查看(&amp;L)：</translation>
+    </message>
+    <message>
+        <source>Files of &amp;type:</source>
+        <translation>文件类型(&amp;T)：</translation>
+    </message>
+</context>
+<context>
     <name>ReasonBar</name>
     <message>
         <source>The tip was replaced or refitted.</source>
@@ -10561,15 +10572,15 @@ needed</source>
     </message>
     <message>
         <source>Away and right</source>
-        <translation>远离自己偏右</translation>
+        <translation>向右前方倾斜</translation>
     </message>
     <message>
         <source>Tilt away</source>
-        <translation>远离自己倾斜</translation>
+        <translation>向前倾斜</translation>
     </message>
     <message>
         <source>Away and left</source>
-        <translation>远离自己偏左</translation>
+        <translation>向左前方倾斜</translation>
     </message>
     <message>
         <source>Tilt left</source>
@@ -10577,15 +10588,15 @@ needed</source>
     </message>
     <message>
         <source>Towards you and left</source>
-        <translation>朝向自己偏左</translation>
+        <translation>向左后方倾斜</translation>
     </message>
     <message>
         <source>Tilt towards you</source>
-        <translation>朝向自己倾斜</translation>
+        <translation>向后倾斜</translation>
     </message>
     <message>
         <source>Towards you and right</source>
-        <translation>朝向自己偏右</translation>
+        <translation>向右后方倾斜</translation>
     </message>
     <message>
         <source>Keep the tip pressed into the cone.</source>
@@ -10937,19 +10948,19 @@ needed</source>
     </message>
     <message>
         <source>away and right</source>
-        <translation>远离自己偏右</translation>
+        <translation>右前方</translation>
     </message>
     <message>
         <source>away and left</source>
-        <translation>远离自己偏左</translation>
+        <translation>左前方</translation>
     </message>
     <message>
         <source>towards you and left</source>
-        <translation>朝向自己偏左</translation>
+        <translation>左后方</translation>
     </message>
     <message>
         <source>towards you and right</source>
-        <translation>朝向自己偏右</translation>
+        <translation>右后方</translation>
     </message>
     <message>
         <source>ACCEPTED</source>
@@ -10969,7 +10980,7 @@ needed</source>
     </message>
     <message>
         <source>away from you</source>
-        <translation>远离自己</translation>
+        <translation>前方</translation>
     </message>
     <message>
         <source>to the left</source>
@@ -10977,7 +10988,7 @@ needed</source>
     </message>
     <message>
         <source>towards you</source>
-        <translation>朝向自己</translation>
+        <translation>后方</translation>
     </message>
     <message>
         <source>Upright</source>

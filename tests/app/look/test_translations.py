@@ -12,7 +12,13 @@ from xml.etree import ElementTree
 import pytest
 from PySide6.QtCore import QCoreApplication
 from PySide6.QtGui import QFont, QRawFont
-from PySide6.QtWidgets import QAbstractButton, QApplication
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QFileDialog,
+    QLabel,
+    QPushButton,
+)
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.languages import LanguageSwitch, own_name
@@ -239,6 +245,12 @@ def test_texts_of_qt_itself_are_translated_too(qapp: QApplication) -> None:
     switch.set_language("zh_CN")
 
     assert QCoreApplication.translate("QPlatformTheme", "Cancel") == "\u53d6\u6d88"
+    dialog = QFileDialog()
+    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    shown = [label.text() for label in dialog.findChildren(QLabel)]
+    shown += [button.text() for button in dialog.findChildren(QPushButton)]
+    assert [text for text in shown if text and text.isascii()] == []
+    dialog.deleteLater()
 
 
 def missing_characters(text: str) -> set[str]:

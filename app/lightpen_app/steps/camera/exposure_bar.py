@@ -7,6 +7,7 @@ from typing_extensions import override
 
 from lightpen.detection.inspection import DARK_PEAK, Exposure
 from lightpen.detection.spots import SATURATED_LEVEL
+from lightpen_app.look.sentences import listed
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.look.tooltips import set_tooltip
@@ -60,7 +61,7 @@ class ExposureBar(Translated, QWidget):
         text = words.format(n_meant, len(value.peaks))
         if not meant or len(meant) == len(value.peaks):
             return text
-        named = ", ".join(map(str, meant[:MOST_NAMED]))
+        named = listed(map(str, meant[:MOST_NAMED]))
         more = "\u2026" if len(meant) > MOST_NAMED else ""
         return f"{text}: {named}{more}"
 

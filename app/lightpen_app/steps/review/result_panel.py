@@ -20,7 +20,7 @@ from lightpen.swing.status import SwingStatus
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, mm_text
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import day_text, shortened
@@ -261,7 +261,7 @@ class ResultPanel(Translated, QFrame):
             else self.tr("Odd and even images differ significantly: {0}")
         )
         parts = map("\xa0".join, zip(AXES, figures, strict=True))
-        text = text.format(", ".join(parts) + "\xa0mm")
+        text = text.format(listed(parts) + "\xa0mm")
         return StatusMessage.good(text) if agree else StatusMessage.warning(text)
 
     def _self_check_message(self, check: SelfCheck | None) -> StatusMessage:

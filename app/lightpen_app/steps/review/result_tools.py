@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen.record.exports.formats import TABLE_FORMATS, ExportFormat
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -105,7 +105,7 @@ class ResultTools(Translated, QWidget):
         for export, action in self._actions:
             action.setText(self._name(export) + "...")
             described = (worded(each.description) for each in export.formats)
-            set_tooltip(action, ", ".join(described))
+            set_tooltip(action, listed(described))
 
     def _name(self, export: Export) -> str:
         if export == ALL:
