@@ -19,7 +19,11 @@ from lightpen.model.rigid import (
     vector_from_rotation,
 )
 from lightpen_extensions.measure.measuring.features import AXIS, PLACE
-from lightpen_extensions.measure.measuring.quantities import Quantity, derive, stacked
+from lightpen_extensions.measure.measuring.quantities import (
+    Quantity,
+    derive,
+    stacked_quantities,
+)
 
 MIN_POINTS = 3
 DISAGREEING = 3.0  # times U of a datum point; form errors make some of it
@@ -114,7 +118,7 @@ def align_points(points: Sequence[Quantity], nominals: FloatArray) -> Alignment:
         R = nearest_rotation((nominals - there).T @ (here - middle))
         return _as_motion(R, there - R @ middle)
 
-    places = stacked(
+    places = stacked_quantities(
         [Quantity(point.values[PLACE], point.by_inputs[PLACE]) for point in points]
     )
     found = derive(motion, places)

@@ -71,7 +71,7 @@ def derive(
     return Quantity(values, by_inputs)
 
 
-def stacked(quantities: Sequence[Quantity]) -> Quantity:
+def stacked_quantities(quantities: Sequence[Quantity]) -> Quantity:
     """Return several quantities as one, in their order."""
     return Quantity(
         np.concatenate([each.values for each in quantities]),
