@@ -25,7 +25,7 @@ from lightpen_extensions.simulator.swings import (
     swing_poses,
 )
 
-N_CALIBRATIONS = 1600  # give the ratio to 0.02, the coverage to 0.5 %
+N_CALIBRATIONS = 400  # give the ratio to 0.04, the coverage to 1.1 %
 N_IMAGES = 300
 SIGMA = 0.05  # px
 CHUNK = 10  # calibrations a worker does at a time

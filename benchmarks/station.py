@@ -107,7 +107,6 @@ CASES: dict[str, Effects] = {
     "sag of up to 20 µm": replace(GOOD, sag=USUAL_SIZES.sag),
     "camera that tilts, 0.01 px": replace(GOOD, tilt=USUAL_SIZES.tilt),
     "seat jitter of up to 4 µm": replace(GOOD, seat=USUAL_SIZES.seat),
-    "pen 2 K warmer or colder": replace(GOOD, warmth=USUAL_SIZES.warmth),
     "LEDs unlike in noise": replace(GOOD, uneven=USUAL_SIZES.uneven),
     "a third of the images copied": replace(GOOD, copies=1 / 3),
     "all together": USUAL_SIZES,
@@ -117,8 +116,8 @@ COVERED = 93.0, 97.0  # per cent, of all together; of 95 % chance alone makes +-
 MOST_PASSED_BEYOND = 5.0  # per cent of PASS
 NORMAL_95 = 1.959964
 FEW_IMAGES = 60
-MORE_TRIALS = 100  # of all together
-FEWER_TRIALS = 40
+MORE_TRIALS = 50  # of all together
+FEWER_TRIALS = 20
 
 
 class StationCase(NamedTuple):
