@@ -37,14 +37,15 @@ _TEXT = 2
 _KIND, _WIDTH, _HEIGHT, _BITS, _COMPRESSION, _PHOTOMETRIC = 254, 256, 257, 258, 259, 262
 _DESCRIPTION, _STRIPS, _ORIENTATION, _CHANNELS, _STRIP_ROWS = 270, 273, 274, 277, 278
 _STRIP_SIZES, _PLANES, _TILE_WIDTH, _TILE_HEIGHT, _TILES = 279, 284, 322, 323, 324
-_TILE_SIZES, _EXTRA = 325, 338
+_TILE_SIZES, _EXTRA, _FORMAT = 325, 338, 339
 _KEPT = (
     *(_WIDTH, _HEIGHT, _BITS, _COMPRESSION, _PHOTOMETRIC, 266, _CHANNELS, _STRIP_ROWS),
-    *(_PLANES, 317, 320, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, 339),
+    *(_PLANES, 317, 320, _TILE_WIDTH, _TILE_HEIGHT, _EXTRA, _FORMAT),
 )
 _READ = frozenset(
     (*_KEPT, _KIND, _STRIPS, _STRIP_SIZES, _TILES, _TILE_SIZES, _ORIENTATION)
 )
+_UNSIGNED = 1  # _FORMAT
 _REDUCED, _MASK = 1, 4  # bits of _KIND
 _MIN_IS_WHITE, _MIN_IS_BLACK, _MOSAIC = 0, 1, 32803
 _LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
@@ -122,6 +123,10 @@ class TiffPage:
             raise FileError("image.channels", name=self.name, n_channels=channels)
         if channels == 0 or depth > 64 or width == 0 or height == 0:
             raise damaged_image(self.name)
+        if depth > 16 and self._first(_FORMAT, _UNSIGNED) == _UNSIGNED:  # not by OpenCV
+            raise FileError(
+                "image.value-type", name=self.name, value_type=f"uint{depth}"
+            )
         check_pixels(width, height, self.name)
         # It is decoded strip by strip or tile by tile, each from a copy.
         strip = width * min(self._first(_STRIP_ROWS, height), height)

@@ -218,3 +218,11 @@ def test_a_cut_off_page_is_named(tmp_path: Path) -> None:
 
     with pytest.raises(FileError, match=r"cut\.tif"):
         next(iter(find_images(str(tmp_path / "cut.tif")).open()))()
+
+
+def test_integers_of_32_bits_are_named(tmp_path: Path) -> None:
+    tags, _ = page(GREY)
+    data = tiff(({**tags, 258: [32]}, [GREY.astype(np.uint32).tobytes()]))
+
+    with pytest.raises(FileError, match="uint32"):
+        images_of(data, tmp_path)
