@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QComboBox,
+    QFileDialog,
     QLineEdit,
     QTabBar,
 )
@@ -104,25 +105,47 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     walker.until_says("Today")
 
 
+def _begin_with_images(walker: "Walker", folder: Path) -> None:
+    """Choose recorded images in the first view; only pen and tip are asked."""
+    walker.until(lambda: bool(walker.workbench.selection.preparation.names.station))
+    walker.click("Calibrate from recorded images")
+    (dialog,) = walker.window.findChildren(QFileDialog)
+    dialog.fileSelected.emit(str(folder))
+    dialog.close()
+    walker.take_window()
+    walker.until_says("Set up station")
+    for name in ("Pen serial number", "Probe tip"):
+        walker.click_into(name, NAMES[name])
+    walker.press(Key.Key_Return)
+    walker.until_shows("Camera")
+
+
+@pytest.mark.parametrize(
+    "begins_by_card", [False, pytest.param(True, marks=pytest.mark.slow)]
+)
 def test_a_recorded_swing_gives_its_tip(
     open_wizard: "OpenWizard",
     around: SourceEnvironment,
     shared_data: Path,
     truth: Callable[[Path], dict[str, Any]],
     lightpen: Run,
+    begins_by_card: bool,
 ) -> None:
     folder = shared_data / "swing-clean"
     walker = open_wizard(replace(around, scene=Scene()))
-    set_up(walker)
-    for name, text in NAMES.items():
-        walker.click_into(name, text)
-    walker.click("Continue to the camera")
-    walker.tab_to("Image source")
-    walker.press(Key.Key_Down)
-    walker.press(Key.Key_Down)
-    walker.until_tells("Choose the folder of the recorded images.")
-    walker.click_into("Folder, record or video", str(folder))
-    walker.press(Key.Key_Return)
+    if begins_by_card:
+        _begin_with_images(walker, folder)
+    else:
+        set_up(walker)
+        for name, text in NAMES.items():
+            walker.click_into(name, text)
+        walker.click("Continue to the camera")
+        walker.tab_to("Image source")
+        walker.press(Key.Key_Down)
+        walker.press(Key.Key_Down)
+        walker.until_tells("Choose the folder of the recorded images.")
+        walker.click_into("Folder, record or video", str(folder))
+        walker.press(Key.Key_Return)
     walker.until_says("RECORDED")
     # Those of the simulated pen are not.
     walker.until_says("Open the intrinsics file.")

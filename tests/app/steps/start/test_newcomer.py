@@ -1,5 +1,6 @@
 """Somebody who has never seen the program: explained, tried out, and guided."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,6 +8,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog
 
+from lightpen.cameras.source import FoundDevice, SourcePlace
+from lightpen.cameras.sources import source_named
+from lightpen.live.sources import SourceEnvironment
 from lightpen.model.origin import Origin
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
@@ -126,3 +130,30 @@ def test_a_station_is_set_up_by_pen_and_tip_and_simulates_nothing(
     walker.press(Qt.Key.Key_Return)
     walker.until_shows("Camera")
     assert walker.tells("Choose your camera.")
+
+
+@pytest.mark.slow
+def test_a_real_station_is_at_its_first_live_image_after_four_entries(
+    open_wizard: "OpenWizard", basler: SourcePlace
+) -> None:
+    found = FoundDevice(basler.name, f"Basler emulation ({basler.name})")
+    source = source_named("basler")
+    assert source is not None
+    cameras = ((source, found),)
+    walker = open_wizard(SourceEnvironment(found_cameras=lambda: cameras))
+    walker.until(lambda: bool(walker.workbench.selection.preparation.names.station))
+    begun = time.monotonic()
+
+    walker.click("Set up my station")
+    walker.type("LP-9")
+    walker.enter("Probe tip", "T-9")
+    walker.press(Qt.Key.Key_Return)
+    walker.until_shows("Camera")
+    walker.until(lambda: walker.offers(found.label))
+    walker.click(found.label)
+    walker.until_says("Live")
+
+    assert time.monotonic() - begun < 30
+    chosen = walker.workbench.selection.preparation.source
+    assert chosen == SourceChoice("basler", basler.name)
+    assert not walker.tells("SIMULATED")
