@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 from tests.app.typed_numbers import type_number
 
+from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.settings import Settings
@@ -47,6 +48,10 @@ def test_who_listens_follows_the_pen_and_every_page_says_so(
     assert settings.of_extension(KEY, StreamChoice()).is_on
     assert any("Active at" in text for text in walker.texts(dialog))
     dialog.close()
+    selection = walker.workbench.selection
+    selection.set_preparation(selection.preparation.with_source(SourceChoice()))
+    walker.workbench.files.use_samples()
+    walker.until(lambda: walker.workbench.live.operator is not None)
     walker.operator.seat()
     client = OpenIGTLinkClient(port=chosen)
     walker.until_tells("clients: 1")
