@@ -3705,10 +3705,6 @@ needed</source>
 <context>
     <name>ResultPanel</name>
     <message>
-        <source>Postures of the included images</source>
-        <translation>所计入图像的姿态</translation>
-    </message>
-    <message>
         <source>The tip beside others</source>
         <translation>测头与其他值的比较</translation>
     </message>

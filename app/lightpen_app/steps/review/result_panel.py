@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QSizePolicy
+from PySide6.QtWidgets import QFrame
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.self_check import SelfCheck
 from lightpen.estimation.reports.methods import reported
 from lightpen.estimation.reports.verdict import halves_agree
 from lightpen.model.bending import Bending
-from lightpen.model.coverage import Coverage
 from lightpen.record.results.assessment import SwingAssessment
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.solving import Solution
@@ -26,14 +24,11 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import day_text, shortened
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 if TYPE_CHECKING:
     from lightpen.comparisons.press_test import PressTest
-
-DIAL_HEIGHT = 18 * GRID  # px
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,29 +134,15 @@ class ResultPanel(Translated, QFrame):
         self._bending_value: Bending | None = None
         self._pressed: PressTest | None = None  # of this session
         self._images = SignLabel()
-        self._postures = text_label(TextSize.LEAD, Tone.QUIET)
-        self._dial = PostureDial()
-        self._dial.setMinimumHeight(DIAL_HEIGHT)
-        # As high as its place is; it draws itself as large as it can.
-        self._dial.setSizePolicy(
-            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
-        )
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2, margins=2 * GRID)
         fill(layout, self._as_found, self._halves, self._self_check, self._bending)
         fill(layout, self._images)
         layout.addSpacing(GRID)
-        fill(layout, self._comparison)
-        fill(layout, self._postures, (self._dial, 100), 1)
+        fill(layout, self._comparison, 1)
 
-        self.set_large(False)
         self._retranslate()
-
-    def set_large(self, large: bool) -> None:
-        """Show the postures, too, in a large window."""
-        for widget in (self._postures, self._dial):
-            widget.setVisible(large)
 
     def value(self) -> ReviewedResult | None:
         """Return the outcome that is shown."""
@@ -193,7 +174,6 @@ class ResultPanel(Translated, QFrame):
             )
 
     def _retranslate(self) -> None:
-        self._postures.setText(self.tr("Postures of the included images"))
         self._refresh()
 
     def _refresh(self) -> None:
@@ -205,9 +185,7 @@ class ResultPanel(Translated, QFrame):
             self._halves.set_value(StatusMessage())
             self._self_check.set_value(StatusMessage())
             self._images.set_value(StatusMessage())
-            self._dial.set_value(DialValue())
             return
-        self._dial.set_value(_postures(outcome.solution.calibration.coverage))
         self._comparison.setAccessibleName(self.tr("The tip beside others"))
         self._comparison.set_value(self._compared(_tip_value(outcome)))
         self._as_found.set_value(self._as_found_message(outcome.assessment))
@@ -296,18 +274,6 @@ def _tip_value(outcome: ReviewedResult) -> TipValue:
             value, nominal=_in_mm(nominal), deviation=_in_mm(outcome.tip_pen - nominal)
         )
     return value
-
-
-def _postures(coverage: Coverage) -> DialValue:
-    """Return a dial with each field full that has an image."""
-    turns = coverage.turns
-    return DialValue(
-        counts=coverage.counts.astype(np.int64),
-        needed=np.minimum(coverage.counts, 1).astype(np.int64),
-        n_upright=coverage.n_upright,
-        n_upright_needed=min(coverage.n_upright, 1),
-        turns=(float(turns.min()), float(turns.max())),
-    )
 
 
 def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:

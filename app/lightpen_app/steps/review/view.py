@@ -1,6 +1,5 @@
 """View of the step Review: the verdict, the result and its details."""
 
-from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
@@ -39,7 +38,6 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
 
     # px; then tip and buttons are in the first tab, too
     narrow_below, low_below = 112 * GRID, 60 * GRID
-    very_large_from = QSize(190 * GRID, 100 * GRID)  # px; then it has the postures
 
     def __init__(
         self, run: SwingRun, place: SavePlace, services: Services = ()
@@ -156,7 +154,6 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
     def _use_room(self) -> None:
         """Place tip and buttons around the tabs, or in the first of a small page."""
         is_small = self._room.is_narrow or self._room.is_low
-        self.result.set_large(self._room.is_very_large)
         set_stacked(self._button_rows, self._room.is_narrow)
         box = self._first_box if is_small else self._box
         if box.indexOf(self.summary) >= 0:

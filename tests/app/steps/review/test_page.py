@@ -80,7 +80,6 @@ from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
@@ -451,25 +450,6 @@ def test_the_step_is_closed_until_the_pen_was_swung(
     assert button(page, "Repeat swing").toolTip() == "Swing the pen first."
     page.run_main_action()
     assert not page.is_complete()
-
-
-@pytest.mark.slow
-def test_a_vast_screen_shows_the_postures_below_the_figures(
-    page: ReviewPage, qtbot: QtBot
-) -> None:
-    dial, panel = the(page, PostureDial), the(page, ResultPanel)
-    page.resize(1480, 780)
-    assert not dial.isVisible()
-    page.resize(2300, 1250)
-    choose_tab(page, "Result")
-
-    qtbot.waitUntil(dial.isVisible)
-    assert 0 < dial.value().n_full == dial.value().n_fields
-    outcome = panel.value()
-    assert outcome is not None
-    coverage = outcome.solution.calibration.coverage
-    kept = int(dial.value().counts.sum()) + dial.value().n_upright
-    assert kept == len(coverage.tilts)
 
 
 def test_a_good_swing_passes_with_its_reason_and_the_next_step(
