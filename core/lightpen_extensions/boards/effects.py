@@ -137,10 +137,11 @@ def fit_effects(views: Views, fitted: BoardFit) -> MixedFit:
 
 def _from(views: Views, fitted: BoardFit) -> MixedFit:
     plain, longer = _design_of(views, fitted), max(views.image_sizes[0])
-    found = (
-        _most_likely(_with_field(plain, views, fitted, share * longer))
-        for share in LENGTHS
-    )
+    found: list[_Solution] = []
+    for share in LENGTHS:
+        design = _with_field(plain, views, fitted, share * longer)
+        near = found[-1].components if found else None
+        found.append(_most_likely(design, near))
     best = min(found, key=lambda each: each.deviance)
     without = _solved(plain, best.components)
     held_out, robust = _robust(best)
@@ -239,11 +240,11 @@ def _without_poses(projector: FloatArray, columns: FloatArray) -> FloatArray:
     return np.asarray(columns - projector @ explained)
 
 
-def _most_likely(design: _Design) -> _Solution:
+def _most_likely(design: _Design, near: VarianceComponents | None = None) -> _Solution:
     """Return the solution by the most likely components."""
     noise = max(np.sqrt(design.squares / max(design.n, 1)), 1e-6)
     mm = FIRST * noise * design.mm
-    components = VarianceComponents(noise, mm, mm, FIRST * noise)
+    components = near or VarianceComponents(noise, mm, mm, FIRST * noise)
     before = np.inf
     for _ in range(MAX_ROUNDS):
         solution = _solved(design, components)

@@ -46,11 +46,12 @@ def start_any_camera(views: Views) -> Camera:
 
     That is taken if rows of points are straighter with it.
     """
-    pinhole, fisheye = start_camera(views, 5), start_camera(views, N_COEFFICIENTS)
+    pinhole = start_camera(views, 5)
     bend = _bend(pinhole, views)
-    is_straight = bend < STRAIGHT * max(views.image_sizes[0])
-    is_fisheye = not is_straight and _bend(fisheye, views) < STRAIGHTER * bend
-    return fisheye if is_fisheye else pinhole
+    if bend < STRAIGHT * max(views.image_sizes[0]):
+        return pinhole
+    fisheye = start_camera(views, N_COEFFICIENTS)
+    return fisheye if _bend(fisheye, views) < STRAIGHTER * bend else pinhole
 
 
 def start_camera(views: Views, n_coefficients: int) -> Camera:
