@@ -35,7 +35,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.widgets.page import step_titles
+from lightpen_app.wizard_pages import page_titles
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.stations import Station, StoredCamera
 from lightpen_extensions.simulator.scenes import Scene
@@ -195,7 +195,9 @@ def test_no_english_word_is_left_after_a_change_to_chinese(
     settings.set_station("2\u53f7", station)
     settings.set_last_station("2\u53f7")
     walker = open_wizard()
-    walker.until(lambda: len(walker.window.pages()) == len(step_titles()))
+    walker.until(
+        lambda: len(walker.window.pages()) == len(page_titles(walker.services))
+    )
     walker.window.preferences_changed.emit(Preferences(language="zh_CN"))
     QApplication.processEvents()
     left: dict[str, set[str]] = {}

@@ -7,8 +7,8 @@ from PySide6.QtCore import QCoreApplication
 from typing_extensions import override
 
 from lightpen.archive.chains.entries import Event
-from lightpen.comparisons.trend import VERIFIED
 from lightpen.estimation.reports.verdict import Grade
+from lightpen.record.folder.verifications import VERIFIED
 from lightpen_app.face import (
     DemoStep,
     InterruptedWork,

@@ -20,8 +20,7 @@ from lightpen.estimation.reports.verdict import Change, change_since
 from lightpen.model.limits import VerificationLimits
 
 LONGEST = 1000  # calibrations, the newest
-VERIFIED = "verified"  # key in the settings of an entry
-LIMIT = "max_uncertainty_mm"  # the same
+LIMIT = "max_uncertainty_mm"  # key in the settings of an entry
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.archive.chains.entries import BESIDE_SWINGS, Event, Kind, StoredEntry
 from lightpen.archive.history.history import Line
-from lightpen.comparisons.trend import VERIFIED
+from lightpen.record.folder.verifications import VERIFIED
 from lightpen.record.library.supervision import Signature
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.sentences import worded

@@ -11,7 +11,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import certain_leds
@@ -172,6 +171,9 @@ def _cropped(camera: Camera, pen: Pen, pixels: FloatArray) -> _Trial:
         if found is None:
             return np.full(pixels.size + 2 * len(pixels), NO_POSE)
         return np.append(np.nan_to_num(found.residuals), _of_tip(found, camera))
+
+    # Imported here: the command line does not wait for it.
+    from scipy.optimize import least_squares
 
     shift = least_squares(
         residuals, np.zeros(2), diff_step=1.0, x_scale=100.0, max_nfev=6

@@ -28,6 +28,7 @@ VERIFICATIONS = "verifications"
 TOUCHES = "touches"  # in that folder: the images of live touches, run by run
 UNDER_WAY = "under way"  # likewise: what is not concluded yet
 CONCLUSION = "conclusion"
+VERIFIED = "verified"  # key of the task in the settings of an entry
 MEASURED_PART = "part"  # kind of the task that measures a part
 BALL_CENTRE = "ball centre"  # of a measured feature: no surface was touched
 
