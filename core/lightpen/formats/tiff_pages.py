@@ -124,9 +124,8 @@ class TiffPage:
         if channels == 0 or depth > 64 or width == 0 or height == 0:
             raise damaged_image(self.name)
         if depth > 16 and self._first(_FORMAT, _UNSIGNED) == _UNSIGNED:  # not by OpenCV
-            raise FileError(
-                "image.value-type", name=self.name, value_type=f"uint{depth}"
-            )
+            kind = f"uint{depth}"
+            raise FileError("image.value-type", name=self.name, value_type=kind)
         check_pixels(width, height, self.name)
         # It is decoded strip by strip or tile by tile, each from a copy.
         strip = width * min(self._first(_STRIP_ROWS, height), height)
