@@ -140,6 +140,26 @@ LAYOUTS = (
         brown="pinhole",
         fisheye="kannalabrandt",
     ),
+    FileLayout(
+        "Nerfstudio",
+        marks="fl_x w",
+        size="w h",
+        numbers=_each("fl_x:fx fl_y:fy cx cy k1 k2 p1 p2 k3 k4"),
+        model="camera_model",
+        brown="opencv pinhole simplepinhole",
+        fisheye="opencvfisheye",
+        first=0.5,
+    ),
+    FileLayout(
+        "ORB-SLAM",
+        marks="Camera.fx|Camera1.fx",
+        size="Camera.width Camera.height",
+        numbers=_each("fx fy cx cy", "Camera.{0}|Camera1.{0}")
+        | _each("k1 k2 p1 p2 k3 k4", "Camera.{0}|Camera1.{0}"),
+        model="Camera.type",
+        brown="pinhole",
+        fisheye="kannalabrandt8",
+    ),
 )
 COLMAP_MODELS = {
     "SIMPLE_PINHOLE": "f cx cy",
@@ -159,8 +179,15 @@ _BY_IMAGES = message("camera-file.by-images")
 _OF_PROJECT = message("camera-file.of-project")
 _AS_TEXT = message("camera-file.as-text")
 FOREIGN = (
-    (r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):", "Halcon", _BY_IMAGES),
+    (
+        r"ParGroup:\s*Camera|\b(Kappa:kappa|Poly1:poly1):|\"(area|line)_scan_",
+        "Halcon",
+        _BY_IMAGES,
+    ),
     (r"#\s*polynomial coefficients for the DIRECT", "OCamCalib", _BY_IMAGES),
+    (r"\"T_imu_cam\"", "Basalt", _BY_IMAGES),
+    (r"\"projection_type\"\s*:", "OpenSfM", _AS_TEXT),
+    (r"\"cameraData\"\s*:", "DepthAI (OAK-D)", _AS_TEXT),
     (r"<document[^>]*>\s*<chunk", "Metashape", _OF_PROJECT),
     (r"(?m)^\s*fc\s*=\s*\[.*^\s*kc\s*=", "Bouguet (Calib_Results.m)", _AS_TEXT),
     (r"\AMATLAB 5\.0 MAT-file", "MATLAB (.mat)", _AS_TEXT),
@@ -207,7 +234,7 @@ def foreign_intrinsics(entries: Entries) -> Given | None:
     Raises `FileError` for a lens model that is not read, or if a number is missing.
     """
     for layout in LAYOUTS:
-        if all(entries.has(mark) for mark in layout.marks.split()):
+        if all(entries.has(*mark.split("|")) for mark in layout.marks.split()):
             return _given(layout, entries)
     return None
 

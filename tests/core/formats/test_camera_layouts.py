@@ -153,6 +153,32 @@ def without(layout: dict[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in layout.items() if name != key}
 
 
+NERFSTUDIO: dict[str, Any] = {
+    "w": 1280,
+    "h": 720,
+    "fl_x": 1320.5,
+    "fl_y": 1318.25,
+    "cx": 652.75,
+    "cy": 356.25,
+    **dict(zip(("k1", "k2", "p1", "p2"), BROWN, strict=True)),
+    "camera_model": "OPENCV",
+    "frames": [],
+}
+ORB_SLAM = f"""%YAML:1.0
+Camera.type: "PinHole"
+Camera1.fx: 1320.5
+Camera1.fy: 1318.25
+Camera1.cx: 652.25
+Camera1.cy: 355.75
+Camera1.k1: {BROWN[0]}
+Camera1.k2: {BROWN[1]}
+Camera1.p1: {BROWN[2]}
+Camera1.p2: {BROWN[3]}
+Camera.width: 1280
+Camera.height: 720
+"""
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -173,6 +199,9 @@ def without(layout: dict[str, Any], key: str) -> dict[str, Any]:
         ),
         pytest.param(REALSENSE, id="RealSense"),
         pytest.param(CAMODOCAL, id="camodocal"),
+        pytest.param(NERFSTUDIO, id="Nerfstudio"),
+        pytest.param(ORB_SLAM, id="ORB-SLAM"),
+        pytest.param(ORB_SLAM.replace("Camera1.", "Camera."), id="ORB-SLAM 2"),
     ],
 )
 def test_one_camera_is_the_same_in_all_layouts(
@@ -274,6 +303,10 @@ def test_a_realsense_without_distortion_is_read_whatever_its_model(
     ("text", "named"),
     [
         ("ParGroup: Camera: Parameter;\n\nFocus:foc: 0.016;\n", "Halcon"),
+        ({"camera": "area_scan_polynomial", "focus": 0.016}, "Halcon"),
+        ({"value0": {"T_imu_cam": [], "intrinsics": []}}, "Basalt"),
+        ({"v2 brown": {"projection_type": "brown", "focal_x": 0.7}}, "OpenSfM"),
+        ({"boardName": "OAK-D", "cameraData": []}, "DepthAI (OAK-D)"),
         ("#polynomial coefficients for the DIRECT mapping function\n\n5 -46", "OCam"),
         ("<document version='1.2.0'>\n<chunk label='a'></chunk></document>", "project"),
         (CAMODOCAL.replace("PINHOLE", "MEI"), '"MEI"'),
