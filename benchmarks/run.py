@@ -65,7 +65,7 @@ SECTIONS: dict[str, Section] = {
     "measure": lambda workers, data: part_rows(workers),
     "power": lambda workers, data: session_rows(workers),
     "pens": lambda workers, data: pen_rows(workers),
-    "speed": lambda workers, data: speed_rows(workers),
+    "speed": speed_rows,
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),
     "killed": lambda workers, data: killed_rows(),
