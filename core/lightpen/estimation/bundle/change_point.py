@@ -24,6 +24,9 @@ MIN_PART = 6  # images on either side
 CERTAIN = 30.0
 MORE_THAN_DRIFT = 10.0  # beyond what a linear drift gains
 EXPLAINED = 0.8  # of the images, by a large step: those before it or after it slipped
+# Most of the square of its distance that an image at the other place is beside it: by
+# chance, and by what errors of the files add to a large step.
+BY_CHANCE, BY_FILES = 16.0, 0.04
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +124,8 @@ def step_of_poses(poses: Poses, is_slipped: BoolArray) -> ChangePoint | None:
     """Return the step by poses cam_from_pen alone, where many images slipped, or None.
 
     A fit of all images leaves out those after a large step. ``is_slipped`` (N,) are
-    those whose tip is elsewhere; a step is returned if it explains most of them.
+    those whose tip is elsewhere; a step is returned if it explains most of them: they
+    lie at one other place, and not on the way to the cone.
     """
     R, t = poses.rotations, poses.translations
     if is_slipped.sum() < MIN_PART or len(R) < 2 * MIN_PART + 1:
@@ -140,7 +144,17 @@ def step_of_poses(poses: Poses, is_slipped: BoolArray) -> ChangePoint | None:
     if step is None:
         return None
     after = np.arange(len(R)) >= step.first
-    explained = max(np.mean(after == is_slipped), np.mean(after != is_slipped))
+    away = after if np.mean(after == is_slipped) > 0.5 else ~after
+    frames = R if step.is_tip else np.broadcast_to(np.eye(3), R.shape)
+    places = (np.swapaxes(frames, 1, 2) @ off[..., None])[..., 0]
+    moved = places[away] - places[~away].mean(axis=0)
+    weights = (np.swapaxes(frames, 1, 2) @ W @ frames)[away]
+    beside = moved - np.median(moved, axis=0)
+    squares, left = (
+        np.einsum("ni,nij,nj->n", each, weights, each) for each in (moved, beside)
+    )
+    limit = np.maximum(BY_CHANCE, BY_FILES * squares)
+    explained = min(np.mean(away == is_slipped), np.mean(left < limit))
     return step if explained > EXPLAINED else None
 
 

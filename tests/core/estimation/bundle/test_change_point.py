@@ -39,6 +39,9 @@ def swung(kind: str, shift: FloatArray, seed: int = 0) -> Calibration:
     elif kind == "camera":
         turn = rotation_from_vector(shift)
         R[FIRST:], t[FIRST:] = turn @ R[FIRST:], t[FIRST:] @ turn.T
+    elif kind == "approach":
+        n = FIRST // 3
+        t[:n] += np.linspace(1, 0, n, endpoint=False)[:, None] * shift
     elif kind == "drift":
         t += np.linspace(-0.5, 0.5, N)[:, None] * shift
     pixels = simulate_centers(CAMERA, PEN, R, t, 0.03, rng)
@@ -79,6 +82,11 @@ def test_a_good_swing_has_no_step(seed: int) -> None:
 
 def test_a_slow_drift_is_no_step() -> None:
     assert swung("drift", np.array([0.03, 0.0, 0.02])).step is None
+
+
+@pytest.mark.parametrize("shift", [[0.0, 0.0, -100.0], [5.0, 0.0, 0.0]])
+def test_the_way_of_the_tip_to_the_cone_is_no_step(shift: list[float]) -> None:
+    assert swung("approach", np.array(shift)).step is None
 
 
 def test_the_longer_part_alone_gives_the_tip() -> None:
