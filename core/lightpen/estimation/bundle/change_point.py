@@ -26,7 +26,7 @@ MORE_THAN_DRIFT = 10.0  # beyond what a linear drift gains
 EXPLAINED = 0.8  # of the images, by a large step: those before it or after it slipped
 # Most of the square of its distance that an image at the other place is beside it: by
 # chance, and by what errors of the files add to a large step.
-BY_CHANCE, BY_FILES = 16.0, 0.04
+BY_CHANCE, BY_FILES = 16.0, 0.1
 
 
 @dataclass(frozen=True, eq=False)
