@@ -145,13 +145,13 @@ def step_of_poses(poses: Poses, is_slipped: BoolArray) -> ChangePoint | None:
         return None
     after = np.arange(len(R)) >= step.first
     away = after if np.mean(after == is_slipped) > 0.5 else ~after
-    frames = R if step.is_tip else np.broadcast_to(np.eye(3), R.shape)
-    places = (np.swapaxes(frames, 1, 2) @ off[..., None])[..., 0]
+    # Places in the frame that the step is in; those of a turned tip are in the pen.
+    tips = _Images(off, W, -W @ M, P)
+    places, weights = (tips.turned(R) if step.is_tip else tips)[:2]
     moved = places[away] - places[~away].mean(axis=0)
-    weights = (np.swapaxes(frames, 1, 2) @ W @ frames)[away]
     beside = moved - np.median(moved, axis=0)
     squares, left = (
-        np.einsum("ni,nij,nj->n", each, weights, each) for each in (moved, beside)
+        np.einsum("ni,nij,nj->n", each, weights[away], each) for each in (moved, beside)
     )
     limit = np.maximum(BY_CHANCE, BY_FILES * squares)
     explained = min(np.mean(away == is_slipped), np.mean(left < limit))
