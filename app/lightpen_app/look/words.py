@@ -1,10 +1,7 @@
 """Displayed names and times."""
 
 import re
-from collections.abc import Iterable
 from datetime import datetime
-
-from PySide6.QtCore import QCoreApplication
 
 from lightpen.local_time import local_time
 
@@ -18,11 +15,6 @@ PARTED = "  \u00b7  "  # between items in one line
 def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:
     """Return a name that fits into a line; its end is left out if it is long."""
     return name if len(name) <= longest else f"{name[: longest - 1]}\u2026"
-
-
-def listed(words: Iterable[str]) -> str:
-    """Return words joined by the comma of the language."""
-    return QCoreApplication.translate("words", ", ").join(words)
 
 
 def breakable(text: str) -> str:

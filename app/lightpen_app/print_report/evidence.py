@@ -14,8 +14,8 @@ from lightpen_app.look.quantities import (
     decimals_for,
     number_text,
 )
+from lightpen_app.look.sentences import listed
 from lightpen_app.look.theme import LIGHT
-from lightpen_app.look.words import listed
 from lightpen_app.print_report.blocks import (
     MM,
     RIGHT,

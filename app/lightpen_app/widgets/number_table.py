@@ -16,7 +16,7 @@ from typing_extensions import override
 from lightpen_app.look.theme import GRID, TextSize, set_size
 from lightpen_app.widgets.row_table import LEFT, RIGHT
 
-ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; also of the header
+NUMBER_ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; also of the header
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class NumberTable(QTableWidget):
         for each in (self, self.horizontalHeader(), self.verticalHeader()):
             set_size(each, size)
         is_large = size > TextSize.BODY
-        self._row_height = LARGE_ROW_HEIGHT if is_large else ROW_HEIGHT
+        self._row_height = LARGE_ROW_HEIGHT if is_large else NUMBER_ROW_HEIGHT
         self.horizontalHeader().setFixedHeight(self._row_height)
         self.verticalHeader().setDefaultSectionSize(self._row_height)
         self.updateGeometry()

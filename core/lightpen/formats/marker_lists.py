@@ -28,7 +28,7 @@ LISTS = (
     *((f"{body}/markers", "") for body in ("RigidBody", "rigid_body", "asset", "tool")),
 )
 _PLACES = ("position", "pos", "xyz", "location", "offset", "coordinates")
-_NORMALS = ("normal", "direction", "dir")
+_NORMAL_FIELDS = ("normal", "direction", "dir")
 _AXES = ("x", "y", "z")
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")  # xlsx and ods; xls
 _ROM = b"NDI\x00"
@@ -119,8 +119,8 @@ def _markers(listed: list[Tree], unit: str, name: str) -> Markers:
             row = [float(entries.counted(1, axis)[0]) for axis in _AXES]
         else:
             row = entries.numbers(*_PLACES).tolist()
-        if entries.has(*_NORMALS):
-            row = [*row[:3], *entries.counted(3, *_NORMALS).tolist()]
+        if entries.has(*_NORMAL_FIELDS):
+            row = [*row[:3], *entries.counted(3, *_NORMAL_FIELDS).tolist()]
         if len(row) < 3 or len(row) != len(rows[0] if rows else row):
             raise FileError("pen-file.no-point", place=place, count=len(row))
         rows.append(row)

@@ -4,7 +4,7 @@ import errno
 
 from lightpen.messages import Message, message
 
-_REASONS = {  # as the C library words them
+_WORDED = {  # as the C library words them
     errno.EPERM: message("system.not-permitted"),
     errno.ENOENT: message("system.not-there"),
     errno.EIO: message("system.input-output"),
@@ -21,5 +21,5 @@ _REASONS = {  # as the C library words them
 
 def strerror(error: OSError) -> Message | str:
     """Return the reason of an error, by default the system's text."""
-    known = _REASONS.get(error.errno or 0)
+    known = _WORDED.get(error.errno or 0)
     return known or error.strerror or type(error).__name__

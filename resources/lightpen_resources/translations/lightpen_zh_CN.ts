@@ -11038,11 +11038,4 @@ needed</source>
         <translation>锥孔{0}</translation>
     </message>
 </context>
-<context>
-    <name>words</name>
-    <message>
-        <source>, </source>
-        <translation>，</translation>
-    </message>
-</context>
 </TS>

@@ -20,10 +20,10 @@ from lightpen.record.library.signing.chain_keys import (
 )
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, origin_text
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
-from lightpen_app.look.words import PARTED, listed
+from lightpen_app.look.words import PARTED
 
 EventText: TypeAlias = Callable[[Event], str]
 

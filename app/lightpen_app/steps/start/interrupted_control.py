@@ -21,8 +21,7 @@ from lightpen.record.swings.reading import recorded_names, recorded_origin
 from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.face import InterruptedWork, Service
 from lightpen_app.look.phrases import missing_input_text, origin_text
-from lightpen_app.look.sentences import worded
-from lightpen_app.look.words import listed
+from lightpen_app.look.sentences import listed, worded
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench

@@ -31,7 +31,7 @@ from lightpen.record.library.tip_library import (
     read_change,
 )
 from lightpen.record.results.assessment import SwingAssessment
-from lightpen.record.results.result_folder import WHAT, FolderArchive
+from lightpen.record.results.result_folder import RESULT, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import HEADER, header_copies
 from lightpen.record.swings.journal import JOURNAL, journal_bytes
@@ -57,7 +57,7 @@ class ExtractedEvent:
 
 def event_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a result file or of a revocation."""
-    content = read_bytes(file, WHAT, LARGEST_RECORD)
+    content = read_bytes(file, RESULT, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     found = results.content(file)
     if isinstance(found, Result):
@@ -79,7 +79,7 @@ def event_of_result(results: FolderArchive, file: Path) -> ExtractedEvent:
 
 def event_of_change(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a change of the tip library."""
-    content, change = read_bytes(file, WHAT, LARGEST_RECORD), read_change(file)
+    content, change = read_bytes(file, RESULT, LARGEST_RECORD), read_change(file)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     item, picture = change.item, None
     if isinstance(item, ListedTip):

@@ -9,8 +9,8 @@ from lightpen.archive.events.event_extraction import ExtractedEvent, file_text
 from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.formats.json_records import Plain
 from lightpen.record.folder.camera_calibrations import (
+    CAMERA_CALIBRATION,
     CAMERA_CALIBRATIONS,
-    WHAT,
     read_camera_trial,
 )
 from lightpen.record.folder.verifications import (
@@ -50,7 +50,7 @@ def is_station_file(file: Path) -> bool:
 
 def event_of_station(results: FolderArchive, file: Path) -> ExtractedEvent:
     """Return the event of a limits, verification or camera file."""
-    content = read_bytes(file, WHAT, LARGEST_RECORD)
+    content = read_bytes(file, CAMERA_CALIBRATION, LARGEST_RECORD)
     place = FileHash(results.place_of(file), sha256(content).hexdigest())
     if file.parent.name == LIMITS_FOLDER:
         return ExtractedEvent(_of_limits(file, content, place))

@@ -25,12 +25,12 @@ def export_entries(database: Database, path: Path) -> int:
     try:
         with path.open("xb") as stream:
             for content in _contents(database):
-                line = _line(content)
+                line = _entry_line(content)
                 stream.write(line)
                 checksum.update(line)
                 n_entries += "entry" in content
             end = {"n_entries": n_entries, "sha256": checksum.hexdigest()}
-            stream.write(_line(end))
+            stream.write(_entry_line(end))
             stream.flush()
             os.fsync(stream.fileno())
     except FileExistsError as error:
@@ -55,5 +55,5 @@ def _contents(database: Database) -> Iterator[dict[str, object]]:
             }
 
 
-def _line(content: object) -> bytes:
+def _entry_line(content: object) -> bytes:
     return json.dumps(content).encode() + b"\n"

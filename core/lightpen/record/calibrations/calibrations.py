@@ -32,7 +32,7 @@ from lightpen.record.results.opening import data_folder_of
 from lightpen.record.results.results import CALIBRATION, TipChange, parse_result
 from lightpen.record.swings.names import Names
 
-WHAT = message("file.calibration")
+CALIBRATION_FILE = message("file.calibration")
 NOBODY = Names()
 
 
@@ -164,7 +164,10 @@ def read_calibration(path: Path) -> CalibrationFile:
     Raises `FileError` if it was changed, or is a result in a data folder and a
     supervisor whom it names did not approve it.
     """
-    content, data = read_bytes(path, WHAT, LARGEST_RECORD), data_folder_of(path)
+    content, data = (
+        read_bytes(path, CALIBRATION_FILE, LARGEST_RECORD),
+        data_folder_of(path),
+    )
     found = parse_calibration(content, path)
     if data is None or found.accepted is None:
         return found

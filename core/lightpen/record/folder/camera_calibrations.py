@@ -24,7 +24,7 @@ from lightpen.record.library.entered_files import add_numbered
 from lightpen.record.swings.names import Names
 
 CAMERA_CALIBRATIONS = "camera-calibrations"
-WHAT = message("file.camera-calibration")
+CAMERA_CALIBRATION = message("file.camera-calibration")
 
 
 @dataclass(frozen=True, eq=False)

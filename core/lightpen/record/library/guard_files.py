@@ -34,7 +34,7 @@ from lightpen.record.library.signing.keys import (
 
 LIMITS_FOLDER = "limits"
 LIMIT = 8 * MEGABYTE  # holds some 80,000 files
-WHAT = message("file.limits")
+LIMITS_FILE = message("file.limits")
 
 _Signed: TypeAlias = Annotated[str, Meta(pattern="^([0-9a-f]{128})?$")]
 

@@ -16,8 +16,8 @@ from lightpen.model.names import same_name
 from lightpen.record.library.entered_files import CountedFile, entered_files
 from lightpen.record.library.guard_files import (
     LIMIT,
+    LIMITS_FILE,
     LIMITS_FOLDER,
-    WHAT,
     LimitsChange,
     PasswordVerifier,
     read_limits_change,
@@ -77,7 +77,7 @@ def read_supervision(data: Path) -> Supervision:
     guard, files = Supervision(), reversed(numbered_files(folder))
     entered.require_all(folder)
     for file in files:
-        counted = entered.counted(file, read_bytes(file, WHAT, LIMIT))
+        counted = entered.counted(file, read_bytes(file, LIMITS_FILE, LIMIT))
         if counted is not None:
             guard = _followed(guard, file, counted)
     return replace(guard, n_changes=newest_number(folder))

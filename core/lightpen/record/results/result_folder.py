@@ -43,7 +43,7 @@ from lightpen.record.results.results import (
 
 RECORDS, RESULTS = "records", "results"
 SIMULATED = "simulated"  # folder of the files and results of the simulated pen
-WHAT = message("file.result")
+RESULT = message("file.result")
 
 _logger = logging.getLogger(__name__)
 
@@ -181,7 +181,7 @@ class FolderArchive:
 
     def content(self, file: Path) -> Result | Withdrawal:
         """Return the content of one of `all_files`."""
-        content = read_bytes(file, WHAT, LARGEST_RECORD)
+        content = read_bytes(file, RESULT, LARGEST_RECORD)
         if parse_heading(content, file).takes_back is None:
             return self.read(file)
         return parse_withdrawal(content, file)
@@ -233,14 +233,14 @@ class FolderArchive:
     def read(self, file: Path) -> Result:
         """Return the result in a file of the archive."""
         located = self._data.joinpath  # an absolute folder stays absolute
-        return parse_result(read_bytes(file, WHAT, LARGEST_RECORD), file, located)
+        return parse_result(read_bytes(file, RESULT, LARGEST_RECORD), file, located)
 
 
 def _counted_heading(
     entered: EnteredFiles, file: Path, present: str
 ) -> ResultHeading | None:
     """Return the heading of a result, approved as it must be; None if not entered."""
-    counted = entered.counted(file, read_bytes(file, WHAT, LARGEST_RECORD))
+    counted = entered.counted(file, read_bytes(file, RESULT, LARGEST_RECORD))
     if counted is None:
         return None
     heading = parse_heading(counted.content, file)

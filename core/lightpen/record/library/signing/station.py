@@ -18,7 +18,7 @@ from lightpen.messages import message
 from lightpen.record.library.signing.keys import PublicKey, chain_of, make_station_key
 
 STATION_FILE = "station.pub"
-WHAT = message("file.station-key")
+STATION_KEY_FILE = message("file.station-key")
 
 
 class _StationFile(Struct):
@@ -31,7 +31,9 @@ def known_station_name(data: Path) -> str:
     if not file.exists():
         return ""
     try:
-        found = parse_own_json(read_bytes(file, WHAT, MEGABYTE), _StationFile)
+        found = parse_own_json(
+            read_bytes(file, STATION_KEY_FILE, MEGABYTE), _StationFile
+        )
     except DamagedError as error:
         raise FileError("signing.key-damaged", file=file) from error
     return chain_of(found.station_key)
