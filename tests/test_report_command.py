@@ -114,7 +114,6 @@ def test_a_measured_part_is_put_on_paper(
         "independent_expanded_uncertainty": 0.006,
         "probability_of_conformity": 0.9,
         "decision": "accepted",
-        "budget": {"points": 0.003, "tip": 0.001},
     }
     feature = {
         "name": "hole",
@@ -127,11 +126,6 @@ def test_a_measured_part_is_put_on_paper(
         "form_error_mm": 0.002,
         "n_touches": 3,
     }
-    moved = {
-        "position": 2,
-        "first_from_here_rotation": [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0, 0, 1.0]],
-        "first_from_here_translation_mm": [1.0, 2.0, 3.0],
-    }
     refinement = {
         "features": ["hole"],
         "is_used": True,
@@ -141,11 +135,10 @@ def test_a_measured_part_is_put_on_paper(
         "chi_square": 8.5,
         "degrees_of_freedom": 9,
     }
-    again = {**touch, "feature": "hole@2", "point_cam_mm": [5.0, 6.0, 900.0]}
+    again = {**touch, "feature": "hole", "point_cam_mm": [5.0, 6.0, 900.0]}
     record = {
         **record_heading(local_now()),
         "verification": "part",
-        "positions": [moved],
         "refinement": refinement,
         "pen": "LP-04",
         "tip": "T-10",

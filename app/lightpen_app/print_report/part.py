@@ -8,7 +8,7 @@ from PySide6.QtCore import QCoreApplication, QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
 
 from lightpen.arrays import FloatArray
-from lightpen.record.folder.verifications import BALL_CENTRE, at_position
+from lightpen.record.folder.verifications import BALL_CENTRE
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.print_report.blocks import (
@@ -36,15 +36,14 @@ N_DECIMALS = 4
 
 
 def part_blocks(record: Mapping[str, Any]) -> Iterator[Block]:
-    """Yield characteristics, budget, features, alignment, points and plan."""
+    """Yield characteristics, features, alignment, points and plan."""
     yield heading(translate("paper", "Characteristics / mm, degrees"))
     yield from _characteristics(record["characteristics"])
-    yield from _budget(record["characteristics"])
     yield heading(translate("paper", "Features / mm, degrees"))
     yield from _features(record["features"])
     yield from _alignment(record["alignment"])
     yield heading(translate("paper", "Points"))
-    yield from _points(record["touches"], record["positions"])
+    yield from _points(record["touches"])
     yield heading(translate("paper", "Measuring plan"))
     yield from _plan(record["plan"])
 
@@ -92,17 +91,6 @@ def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
     yield paragraph(
         translate("paper", "P: probability of conformity (JCGM 106)."), PrintSize.SMALL
     )
-
-
-def _budget(entries: list[dict[str, Any]]) -> Iterator[Block]:
-    budgets = {each["name"]: each["budget"] for each in entries if each["budget"]}
-    if not budgets:
-        return
-    names = list(next(iter(budgets.values())))
-    yield heading(translate("paper", "Uncertainty budget, U (k = 2) by source"))
-    columns = [Column(translate("paper", "Characteristic"), 2.2), *_numbers(*names)]
-    rows = [[name, *map(_text, own.values())] for name, own in budgets.items()]
-    yield from table(columns, rows, size=PrintSize.SMALL)
 
 
 def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
@@ -160,18 +148,10 @@ def _alignment(alignment: dict[str, Any] | None) -> Iterator[Block]:
     yield from table(columns, rows, size=PrintSize.SMALL)
 
 
-def _points(
-    touches: list[dict[str, Any]], positions: list[dict[str, Any]]
-) -> Iterator[Block]:
+def _points(touches: list[dict[str, Any]]) -> Iterator[Block]:
     """Yield a plot of all points with their deviations, from the flattest side."""
     points = np.array([each["point_cam_mm"] for each in touches])
     off = np.array([each["deviation_cam_mm"] or [0, 0, 0] for each in touches])
-    for each in positions:
-        tail = at_position("", each["position"])
-        own = [touch["feature"].endswith(tail) for touch in touches]
-        turn = np.array(each["first_from_here_rotation"]).T
-        points[own] = points[own] @ turn + each["first_from_here_translation_mm"]
-        off[own] = off[own] @ turn
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
     if len(axes) < 2:

@@ -119,7 +119,7 @@ class BandChart(QWidget):
         painter.setFont(font(TextSize.SMALL))
         below = QRectF(place.x() - 5 * GRID, place.y(), 10 * GRID, 2 * GRID)
         center = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
-        painter.drawText(below, center, f"{limit:.6g}")
+        painter.drawText(below, center, f"{round(limit, MOST_DECIMALS):.7g}")
         painter.restore()
 
     def _draw_bar(

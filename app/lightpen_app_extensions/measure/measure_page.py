@@ -37,7 +37,6 @@ from lightpen_extensions.measure.verification.session.session_state import (
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.part_course import (
     FeatureSoFar,
-    base_name,
     course,
     feature_so_far,
     planned_at,
@@ -55,7 +54,9 @@ class MeasurePresenter(VerifyPresenter):
 
     @override
     def view(self) -> VerifyView:
-        return replace(super().view(), can_be_accepted=False)
+        view = super().view()
+        begins_anew = view.can_start_over and not self._status.is_done
+        return replace(view, can_be_accepted=False, can_start_over=begins_anew)
 
     @override
     def next_step(self) -> str:
@@ -85,7 +86,7 @@ class MeasurePresenter(VerifyPresenter):
         for i, planned in enumerate(features):
             name = planned.name
             if i < n_done:
-                values = ends.get(base_name(name), [])
+                values = ends.get(name, [])
                 rows += [_value_row(each) for each in values]
                 if not values:
                     rows.append(CheckRow(name, "", *DECISION_MARKS[None]))
@@ -101,8 +102,8 @@ class MeasurePresenter(VerifyPresenter):
         self, setup: SessionSetup, state: SessionState
     ) -> dict[str, list[Band]]:
         """Return the values so far by the last probed of their features."""
-        names = [base_name(e.name) for e in course(setup.choices.options_of(PART))]
-        order = {name: i for i, name in enumerate(dict.fromkeys(names))}
+        features = course(setup.choices.options_of(PART))
+        order = {each.name: i for i, each in enumerate(features)}
         found: dict[str, list[Band]] = {}
         for band in bands_so_far(setup, state):
             last = max((n for n in band.of if n in order), key=order.__getitem__)
@@ -128,7 +129,7 @@ class MeasurePresenter(VerifyPresenter):
         name = now.planned.name
         title = name if not kind or kind in name else f"{name} ({kind})"
         before = planned_at(options, len(state.runs) - 1) if state.runs else None
-        last = None if before is None else base_name(before.name)
+        last = None if before is None else before.name
         ended = self._values_by_last(setup, state).get(last or "", [])
         live = self._live_deviation(now, state)
         return FigureValue(title, live, picture, tuple(ended))
@@ -238,7 +239,7 @@ class MeasurePage(ProbingPage):
         # Layout
         self._rows.insertWidget(0, self._plan)
         self._figure.head.addWidget(self._plan.of_feature)
-        self._use_room()
+        self._progress.add_button(self._plan.of_part)
 
         self._on_workbench_changed()
         self._retranslate()
@@ -258,15 +259,6 @@ class MeasurePage(ProbingPage):
             self._plan.pick_plan()
         else:
             super().run_main_action()
-
-    @override
-    def _use_room(self) -> None:
-        super()._use_room()
-        of_part, is_narrow = self._plan.of_part, self._room.is_narrow
-        self._tabs.setCornerWidget(QWidget() if is_narrow else of_part)
-        if is_narrow:
-            self._rows.addWidget(of_part)
-        of_part.show()
 
     @override
     def _show(self) -> None:

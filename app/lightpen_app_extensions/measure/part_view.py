@@ -57,21 +57,16 @@ def part_value(setup: SessionSetup, state: SessionState) -> PartValue:
     tip = touching.held[-1].tip_cam if is_seen else None
     if found is not None:
         part = found.part
-        points, off = part.touches.points_cam.copy(), np.zeros((len(found.points), 3))
+        points, off = part.touches.points_cam, np.zeros((len(found.points), 3))
         for i, offset in enumerate(found.deviations()):
             off[i] = 0.0 if offset is None else offset
-        for position, motion in part.ties.items():
-            moved = part.touches.in_position(position)
-            points[moved] = points[moved] @ motion.rotation.T + motion.translation
-            off[moved] = off[moved] @ motion.rotation.T
         outlines = [line for one in part.features.values() for line in outline_of(one)]
         return PartValue(points, off, tuple(outlines), tip=tip)
     options = setup.choices.options_of(PART)
-    begin = options.moves[-1].run if options.moves else 0  # where the part is now
-    runs = (*progress.runs, progress.points)[begin:]
+    runs = *progress.runs, progress.points
     shown = [EMPTY]
     offsets, lines = [EMPTY], list[FloatArray]()
-    for planned, run in zip(course(options)[begin:], runs, strict=False):
+    for planned, run in zip(course(options), runs, strict=False):
         _, fit = fit_of(planned, run, setup.instrument)
         shown.append(np.array([point.point_cam for point in run]).reshape(-1, 3))
         offsets.append(np.zeros_like(shown[-1]) if fit is None else fit.offsets)

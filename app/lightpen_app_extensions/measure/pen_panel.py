@@ -3,13 +3,14 @@
 from functools import partial
 
 import numpy as np
-from PySide6.QtGui import QShowEvent
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.comparisons.pen_health import PenHealth
 from lightpen.comparisons.pen_over_time import PenOverTime, read_pen_over_time
 from lightpen.comparisons.records import BY_SIMPLE_ACCEPTANCE
+from lightpen.estimation.reports.verdict import Grade
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.quantities import MICROMETRES, number_text
@@ -29,6 +30,8 @@ PPM = 1e6
 
 class PenPanel(Translated, QWidget):
     """Shows the pen that is chosen over its swings."""
+
+    changed = Signal()  # what is found of it
 
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
@@ -59,27 +62,14 @@ class PenPanel(Translated, QWidget):
         """Cancel the running job."""
         self._reading.cancel()
 
-    @override
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self._read()
+    @property
+    def grade(self) -> Grade | None:
+        """What the swings say of the pen; None as long as they are too few."""
+        found = None if self._shown is None else self._shown.health
+        return None if found is None else found.assessment.grade
 
-    @override
-    def _retranslate(self) -> None:
-        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
-        self._head.setText(head)
-        self._table.setAccessibleName(head)
-        self._refresh()
-
-    def _on_workbench_changed(self) -> None:
-        if self.isVisible() and self._chosen() != self._read_of:
-            self._read()
-
-    def _chosen(self) -> tuple[object, ...]:
-        now = self._selection.preparation
-        return now.names.pen, now.origin, now.pen_file, now.camera_file
-
-    def _read(self) -> None:
+    def read(self) -> None:
+        """Read the swings of the pen that is chosen."""
         now, archive = self._selection.preparation, self._run.archive
         if self._chosen() != self._read_of:
             self._shown = None
@@ -89,6 +79,21 @@ class PenPanel(Translated, QWidget):
             work = partial(read_pen_over_time, archive, now)
             self._reading.start(work, self._on_read, self._on_unread)
         self._refresh()
+
+    @override
+    def _retranslate(self) -> None:
+        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
+        self._head.setText(head)
+        self._table.setAccessibleName(head)
+        self._refresh()
+
+    def _on_workbench_changed(self) -> None:
+        if self._read_of and self._chosen() != self._read_of:
+            self.read()
+
+    def _chosen(self) -> tuple[object, ...]:
+        now = self._selection.preparation
+        return now.names.pen, now.origin, now.pen_file, now.camera_file
 
     def _on_read(self, found: PenOverTime) -> None:
         self._shown = found
@@ -108,6 +113,7 @@ class PenPanel(Translated, QWidget):
             widget.setVisible(health is not None)
         if health is not None and found is not None:
             self._table.set_value(self._figures(found, health))
+        self.changed.emit()
 
     def _health_message(self, health: PenHealth | None) -> StatusMessage:
         if self._unread:

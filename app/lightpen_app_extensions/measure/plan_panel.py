@@ -6,7 +6,7 @@ from pathlib import Path
 
 from msgspec import structs
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QWidget
+from PySide6.QtWidgets import QFileDialog, QWidget
 from typing_extensions import override
 
 from lightpen.formats.file_format import FileFormat
@@ -34,7 +34,6 @@ from lightpen_extensions.measure.verification.session.status import Verification
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.part_course import (
     PartOptions,
-    base_name,
     planned_at,
 )
 
@@ -85,9 +84,7 @@ class PlanPanel(Translated, QWidget):
         self._kind = ChoiceField()
         for kind in (None, *FeatureKind):
             self._kind.addItem("", None if kind is None else kind.value)
-        self._scan = QCheckBox()
-        self._moved, self._save_plan, self._export = (PushButton() for _ in range(3))
-        self._other = PushButton()
+        self._save_plan, self._export, self._other = (PushButton() for _ in range(3))
 
         # Layout
         vertical_layout(self, self._question, (self._start, 1))
@@ -98,8 +95,8 @@ class PlanPanel(Translated, QWidget):
             button.setMinimumSize(BUTTON_WIDTH, BUTTON_HEIGHT)
             horizontal_layout(rows, button, (words, 1), spacing=3 * GRID)
         fill(rows, (self._artefact, 0, Qt.AlignmentFlag.AlignLeft), 2)
-        horizontal_layout(self.of_feature, self._kind, self._scan)
-        of_part = self._moved, self._save_plan, self._export, self._other
+        horizontal_layout(self.of_feature, self._kind)
+        of_part = self._save_plan, self._export, self._other
         horizontal_layout(self.of_part, *of_part)
 
         # Connections
@@ -111,8 +108,6 @@ class PlanPanel(Translated, QWidget):
         self._artefact.activated.connect(self._on_artefact_chosen)
         workbench.library.changed.connect(self._list_artefacts)
         self._kind.activated.connect(self._on_kind_chosen)
-        self._scan.clicked.connect(self._on_scan_clicked)
-        self._moved.clicked.connect(self._on_moved_clicked)
         self._save_plan.clicked.connect(self._on_save_plan_clicked)
         self._export.clicked.connect(self._on_export_clicked)
 
@@ -125,11 +120,8 @@ class PlanPanel(Translated, QWidget):
         planned = self._planned()
         is_taught = planned is not None and planned.nominal is None
         self.of_feature.setVisible(is_taught)
-        has_runs = status.state is not None and bool(status.state.runs)
-        self._moved.setVisible(planned is not None and has_runs)
         kind = None if planned is None else planned.kind
         self._kind.setCurrentIndex(self._kind.findData(kind and kind.value))
-        self._scan.setChecked(planned is not None and planned.scan)
         is_simulated = self._live.operator is not None
         why_not = "" if is_simulated else self.tr("Only with the simulated camera.")
         self._plate.set_why_not(why_not)
@@ -186,18 +178,6 @@ class PlanPanel(Translated, QWidget):
         self._kind.setItemText(0, self.tr("Recognise"))
         for index, kind in enumerate(FeatureKind, start=1):
             self._kind.setItemText(index, worded(NAMES[kind]))
-        self._scan.setText(self.tr("Scan"))
-        set_tooltip(
-            self._scan, self.tr("Hold still on the feature, then slide along it.")
-        )
-        self._moved.setText(self.tr("Part moved"))
-        set_tooltip(
-            self._moved,
-            self.tr(
-                "Part or camera was moved: probe three datum points again, which "
-                "connect the new position with the old."
-            ),
-        )
         self._save_plan.setText(self.tr("Save plan..."))
         set_tooltip(
             self._save_plan,
@@ -267,28 +247,18 @@ class PlanPanel(Translated, QWidget):
     def _on_kind_chosen(self) -> None:
         word = self._kind.currentData()
         kind = None if word is None else FeatureKind(word)
-        self._change(lambda each: structs.replace(each, kind=kind))
-
-    def _on_scan_clicked(self) -> None:
-        scan = self._scan.isChecked()
-        self._change(lambda each: structs.replace(each, scan=scan))
-
-    def _change(self, changed: Callable[[PlannedFeature], PlannedFeature]) -> None:
         plan, planned = self._plan(), self._planned()
         if plan is None or planned is None:
             return
-        name = base_name(planned.name)
+        changed = structs.replace(planned, kind=kind)
         features = tuple(
-            changed(each) if each.name == name else each for each in plan.features
+            changed if e.name == planned.name else e for e in plan.features
         )
         choices = self._service.choices
         options = structs.replace(
             choices.options_of(PART), plan=structs.replace(plan, features=features)
         )
         self._service.set_choices(choices.with_options(options))
-
-    def _on_moved_clicked(self) -> None:
-        self._run.runner.ask(lambda workflow: workflow.part_moved())
 
     def _on_save_plan_clicked(self) -> None:
         part = self._part()

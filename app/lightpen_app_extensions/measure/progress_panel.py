@@ -88,7 +88,7 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         numbers = 1, self._count, self._progress, 1
         vertical_layout(self._numbers, *numbers, spacing=GRID // 2)
         buttons = self._accept, self._report, self._act, self._undo, self._start_over
-        horizontal_layout(self._buttons, *buttons, 1)
+        self._row = horizontal_layout(self._buttons, *buttons, 1)
         fill(layout, self._lamps)
         self._use_room()
 
@@ -126,6 +126,10 @@ class ProgressPanel(ResponsiveLayout, Translated, QWidget):
         self._report.setVisible(view.has_report)
         if not view.can_be_accepted:
             self._reason.hide()
+
+    def add_button(self, button: QWidget) -> None:
+        """Add a button, or several, after the others."""
+        self._row.insertWidget(self._row.count() - 1, button)
 
     def toggle_pause(self) -> None:
         """Pause the verification, or continue."""

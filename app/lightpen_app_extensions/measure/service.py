@@ -127,7 +127,7 @@ class MeasureService(Service):
         chosen, is_part = self.choices, under_way.choices.task is PART
         kind = chosen.kind if is_part else under_way.choices.kind
         again = replace(under_way.choices, kind=kind, limits=chosen.limits)
-        self.set_choices(again.with_moves(()))  # as in the session
+        self.set_choices(again)  # as in the session
         self._resumed = found
         run = self.measuring if is_part else self.verification
         run.runner.ask(lambda workflow: workflow.go_on(found))

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 from typing_extensions import override
 
+from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.artefacts import Artefact
+from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
@@ -24,6 +26,7 @@ class ChecksPresenter(VerifyPresenter):
     def __init__(self, service: MeasureService) -> None:
         super().__init__(service, service.verification)
         self._library = service.workbench.library
+        self.pen_grade: Grade | None = None  # None until it is known
 
     @property
     def artefacts(self) -> dict[str, Artefact]:
@@ -32,9 +35,12 @@ class ChecksPresenter(VerifyPresenter):
 
     @override
     def rows(self) -> tuple[CheckRow, ...]:
-        others = *self.artefacts, self.tr("Pen")
-        quiet = (CheckRow(name, "", Sign.RING, Tone.QUIET) for name in others)
-        return (*super().rows(), *quiet)
+        quiet = (CheckRow(name, "", Sign.RING, Tone.QUIET) for name in self.artefacts)
+        name, grade = self.tr("Pen"), self.pen_grade
+        pen = CheckRow(name, "", Sign.RING, Tone.QUIET)
+        if grade is not None:
+            pen = CheckRow(name, self._grade_text(grade), *GRADE_MARKS[grade])
+        return (*super().rows(), *quiet, pen)
 
     @override
     def figure(self, row: int) -> FigureValue:
@@ -65,6 +71,7 @@ class VerifyPage(ProbingPage):
         # Connections
         self._checks.chosen.connect(self._on_row_chosen)
         self._figure.asked.connect(self._on_asked)
+        self._pen.changed.connect(self._on_pen_read)
 
         self._on_workbench_changed()
         self._retranslate()
@@ -72,6 +79,11 @@ class VerifyPage(ProbingPage):
     @override
     def title(self) -> str:
         return self.tr("Verify")
+
+    @override
+    def entered(self) -> None:
+        super().entered()
+        self._pen.read()
 
     @override
     def shut_down(self) -> None:
@@ -93,6 +105,10 @@ class VerifyPage(ProbingPage):
     def _on_row_chosen(self, row: int) -> None:
         self._row = None if row == self._view.current else row
         self._show()
+
+    def _on_pen_read(self) -> None:
+        self._lists.pen_grade = self._pen.grade
+        self._show_soon()
 
     def _on_asked(self) -> None:
         row, choices = self._shown_row(), self._service.choices

@@ -66,7 +66,6 @@ MESSAGES = {
     "part.nothing-probed": "No feature of the plan was probed. Probe at least one.",
     "part.of-kind": "the {kind} {name}",
     "part.instruction": "Probe {what}: {n_points} of {needed} points.",
-    "part.slide": "Slide along {what}: {n_points} of {needed} points.",
     "part.deviation": "Deviation",
     "part.features-in-part": "Features in the part frame / mm, angles / degrees, k = 2",
     "part.features-in-camera": "Features in the camera frame / mm, angles / degrees, k = 2",
@@ -96,10 +95,5 @@ MESSAGES = {
     "part.csv": "CSV, a row for each characteristic",
     "part.qdas": "Q-DAS (AQDEF), for statistics",
     "part.qif": "QIF 3.0 results",
-    "measuring.not-tied": "Position {position} shares {n_shared} datum points (points, circles, spheres) with the positions before; at least {needed} are needed. Probe more of them again.",
-    "part.few-datums": "{n_points} points, circles and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.",
-    "part.moved": "Position {position}: datum points agree with the first position within {residual:.4f} mm.",
-    "part.datums-moved": "Position {position}: datum points are up to {residual:.4f} mm off the first position, much more than their U. The datum points were not the same, or the part moved once more.",
-    "part.probe-again": "Measure the part again.",
     "measuring.no-format": "The suffix of {file} is no export format. Use one of {suffixes}.",
 }

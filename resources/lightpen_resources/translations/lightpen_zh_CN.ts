@@ -3285,22 +3285,6 @@
         <translation>识别</translation>
     </message>
     <message>
-        <source>Scan</source>
-        <translation>扫描</translation>
-    </message>
-    <message>
-        <source>Hold still on the feature, then slide along it.</source>
-        <translation>在要素上停稳，然后沿要素滑动。</translation>
-    </message>
-    <message>
-        <source>Part moved</source>
-        <translation>工件已移动</translation>
-    </message>
-    <message>
-        <source>Part or camera was moved: probe three datum points again, which connect the new position with the old.</source>
-        <translation>工件或相机已移动：重新触测三个基准点，把新位置与原位置联系起来。</translation>
-    </message>
-    <message>
         <source>Save plan...</source>
         <translation>保存测量计划...</translation>
     </message>
@@ -6036,10 +6020,6 @@ needed</source>
         <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
     </message>
     <message>
-        <source>Position {position} shares {n_shared} datum points (points, circles, spheres) with the positions before; at least {needed} are needed. Probe more of them again.</source>
-        <translation>位置 {position} 与先前位置共有 {n_shared} 个基准点（点、圆、球）；至少需要 {needed} 个。请再触测几个。</translation>
-    </message>
-    <message>
         <source>Press test: U of the bending is {uncertainty:.4f} mm, too large to count.</source>
         <translation>压力试验：弯曲的 U 为 {uncertainty:.4f} mm，过大，不予采用。</translation>
     </message>
@@ -7428,10 +7408,6 @@ needed</source>
         <translation>有 {n_others} 个光点一起移动，但不随光笔移动：可能有第二支光笔或反射镜，或者变焦已改变。请将其移走或遮住，锁定变焦，然后重新摆动。</translation>
     </message>
     <message>
-        <source>{n_points} points, circles and spheres were probed; {needed} that are not on one line are needed as datum points to connect the new position. Start over.</source>
-        <translation>已触测 {n_points} 个点、圆和球；联系新位置需要 {needed} 个不共线的基准点。请重新开始。</translation>
-    </message>
-    <message>
         <source>{n_poses} poses are usable; the tip needs at least {needed}. Capture more images.</source>
         <translation>可用位姿 {n_poses} 个；求测头至少需要 {needed} 个。请采集更多图像。</translation>
     </message>
@@ -7848,10 +7824,6 @@ needed</source>
         <translation>最大变化 {limit:g} mm 无效。请输入大于 0 且不超过 {most:g} mm 的值。</translation>
     </message>
     <message>
-        <source>Measure the part again.</source>
-        <translation>请重新测量工件。</translation>
-    </message>
-    <message>
         <source>Monte Carlo confirms U: the largest difference is {percent:.0f} % along {axis}, with a standard error of {own:.0f} %.</source>
         <translation>蒙特卡洛法证实了 U：最大差异沿 {axis} 为 {percent:.0f} %，标准误差为 {own:.0f} %。</translation>
     </message>
@@ -8006,14 +7978,6 @@ needed</source>
     <message>
         <source>Point {number}</source>
         <translation>测点 {number}</translation>
-    </message>
-    <message>
-        <source>Position {position}: datum points agree with the first position within {residual:.4f} mm.</source>
-        <translation>位置 {position}：基准点与第一位置的偏差不超过 {residual:.4f} mm。</translation>
-    </message>
-    <message>
-        <source>Position {position}: datum points are up to {residual:.4f} mm off the first position, much more than their U. The datum points were not the same, or the part moved once more.</source>
-        <translation>位置 {position}：基准点与第一位置相差达 {residual:.4f} mm，远大于其 U。所测基准点不是同一些点，或工件又移动了。</translation>
     </message>
     <message>
         <source>Press test without result: {why}</source>
@@ -8246,10 +8210,6 @@ needed</source>
     <message>
         <source>Probe {what}: {n_points} of {needed} points.</source>
         <translation>触测{what}：{n_points} / {needed} 个点。</translation>
-    </message>
-    <message>
-        <source>Slide along {what}: {n_points} of {needed} points.</source>
-        <translation>沿{what}滑动：{n_points} / {needed} 点。</translation>
     </message>
     <message>
         <source>Standard deviation {axis}</source>
@@ -10454,10 +10414,6 @@ needed</source>
     <message>
         <source>Decision</source>
         <translation>判定</translation>
-    </message>
-    <message>
-        <source>Uncertainty budget, U (k = 2) by source</source>
-        <translation>不确定度预算，各来源的 U (k = 2)</translation>
     </message>
     <message>
         <source>Feature</source>

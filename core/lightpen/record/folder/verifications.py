@@ -164,8 +164,3 @@ def conditions_entries(
     """Return the measured environment as entries of a record."""
     conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
     return {name: each for name, each in conditions.items() if each is not None}
-
-
-def at_position(name: str, position: int) -> str:
-    """Return the owner of touches after part or camera were moved to a position."""
-    return name if position == 1 else f"{name}@{position}"

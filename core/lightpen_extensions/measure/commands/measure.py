@@ -50,8 +50,8 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         metavar="TOUCHES",
         help="FEATURE=IMAGES for each feature of the plan (image folder, pattern, "
         "video, record, or LED centres as CSV), or a folder with a folder or CSV file "
-        "for each feature; FEATURE@2 for those probed after the part or the camera "
-        f"was moved; of {POINTS}: IMAGES",
+        "for each feature; "
+        f"of {POINTS}: IMAGES",
     )
     add_touch_inputs(parser, "calibration to measure with")
     add_ball(
@@ -147,7 +147,7 @@ def _places(plan: Plan, given: Sequence[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for text in given:
         name, equals, place = text.partition("=")
-        if equals and name.partition("@")[0] in names:
+        if equals and name in names:
             found[name] = place
             continue
         folder = Path(text)
@@ -157,14 +157,9 @@ def _places(plan: Plan, given: Sequence[str]) -> dict[str, str]:
             )
         for path in sorted(folder.iterdir()):
             own = path.stem if _is_csv(path.name) else path.name
-            if own.partition("@")[0] in names:
+            if own in names:
                 found[own] = str(path)
     for name in names:
-        if not any(own.partition("@")[0] == name for own in found):
+        if name not in found:
             raise FileError("measuring.no-touches", name=name)
-    return dict(sorted(found.items(), key=lambda item: _order(names, item[0])))
-
-
-def _order(names: Sequence[str], name: str) -> tuple[int, int]:
-    feature, _, position = name.partition("@")
-    return names.index(feature), int(position) if position.isdigit() else 1
+    return {name: found[name] for name in names}

@@ -1,4 +1,4 @@
-"""The frame of a part: by 3-2-1, by nominal points, or by datum points touched again.
+"""The frame of a part: by 3-2-1, or by nominal points.
 
 An alignment is the rigid motion ``part_from_cam``; as a quantity it has the values of a
 rotation vector and a translation, with their derivative by all inputs, so that results
@@ -6,13 +6,12 @@ in the frame of the part hold what the alignment leaves uncertain.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import (
     nearest_rotation,
     rotation_from_vector,
@@ -26,7 +25,6 @@ from lightpen_extensions.measure.measuring.quantities import (
 )
 
 MIN_POINTS = 3
-DISAGREEING = 3.0  # times U of a datum point; form errors make some of it
 THIN = 1e-3  # of the extent: points on a line determine no frame
 
 
@@ -36,14 +34,6 @@ class Alignment:
 
     motion: Quantity  # rotation vector and translation of part_from_cam, rad and mm
     residuals: FloatArray  # (N,), of datum points from nominals; empty for 3-2-1
-    # (N,), U (k = 2) of them where both touches of a point are known; else empty
-    residual_uncertainties: FloatArray = field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def is_consistent(self) -> bool:
-        """Whether datum points that were touched again are where they were."""
-        limits = DISAGREEING * self.residual_uncertainties
-        return not len(limits) or bool((self.residuals <= limits).all())
 
     @property
     def rotation(self) -> FloatArray:
@@ -58,15 +48,6 @@ class Alignment:
     def in_part(self, feature: Quantity) -> Quantity:
         """Return the values of a feature in the frame of the part."""
         return derive(_in_part, self.motion, feature)
-
-    def moved(self, points: Quantity) -> Quantity:
-        """Return the coordinates (3 n,) of points in the frame of the part."""
-        return derive(_moved_points, self.motion, points)
-
-
-def _moved_points(motion: FloatArray, points: FloatArray) -> FloatArray:
-    moved = points.reshape(-1, 3) @ rotation_from_vector(motion[:3]).T + motion[3:]
-    return np.asarray(moved.ravel())
 
 
 def _in_part(motion: FloatArray, feature: FloatArray) -> FloatArray:
@@ -124,34 +105,6 @@ def align_points(points: Sequence[Quantity], nominals: FloatArray) -> Alignment:
     found = derive(motion, places)
     R, t = rotation_from_vector(found.values[:3]), found.values[3:]
     return Alignment(found, np.linalg.norm(actual @ R.T + t - nominals, axis=1))
-
-
-def tie(
-    then: Sequence[Quantity], now: Sequence[Quantity], inputs: FloatArray
-) -> Alignment:
-    """Return the motion that brings datum points, probed again, back into place.
-
-    The part or the camera was moved in between. The origins of the same features before
-    and after count. Both touches of each point are uncertain, and the motion carries
-    the covariance of both, given the covariance of all inputs, (P, P).
-    """
-    n = len(then)
-
-    def motion(*values: FloatArray) -> FloatArray:
-        before = np.array([each[PLACE] for each in values[:n]])
-        after = [Quantity(each[PLACE], np.zeros((3, 1))) for each in values[n:]]
-        return align_points(after, before).motion.values
-
-    before = np.array([each.values[PLACE] for each in then])
-    fit = align_points(now, before)
-    differences = [
-        fit.rotation @ after.by_inputs[PLACE] - earlier.by_inputs[PLACE]
-        for earlier, after in zip(then, now, strict=True)
-    ]
-    variances = [float(np.trace(D @ inputs @ D.T)) for D in differences]
-    return Alignment(
-        derive(motion, *then, *now), fit.residuals, COVERAGE_FACTOR * np.sqrt(variances)
-    )
 
 
 def _thinness(points: FloatArray) -> float:

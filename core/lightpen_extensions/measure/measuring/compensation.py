@@ -76,8 +76,8 @@ class ProbedFeature:
     planned: PlannedFeature
     fit: Feature
     at: IntArray  # touches
-    quantity: Quantity  # of the fit, in the position that all results refer to
-    points: Quantity  # (3 n,), ball centres, likewise
+    quantity: Quantity  # of the fit
+    points: Quantity  # (3 n,), ball centres
 
     @property
     def kind(self) -> FeatureKind:

@@ -1,7 +1,7 @@
 """Measurement of a part: features, alignment and characteristics of a plan."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -13,14 +13,11 @@ from lightpen.model.artefacts import Side
 from lightpen.model.decision_rules import Decision, conformity_probability, decide
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.record.folder.verifications import at_position
 from lightpen_extensions.measure.measuring import constructions
 from lightpen_extensions.measure.measuring.alignment import (
-    MIN_POINTS,
     Alignment,
     align_321,
     align_points,
-    tie,
 )
 from lightpen_extensions.measure.measuring.characteristics import (
     DEVIATIONS,
@@ -57,12 +54,7 @@ from lightpen_extensions.measure.measuring.quantities import (
     quantity_of,
 )
 from lightpen_extensions.measure.measuring.recognition import recognise, recognised
-from lightpen_extensions.measure.measuring.surfaces import (
-    CENTRED,
-    NAMES,
-    SURFACES,
-    FeatureKind,
-)
+from lightpen_extensions.measure.measuring.surfaces import NAMES, SURFACES, FeatureKind
 from lightpen_extensions.measure.measuring.touches import PartTouches
 from lightpen_extensions.measure.measuring.zones import Criterion, fit_zone
 
@@ -111,8 +103,6 @@ class MeasuredPart:
     features: Mapping[str, Measured]  # all features and constructed features by name
     alignment: Alignment | None  # None if results are in the frame of the camera
     results: tuple[CharacteristicResult, ...]
-    # Motion of each later position to the first one, by datum points.
-    ties: Mapping[int, Alignment] = field(default_factory=dict)
 
     def uncertainty(self, name: str) -> FloatArray:
         """Return U (k = 2) of a feature's values in the frame of the part."""
@@ -133,7 +123,7 @@ def measure_part(
     limits = replace(limits, rule=plan.rule or limits.rule)
     were_recognised = {each.name for each in plan.features if each.kind is None}
     plan = _with_kinds(plan, touches)
-    probed, ties = _probed(plan, touches)
+    probed = {each.name: _of_centres(each, touches) for each in plan.features}
     surfaces = _surfaces(plan, probed, touches, were_recognised)
     alignment = _aligned(plan, surfaces)
     features = {}
@@ -148,58 +138,13 @@ def measure_part(
     results = tuple(
         _result(planned, features, touches, limits) for planned in plan.characteristics
     )
-    return MeasuredPart(plan, touches, features, alignment, results, ties)
+    return MeasuredPart(plan, touches, features, alignment, results)
 
 
-def _probed(
-    plan: Plan, touches: PartTouches
-) -> tuple[dict[str, ProbedFeature], dict[int, Alignment]]:
-    """Return the features of ball centres, all in the first position.
-
-    Features with a centre that were probed in an earlier position and in a later one
-    are the datum points that tie the two together.
-    """
-    ties: dict[int, Alignment] = {}
-    probed: dict[str, ProbedFeature] = {}
-    for position in touches.positions:
-        own: dict[str, ProbedFeature] = {}
-        for each in plan.features:
-            name = at_position(each.name, position)
-            at = touches.of(name)
-            if len(at) or (position == 1 and not len(touches.first_of(each.name))):
-                own[each.name] = _of_centres(each, name, touches)
-        if position > 1:
-            shared = [n for n in own if n in probed and own[n].kind in CENTRED]
-            if len(shared) < MIN_POINTS:
-                raise CalibrationError(
-                    "measuring.not-tied",
-                    position=position,
-                    n_shared=len(shared),
-                    needed=MIN_POINTS,
-                )
-            ties[position] = motion = tie(
-                [probed[name].quantity for name in shared],
-                [own[name].quantity for name in shared],
-                touches.inputs,
-            )
-            own = {
-                name: replace(
-                    each,
-                    quantity=motion.in_part(each.quantity),
-                    points=motion.moved(each.points),
-                )
-                for name, each in own.items()
-            }
-        probed = {**own, **probed}
-    return {each.name: probed[each.name] for each in plan.features}, ties
-
-
-def _of_centres(
-    planned: PlannedFeature, name: str, touches: PartTouches
-) -> ProbedFeature:
-    """Return a feature of the ball centres of a name."""
-    at = touches.of(name)
-    fit = _fitted(structs.replace(planned, name=name), touches)
+def _of_centres(planned: PlannedFeature, touches: PartTouches) -> ProbedFeature:
+    """Return a feature of its ball centres."""
+    at = touches.of(planned.name)
+    fit = _fitted(planned, touches)
     quantity = quantity_of(fit, 3 * at, touches.n_inputs)
     if fit.kind in {FeatureKind.LINE, FeatureKind.CYLINDER}:
         quantity = along_touches(quantity, touches.points_cam[at])
@@ -313,7 +258,7 @@ def taught_plan(part: MeasuredPart) -> Plan:
                 if each.kind is not FeatureKind.PLANE
                 and part.features[each.name].surface.evidence is Evidence.NONE
                 else each.side,
-                touches=len(part.touches.first_of(each.name)),
+                touches=len(part.touches.of(each.name)),
             )
             for each in part.plan.features
         ),
@@ -322,7 +267,7 @@ def taught_plan(part: MeasuredPart) -> Plan:
 
 def kind_of(name: str, touches: PartTouches) -> FeatureKind | None:
     """Return the kind that the touches of a feature show, if they do."""
-    at = touches.first_of(name)
+    at = touches.of(name)
     if not len(at):
         return None
     return recognise(

@@ -118,7 +118,6 @@ class PlannedFeature(_Entry, frozen=True):
     # plane that the points lie on.
     surface: str = ""
     normal: Vector | None = None
-    scan: bool = False  # whether the pen slides along the surface after its first touch
 
     @property
     def n_touches(self) -> int:

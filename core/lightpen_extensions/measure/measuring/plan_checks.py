@@ -136,8 +136,6 @@ def _of_feature(
         needed = SURFACES[each.kind].min_points
         if each.touches < needed:
             yield f"a {each.kind.value} needs {needed} touches"
-    if "@" in each.name:
-        yield "a name has no '@'"
     if each.nominal is not None and each.nominal.axis == (0, 0, 0):
         yield "the axis has the length 0"
     if each.normal == (0, 0, 0):

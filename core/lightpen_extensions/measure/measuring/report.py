@@ -130,17 +130,6 @@ def part_entries(part: MeasuredPart) -> dict[str, Any]:
             "covariance": alignment.motion.covariance(inputs),
             "residuals_mm": alignment.residuals,
         },
-        "positions": [
-            {
-                "position": position,
-                "first_from_here_rotation": motion.rotation,
-                "first_from_here_translation_mm": motion.translation,
-                "residuals_mm": motion.residuals,
-                "residual_uncertainties_mm": motion.residual_uncertainties,
-                "is_consistent": motion.is_consistent,
-            }
-            for position, motion in part.ties.items()
-        ],
         "features": [
             {
                 "name": name,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.record.folder.verifications import at_position
 from lightpen_extensions.measure.measuring.quantities import Quantity
 
 
@@ -19,16 +18,9 @@ class PartTouches:
     # (N, 3), unit vectors along which the ball came to the surface; NaN if unknown
     approaches_cam: FloatArray
     styli_cam: FloatArray  # (N, 3), unit vectors from the ball into the pen
-    owners: tuple[str, ...]  # feature of each touch, see `at_position`
+    owners: tuple[str, ...]  # feature of each touch
     ball_radius: float = 0.0  # mm; 0 to measure at the centre of the tip
     ball_uncertainty: float = 0.0  # U (k = 2) of the radius, mm
-
-    @property
-    def positions(self) -> tuple[int, ...]:
-        """Positions of part and camera, the first one first."""
-        tails = {owner.rpartition("@")[2] for owner in self.owners if "@" in owner}
-        later = sorted(int(tail) for tail in tails if tail.isdigit())
-        return (1, *(each for each in later if each > 1))
 
     @property
     def n_inputs(self) -> int:
@@ -53,16 +45,6 @@ class PartTouches:
     def of(self, name: str) -> IntArray:
         """Return the indices of the touches of a feature."""
         return np.flatnonzero([owner == name for owner in self.owners])
-
-    def in_position(self, position: int) -> IntArray:
-        """Return the indices of the touches in a position of part and camera."""
-        tail = at_position("", position)
-        return np.flatnonzero([owner.endswith(tail) for owner in self.owners])
-
-    def first_of(self, name: str) -> IntArray:
-        """Return the touches of a feature in the first position where it was probed."""
-        each = (self.of(at_position(name, position)) for position in self.positions)
-        return next((at for at in each if len(at)), self.of(name))
 
     def noise(self, touches: IntArray) -> float:
         """Return the standard deviation of a coordinate about the mean of touches, mm.

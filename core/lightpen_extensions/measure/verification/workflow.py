@@ -39,8 +39,6 @@ from lightpen_extensions.measure.verification.session.session import (
     SessionTransition,
     end_task,
     setup_of,
-    with_moved_part,
-    with_other_choices,
     without_last_touch,
 )
 from lightpen_extensions.measure.verification.session.session_state import (
@@ -74,7 +72,6 @@ from lightpen_extensions.measure.verification.storage.resuming import (
 from lightpen_extensions.measure.verification.storage.session_files import (
     SessionKeeping,
 )
-from lightpen_extensions.measure.verification.tasks.part import PART
 
 ANOTHER = message("verification.another-under-way")
 NOT_READY = message("verification.not-ready")
@@ -180,23 +177,6 @@ class VerificationWorkflow:
             return
         self._publish(replace(self._status, state=after))
 
-    def part_moved(self) -> None:
-        """Probe datum points again, as part or camera was moved, or report why not.
-
-        The points of the current feature are discarded.
-        """
-        self._faults.trying(self._part_moved)
-
-    def _part_moved(self) -> None:
-        setup, state = self._status.setup, self._status.state
-        if setup is None or state is None or self._status.task is not PART:
-            return
-        setup = with_moved_part(setup, state)
-        for _ in state.touches:
-            self.undo()
-        self._faults.end()
-        self._publish(replace(self._status, setup=setup))
-
     def accept(self, reason: str, signature: Signature | None = None) -> None:
         """Accept the tip despite findings, or report why not."""
         self._faults.trying(lambda: self._accept(reason.strip(), signature))
@@ -268,7 +248,7 @@ class VerificationWorkflow:
             self._on_not_resumed(error.message)
             return
         self._faults.end()
-        self._choices = before.setup.choices.with_moves(())  # of that session
+        self._choices = before.setup.choices  # of that session
         self._publish(
             VerificationStatus(
                 tip=before.tip,
@@ -368,7 +348,7 @@ class VerificationWorkflow:
         if choices.kind != setup.choices.kind:
             self._begin(tip)
             return
-        setup = with_other_choices(setup, choices)
+        setup = replace(setup, choices=choices)
         refusal = self._why_not(tip)
         self._publish(replace(status, setup=setup, refusal=refusal))
 

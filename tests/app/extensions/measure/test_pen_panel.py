@@ -1,17 +1,20 @@
 """What is reported of the pen is of the pen that is chosen now."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QCoreApplication, QThreadPool
 from pytestqt.qtbot import QtBot
+from tests.accepted_tip import accept_tip
 
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.workbench import Workbench
+from lightpen_app_extensions.measure.check_list import ROW, CheckList, CheckRow
 from lightpen_app_extensions.measure.pen_panel import PenPanel
-
-if TYPE_CHECKING:
-    pass
+from lightpen_app_extensions.measure.service import MeasureService
+from lightpen_app_extensions.measure.verify_page import VerifyPage
 
 
 def words(panel: PenPanel) -> str:
@@ -26,6 +29,7 @@ def test_swings_are_said_to_be_read_only_as_long_as_they_are(
     panel = PenPanel(workbench)
     qtbot.addWidget(panel)
     panel.show()
+    panel.read()
     assert words(panel) == "Reading the swings of the pen."
     QThreadPool.globalInstance().waitForDone()
     QCoreApplication.processEvents()
@@ -41,3 +45,29 @@ def test_swings_are_said_to_be_read_only_as_long_as_they_are(
 
     assert not words(panel)
     panel.shut_down()
+
+
+def test_the_pen_is_ticked_off_once_two_swings_of_it_are_read(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
+    page = VerifyPage(MeasureService(workbench), SilentSounds())
+    qtbot.addWidget(page)
+    panel = page.findChild(PenPanel)
+    checks = page.findChild(CheckList)
+    assert isinstance(panel, PenPanel)
+    assert isinstance(checks, CheckList)
+
+    def pen_row() -> CheckRow:
+        row = checks.item(checks.count() - 1).data(ROW)
+        assert isinstance(row, CheckRow)
+        return row
+
+    assert (pen_row().name, pen_row().sign) == ("Pen", Sign.RING)
+    for seed in (3, 4):
+        accept_tip(workbench.folder, workbench.selection.preparation, seed=seed)
+    panel.read()
+    qtbot.waitUntil(lambda: pen_row().value != "", timeout=60_000)
+
+    assert panel.grade is not None
+    assert (pen_row().sign, pen_row().tone) == GRADE_MARKS[panel.grade]
+    page.shut_down()

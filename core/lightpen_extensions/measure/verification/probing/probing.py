@@ -99,7 +99,6 @@ class ProbingState:
     path: tuple[FloatArray, ...] = ()  # earlier positions of the tip, (3,) each, mm
     taken: tuple[StillFrames, ...] = ()  # points probed so far
     places: tuple[TipObservation, ...] = ()  # one observation of each point
-    is_sliding: bool = False  # seen without a break since the last point
 
     def progress(self, rules: ProbingRules) -> float:
         """Return the completed fraction of a touch, 0 to 1."""
@@ -164,7 +163,7 @@ def advance_touch(
 def at_rest(state: ProbingState) -> ProbingState:
     """Return the touches so far; the pen must leave its place before the next."""
     moving = _let_go(state)
-    return replace(moving, phase=ProbingPhase.AT_REST, path=(), is_sliding=False)
+    return replace(moving, phase=ProbingPhase.AT_REST, path=())
 
 
 def take_all(
@@ -248,8 +247,7 @@ def _without_pose(
     if state.n_lost > MAX_LOST and state.phase is ProbingPhase.AT_REST:
         return ProbingTransition(replace(state, held=()))
     if state.n_lost > MAX_LOST:
-        let_go = replace(_let_go(state), is_sliding=False)
-        return ProbingTransition(let_go, _broken_off(rules, state))
+        return ProbingTransition(_let_go(state), _broken_off(rules, state))
     if state.phase is ProbingPhase.HOLDING:
         state = replace(state, rejected=(*state.rejected, rejected))
     return ProbingTransition(state)
@@ -290,13 +288,11 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
         return ProbingTransition(state)
     used = state.held[rules.n_settling :]
     if not _is_new(rules, state, used[0]):
-        if rules.n_frames == 1:  # the pen slides on
-            return ProbingTransition(replace(_let_go(state), path=()))
         return ProbingTransition(replace(state, phase=ProbingPhase.KNOWN))
     still = StillFrames(
         frames=tuple(each.frame for each in used),
         rejected=state.rejected,
-        approach_cam=approach_of(rules, state, used[0].tip_cam),
+        approach_cam=approach_of(state, used[0].tip_cam),
     )
     taken = replace(
         state,
@@ -305,7 +301,6 @@ def _held(rules: ProbingRules, state: ProbingState) -> ProbingTransition:
         path=(),
         taken=(*state.taken, still),
         places=(*state.places, used[0]),
-        is_sliding=True,
     )
     event = ProbingEvent(ProbingEventKind.RECORDED, tuple(map(_name, used)))
     return ProbingTransition(taken, (event,))
@@ -316,15 +311,8 @@ def _is_new(rules: ProbingRules, state: ProbingState, seen: TipObservation) -> b
     return all(_differs(seen, before, *least) for before in state.places)
 
 
-def approach_of(
-    rules: ProbingRules, state: ProbingState, tip_cam: FloatArray
-) -> FloatArray | None:
-    """Return the direction in which the tip came, if it came from far enough.
-
-    A pen that slides from one point to the next does not show it.
-    """
-    if rules.n_frames == 1:
-        return None
+def approach_of(state: ProbingState, tip_cam: FloatArray) -> FloatArray | None:
+    """Return the direction in which the tip came, if it came from far enough."""
     for before in reversed(state.path):
         way = tip_cam - before
         distance = float(np.linalg.norm(way))

@@ -2,14 +2,10 @@
 
 from dataclasses import dataclass, field, replace
 
-from msgspec import structs
-
 from lightpen.messages import Message
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.verification.probing.probing import FAST
 from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import Move
 from lightpen_extensions.measure.verification.tasks.registry import (
     ALL_TASKS,
     AnyOptions,
@@ -53,13 +49,6 @@ class VerificationChoices:
         ordered = (chosen.get(task.options) for task in ALL_TASKS)
         unusual = (each for each in ordered if each and each != type(each)())
         return replace(self, options=tuple(unusual))
-
-    def with_moves(self, moves: tuple[Move, ...]) -> "VerificationChoices":
-        """Return a copy with other moves of a part, which belong to one session."""
-        options = self.options_of(PART)
-        if options.moves == moves:
-            return self
-        return self.with_options(structs.replace(options, moves=moves))
 
     def missing(self, ball_diameter: float | None) -> Message | None:
         """Return the missing entry, with a ball of this diameter, mm."""

@@ -27,8 +27,6 @@ from lightpen_extensions.measure.verification.session.session_state import (
     numbered_runs,
     without_touches,
 )
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import with_move
 from lightpen_extensions.measure.verification.tasks.probed_point import (
     StillFrames,
     measure_touches,
@@ -139,27 +137,8 @@ def without_last_touch(state: SessionState) -> SessionState:
         state.touching,
         taken=state.touching.taken[:-1],
         places=state.touching.places[:-1],
-        is_sliding=False,
     )
     return replace(state, touching=touching, touches=state.touches[:-1], fault=None)
-
-
-def with_moved_part(setup: SessionSetup, state: SessionState) -> SessionSetup:
-    """Return the setup of a session in which part or camera was moved just now.
-
-    Raises `CalibrationError` if the runs so far have no datum points.
-    """
-    options = setup.choices.options_of(PART)
-    moves = with_move(options, state.runs, setup.conditions).moves
-    return replace(setup, choices=setup.choices.with_moves(moves))
-
-
-def with_other_choices(
-    setup: SessionSetup, choices: VerificationChoices
-) -> SessionSetup:
-    """Return the setup of a session that continues with other options of its task."""
-    moves = setup.choices.options_of(PART).moves
-    return replace(setup, choices=choices.with_moves(moves))
 
 
 def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> ProbingRules:
@@ -167,11 +146,7 @@ def rules_of(setup: SessionSetup, state: SessionState, task: AnyTask) -> Probing
     options = setup.choices.options_of(task)
     turn, distance = task.newness(options)
     n_frames = setup.choices.frames_of(task)
-    rules = ProbingRules(n_frames, min_turn=turn, min_distance=distance)
-    is_sliding = bool(state.touches) and state.touching.is_sliding
-    if is_sliding and task.scans(options, len(state.runs)):
-        return replace(rules, n_frames=1, n_settling=0)
-    return rules
+    return ProbingRules(n_frames, min_turn=turn, min_distance=distance)
 
 
 def with_touch(setup: SessionSetup, state: SessionState, task: AnyTask) -> SessionState:

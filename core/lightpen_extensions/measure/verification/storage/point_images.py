@@ -273,5 +273,5 @@ class LivePoints:
         if not is_held_on(rules, state):
             return str(frame.seq)
         tip_cam = seen.rotation @ setup.instrument.tip_pen + seen.translation
-        approach = approach_of(rules, state.touching, tip_cam)
+        approach = approach_of(state.touching, tip_cam)
         return self._images.keep(frame, seen, approach)

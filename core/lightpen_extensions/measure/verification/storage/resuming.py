@@ -99,8 +99,7 @@ def resume_verification(
     lamps, cameras = LampObservations(), setup.instrument.rig.cameras
     for n, run in enumerate(under_way.runs, start=1):
         record = open_record(root / TOUCHES / run.folder)
-        scans = task.scans(under_way.choices.options_of(task), len(state.runs))
-        held = _held_in(record, under_way.choices.frames_of(task), scans=scans)
+        held = _held_in(record, under_way.choices.frames_of(task))
         lamps = lamps.then(_lamps_in(record, setup))
         drifted = with_drift(setup, lamps.lamp_drift(cameras, setup.choices.limits))
         if record.verdict == CONCLUDED:
@@ -174,22 +173,15 @@ def _lamps_in(record: Record, setup: SessionSetup) -> LampObservations:
     return LampObservations()
 
 
-def _held_in(record: Record, n_frames: int, *, scans: bool) -> tuple[StillFrames, ...]:
-    """Return the touches in a record that are complete.
-
-    Where the pen slides after the first one, an image is a touch.
-    """
+def _held_in(record: Record, n_frames: int) -> tuple[StillFrames, ...]:
+    """Return the touches in a record that are complete."""
     by_touch: dict[int, list[RecordedImage]] = {}
     for image in record.used_images:
         by_touch.setdefault(image.touch, []).append(image)
-    whole = (
-        images
-        for touch, images in by_touch.items()
-        if len(images) >= n_frames or (scans and touch > 1)
-    )
     return tuple(
         StillFrames(tuple(map(_frame, images)), approach_cam=images[0].approach_cam)
-        for images in whole
+        for images in by_touch.values()
+        if len(images) >= n_frames
     )
 
 

@@ -5,12 +5,10 @@ order, and the shown and recorded results. A plan that is ended early gives the 
 of the probed features.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
 from typing import Any
 
-import numpy as np
 from msgspec import structs
 
 from lightpen.arrays import FloatArray
@@ -21,7 +19,6 @@ from lightpen.comparisons.assessment import (
     accepted,
     check,
     refused,
-    worst,
 )
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
@@ -29,7 +26,6 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import Side
 from lightpen.model.decision_rules import Decision
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.folder.verifications import MEASURED_PART
 from lightpen_extensions.measure.measuring.artefacts import QUANTITIES
@@ -49,7 +45,6 @@ from lightpen_extensions.measure.measuring.report import (
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
 from lightpen_extensions.measure.verification.tasks.part_course import (
     PartOptions,
-    base_name,
     course,
     hand_goal,
     planned_at,
@@ -89,45 +84,10 @@ class Part(Found):
         found: list[FloatArray | None] = [None] * len(self.points)
         for name, one in self.part.features.items():
             if one.feature is not None:
-                at = self.part.touches.first_of(name).tolist()
+                at = self.part.touches.of(name).tolist()
                 for i, offset in zip(at, one.feature.offsets, strict=True):
                     found[i] = offset
         return found
-
-    def budgets(self, instrument: Instrument) -> list[dict[str, float] | None]:
-        """Return U (k = 2) of each characteristic by its sources, mm or degrees.
-
-        The sources are taken one by one, without their correlations; None for
-        geometrical deviations.
-        """
-        points = [point for _, point in self.points]
-        by_parameters = np.concatenate([point.sensitivity for point in points])
-        covariance = instrument.covariance
-        own = np.zeros((len(by_parameters), len(by_parameters)))
-        for i, point in enumerate(points):
-            own[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = point.noise
-        at = instrument.parameters
-        leds = np.r_[at.leds, at.diameter]
-        known = {*np.r_[at.tip].tolist(), *leds.tolist()}
-        cameras = np.array([i for i in range(at.number) if i not in known])
-        covariances = {"points": own}
-        for name, of in (("tip", np.r_[at.tip]), ("LEDs", leds), ("cameras", cameras)):
-            rows = by_parameters[:, of]
-            covariances[name] = rows @ covariance[np.ix_(of, of)] @ rows.T
-        ball = self.part.touches.ball_uncertainty
-        budgets: list[dict[str, float] | None] = []
-        for result in self.part.results:
-            if result.quantity is None:
-                budgets.append(None)
-                continue
-            row = result.quantity.by_inputs[0]
-            budget = {
-                name: COVERAGE_FACTOR * sqrt(max(float(row[:-1] @ C @ row[:-1]), 0.0))
-                for name, C in covariances.items()
-            }
-            budget["ball"] = abs(float(row[-1])) * ball
-            budgets.append(budget)
-        return budgets
 
 
 def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
@@ -140,7 +100,7 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
     if options.plan is None:
         raise CalibrationError("part.no-plan")
     found = _owned(runs, options)
-    names = {base_name(name) for name, _ in found}
+    names = {name for name, _ in found}
     plan = options.plan.limited_to(names)
     if not plan.features:
         raise CalibrationError("part.nothing-probed")
@@ -150,12 +110,6 @@ def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) ->
         each.name for each in options.plan.features if each.name not in names
     )
     assessment = _assessment(part, missing)
-    for position, motion in part.ties.items():
-        if not motion.is_consistent:
-            residual = float(motion.residuals.max())
-            reason = message("part.datums-moved", position=position, residual=residual)
-            doubt = refused(reason, message("part.probe-again"))
-            assessment = worst((doubt, assessment))
     return Part(assessment, part, tuple(found), missing)
 
 
@@ -167,9 +121,8 @@ def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> N
     if options.plan is None:
         return
     found = _owned(runs, options)
-    last = found[-1][0]
-    name = base_name(last)
-    own = [(name, point) for owner, point in found if owner == last]
+    name = found[-1][0]
+    own = [(owner, point) for owner, point in found if owner == name]
     planned = options.plan.feature(name)
     if planned.kind in {FeatureKind.POINT, FeatureKind.LINE}:
         planned = structs.replace(planned, side=Side.CENTRE, surface="", normal=None)
@@ -179,16 +132,14 @@ def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> N
 
 def _owned(runs: Runs, options: PartOptions) -> list[tuple[str, ProbedPoint]]:
     """Return the touches with their features."""
-    planned = [each.name for each in course(options)]
-    names = dict.fromkeys(map(base_name, planned))
+    names = [each.name for each in course(options)]
     found = []
     for i, (run, points) in enumerate(runs):
-        is_named = base_name(run) in names
-        if not is_named and i >= len(planned):
+        if run not in names and i >= len(names):
             raise CalibrationError(
                 "measuring.unknown-feature", name=run, names=", ".join(names)
             )
-        found += [(run if is_named else planned[i], point) for point in points]
+        found += [(run if run in names else names[i], point) for point in points]
     return found
 
 
@@ -275,14 +226,9 @@ def _listed(names: Sequence[Message]) -> tuple[Message, ...]:
 
 def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
     points = [point for _, point in found.points]
-    entries = part_entries(found.part)
-    for each, budget in zip(
-        entries["characteristics"], found.budgets(instrument), strict=True
-    ):
-        each["budget"] = budget
     scale = scale_of(found.part, points, instrument)
     return {
-        **entries,
+        **part_entries(found.part),
         "scale": None
         if scale is None
         else {
@@ -321,7 +267,6 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
             message("part.kind"),
         ),
         _rows(feature_rows(part)),
-        tuple(_notes(part)),
     )
     characteristics = ResultTable(
         message("part.characteristics"),
@@ -337,13 +282,6 @@ def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
         _rows(characteristic_rows(part)),
     )
     return tuple(each for each in (characteristics, features) if each.rows)
-
-
-def _notes(part: MeasuredPart) -> Iterator[Message]:
-    """Yield how datum points of a moved part agree."""
-    for position, motion in part.ties.items():
-        residual = float(motion.residuals.max())
-        yield message("part.moved", position=position, residual=residual)
 
 
 def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
@@ -380,14 +318,7 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     if planned.kind is not None and planned.kind.value not in planned.name.casefold():
         what = message("part.of-kind", kind=NAMES[planned.kind], name=planned.name)
     n_points, needed = len(progress.points), planned.n_touches
-    if planned.scan and n_points:
-        return message("part.slide", what=what, n_points=n_points, needed=needed)
     return message("part.instruction", what=what, n_points=n_points, needed=needed)
-
-
-def _scans(options: PartOptions, run: int) -> bool:
-    planned = planned_at(options, run)
-    return planned is not None and planned.scan
 
 
 def _missing(options: PartOptions, ball_diameter: float | None) -> Message | None:
@@ -425,7 +356,6 @@ PART = VerificationTask(
     n_runs=lambda options: max(len(course(options)), 1),
     instruction=_instruction,
     newness=lambda options: (ANY, NEW_PLACE),
-    scans=_scans,
     missing=_missing,
     rule_of=_rule,
 )

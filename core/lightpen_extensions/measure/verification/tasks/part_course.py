@@ -1,26 +1,18 @@
-"""The course of a part: its plan, run by run, with the datum points of moved parts.
-
-A run is a feature of the plan. If part or camera was moved, three features are probed
-again before the others; all runs since then belong to another position.
-"""
+"""The course of a part: its plan, run by run. A run is a feature of the plan."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from itertools import combinations
 from typing import Annotated
 
 import numpy as np
-from msgspec import Meta, Struct, structs
+from msgspec import Meta
 
-from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.artefacts import Side
 from lightpen.model.assumptions import BALL_UNCERTAINTY
 from lightpen.model.posture import UPRIGHT_AXIS
-from lightpen.record.folder.verifications import at_position
-from lightpen_extensions.measure.measuring.alignment import MIN_POINTS, THIN
 from lightpen_extensions.measure.measuring.features import Feature, fit_feature
 from lightpen_extensions.measure.measuring.next_touch import (
     Place,
@@ -30,7 +22,7 @@ from lightpen_extensions.measure.measuring.next_touch import (
 )
 from lightpen_extensions.measure.measuring.part import kind_of
 from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
-from lightpen_extensions.measure.measuring.surfaces import CENTRED, FeatureKind
+from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.measuring.touches import PartTouches
 from lightpen_extensions.measure.verification.tasks.probed_point import (
     ProbedPoint,
@@ -52,67 +44,16 @@ SIMULATED_ORIGIN = np.array([0.0, -30.0, 0.0])
 SIMULATED_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-class Move(Struct, frozen=True):
-    """Part or camera was moved before a run, from 0; datum points are probed again."""
-
-    run: Annotated[int, Meta(ge=0)]
-    datums: tuple[str, ...]
-
-
 class PartOptions(TaskOptions, frozen=True, tag="part"):
-    """A plan, U (k = 2) of the ball diameter, mm, and the moves of the session."""
+    """A plan, and U (k = 2) of the ball diameter, mm."""
 
     plan: Plan | None = None
     ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
-    moves: tuple[Move, ...] = ()
 
 
-@cache
 def course(options: PartOptions) -> tuple[PlannedFeature, ...]:
-    """Return the features run by run with their positions; none without a plan."""
-    if options.plan is None:
-        return ()
-    runs = list(options.plan.features)
-    for position, move in enumerate(options.moves, start=2):
-        left = [base_name(each.name) for each in runs[move.run :]]
-        runs[move.run :] = [
-            structs.replace(
-                options.plan.feature(name), name=at_position(name, position)
-            )
-            for name in dict.fromkeys((*move.datums, *left))
-        ]
-    return tuple(runs)
-
-
-def base_name(name: str) -> str:
-    """Return the name of a feature without its position."""
-    return name.partition("@")[0]
-
-
-def with_move(
-    options: PartOptions, runs: Sequence[Points], conditions: Conditions
-) -> PartOptions:
-    """Return the options with a new position of the part after the present runs.
-
-    Its datum points are the three probed features with a centre that span the largest
-    triangle (`CalibrationError` if there are none).
-    """
-    centres: dict[str, FloatArray] = {}
-    for planned, points in zip(course(options), runs, strict=False):
-        kind, fit = fit_of(planned, points, conditions.instrument)
-        if kind in CENTRED and fit is not None:
-            centres.setdefault(base_name(planned.name), fit.origin)
-    largest, datums = 0.0, tuple[str, ...]()
-    for names in combinations(centres, MIN_POINTS):
-        a, b, c = (centres[name] for name in names)
-        area = float(np.linalg.norm(np.cross(b - a, c - a)))
-        if area > max(largest, THIN * float(np.linalg.norm(b - a)) ** 2):
-            largest, datums = area, names
-    if not datums:
-        raise CalibrationError(
-            "part.few-datums", n_points=len(centres), needed=MIN_POINTS
-        )
-    return structs.replace(options, moves=(*options.moves, Move(len(runs), datums)))
+    """Return the features run by run; none without a plan."""
+    return () if options.plan is None else options.plan.features
 
 
 def touches_of_part(

@@ -187,8 +187,6 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     rule_of: Callable[[OptionsT, VerificationLimits], Message] = (
         lambda options, limits: rule_in_words(limits)
     )
-    # Whether the pen slides along a surface in a run, from 0
-    scans: Callable[[OptionsT, int], bool] = lambda options, run: False
     # Refuses the last of some runs in less time than `measure`.
     check: Callable[[Runs, Conditions, OptionsT], object] | None = None
     judges_points: bool = True  # whether values are shown amid a run

@@ -5,7 +5,7 @@ What is done in the background is done when a test says so.
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,6 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
 from lightpen.formats.opened_files import CameraFile
 from lightpen.messages import Message
-from lightpen.model.artefacts import Side
 from lightpen.model.rig import rig_of
 from lightpen.record.folder.verifications import TOUCHES, VERIFICATIONS
 from lightpen.record.library.signing.station import STATION_FILE
@@ -30,8 +29,6 @@ from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.runners.serial_queue import Act, Report, T, Task
 from lightpen.swing.image_sources import SourceChoice
 from lightpen.swing.preparation import Preparation
-from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
-from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.verification.probing.drift_reference import (
     LampImages,
     LampObservations,
@@ -51,7 +48,6 @@ from lightpen_extensions.measure.verification.tasks.fixed_point import (
     FixedPointOptions,
 )
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.workflow import VerificationWorkflow
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
@@ -361,47 +357,3 @@ def test_a_camera_that_turns_before_lamps_counts_in_what_is_touched_then(
     np.testing.assert_allclose(
         moved, np.hypot(still, 2 * status.lamp_drift.share), rtol=0.05
     )
-
-
-def over_and_at(places: Sequence[Sequence[float]]) -> list[Hold]:
-    """Return holds above places and on them."""
-    return [
-        Hold(tuple(np.add(place, [0.0, up, 0.0]).tolist()), tilt=0.1)
-        for place in places
-        for up in (-8.0, 0.0)
-    ]
-
-
-def test_a_part_that_is_moved(trace: Trace) -> None:
-    act = trace.workflow
-    places = np.array([[0.0, 0, 0], [40, 0, 0], [0, 30, 0], [40, 30, 5]])
-    plan = Plan(
-        "Points",
-        tuple(
-            PlannedFeature(f"p{i}", FeatureKind.POINT, side=Side.OUTSIDE)
-            for i in range(len(places))
-        ),
-    )
-    choices = VerificationChoices(PART.kind, (PartOptions(plan),), n_frames=2)
-    act.part_moved()
-    trace.come(choices)
-    trace.pick_up()
-    act.part_moved()  # too early
-    trace.touch(*over_and_at(places[:3].tolist()))
-    act.part_moved()
-    away = places + np.array([3.0, -2.0, 4.0])
-    trace.touch(*over_and_at(away[:2].tolist()))
-    act.undo()
-    trace.touch(*over_and_at(away[1:].tolist()))
-    act.start_over()
-    trace.settle()
-    trace.pick_up()
-    trace.touch(*over_and_at(places[:1].tolist()))
-    act.shut_down()
-
-    assert trace.faults == ["part.few-datums"]
-    assert trace.kept() == [
-        ("part", "part.measured"),
-        ("conclusion", "accepted"),
-        ("conclusion", "abandoned"),
-    ]

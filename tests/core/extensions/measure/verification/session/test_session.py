@@ -24,7 +24,6 @@ from lightpen_extensions.measure.verification.session.session import (
     advance_session,
     end_task,
     run_again,
-    with_other_choices,
     without_last_touch,
 )
 from lightpen_extensions.measure.verification.session.session_state import (
@@ -38,7 +37,7 @@ from lightpen_extensions.measure.verification.tasks.fixed_point import (
     FixedPointOptions,
 )
 from lightpen_extensions.measure.verification.tasks.part import PART, sizes_of
-from lightpen_extensions.measure.verification.tasks.part_course import Move, PartOptions
+from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
 from lightpen_extensions.measure.verification.tasks.task import TaskOptions
 from lightpen_extensions.simulator.camera import SimulatedCamera
@@ -347,11 +346,3 @@ def test_runs_of_earlier_are_added_and_end_their_task(session: Session) -> None:
     assert sizes_of(found_by(early, PART).part) == []
     assert found_by(early, PART).missing == ("length 1 end 2",)
     assert run_again(setup, two, first, is_last=False).found is two.found
-
-
-def test_other_options_keep_the_moves_of_the_session(session: Session) -> None:
-    moved = session.setup.choices.with_moves((Move(2, ("p",)),))
-    setup = with_other_choices(replace(session.setup, choices=moved), CHOICES)
-
-    assert setup.choices.options_of(PART).moves == (Move(2, ("p",)),)
-    assert with_other_choices(session.setup, CHOICES).choices == CHOICES

@@ -10,19 +10,16 @@ from copy import deepcopy
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 from msgspec.structs import replace as replace_entries
 from tests.accepted_tip import Hold, accept_tip, leant, round_a_ring
 from tests.verifying import BAR, NOON, PART_CHOICES, TIMEOUT, Verifier
 
 from lightpen.archive.logbook.logbook import Logbook
-from lightpen.arrays import FloatArray
 from lightpen.model.artefacts import Side
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.swing.preparation import Preparation
-from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
-from lightpen_extensions.measure.measuring.surfaces import FeatureKind
+from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.session_state import SessionState
@@ -216,84 +213,6 @@ def test_a_part_goes_on_after_a_kill_and_gives_the_same_figures(
         (again,) = second.records
         for name in ("features", "touches", "characteristics"):
             assert again[name] == record[name]
-
-
-@pytest.mark.slow
-def test_a_moved_part_goes_on_after_a_kill_in_its_new_position(
-    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    places = np.array([[0.0, 0, 0], [40, 0, 0], [0, 30, 0], [40, 30, 5]])
-    plan = Plan(
-        "Points",
-        tuple(
-            PlannedFeature(f"p{i}", FeatureKind.POINT, side=Side.OUTSIDE)
-            for i in range(len(places))
-        ),
-    )
-    away, above = np.array([3.0, -2.0, 4.0]), np.array([0.0, -8.0, 0.0])
-
-    def probe(verifier: Verifier, place: FloatArray) -> None:
-        over = Hold(tuple((place + above).tolist()), tilt=0.1)
-        verifier.see(verifier.holder.still(over, 2))
-        verifier.touch(Hold(tuple(place.tolist()), tilt=0.1))
-
-    first = verifying()
-    first.come(VerificationChoices(PART.kind, (PartOptions(plan),), n_frames=2))
-    for place in places[:3]:
-        probe(first, place)
-    first.runner.ask(lambda workflow: workflow.part_moved())
-    probe(first, places[0] + away)
-    copy = tmp_path_factory.mktemp("killed") / "data"
-    shutil.copytree(in_force, copy)
-
-    second = verifying(copy)
-    go_on(second)
-    second.holder = deepcopy(first.holder)
-    for place in places[1:] + away:
-        probe(second, place)
-
-    (record,) = second.records
-    owners = [each["feature"] for each in record["touches"]]
-    assert owners[3:] == ["p0@2", "p1@2", "p2@2", "p3@2"]
-    last, known = (record["features"][i]["origin_mm"] for i in (3, 0))
-    np.testing.assert_allclose(np.subtract(last, known), places[3], atol=0.1)
-    assert len(record["positions"]) == 1
-
-
-def test_a_scanned_feature_goes_on_after_a_kill(
-    in_force: Path, verifying: Verifying, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    edge = PlannedFeature(
-        "edge", FeatureKind.LINE, touches=8, scan=True, side=Side.CENTRE
-    )
-    options = PartOptions(Plan("Edge", (edge,)))
-    places = [Hold((3.0 * i, -30.0, 0.0), tilt=0.1) for i in range(12)]
-
-    def slide(verifier: Verifier, holds: list[Hold]) -> None:
-        for hold in holds:
-            verifier.see(verifier.holder.still(hold, 1))
-
-    first = verifying()
-    first.come(VerificationChoices(PART.kind, (options,), n_frames=2))
-    first.touch(places[0])
-    slide(first, places[1:5])
-    copy = tmp_path_factory.mktemp("killed") / "data"
-    shutil.copytree(in_force, copy)
-    holder = deepcopy(first.holder)
-    slide(first, places[5:])
-    (record,) = first.records
-    assert len(record["touches"]) == 8
-
-    second = verifying(copy)
-    assert len(go_on(second).touches) == 5
-    second.holder = holder
-    slide(second, places[5:8])  # nothing counts before the pen is held again
-    second.touch(places[8])
-    slide(second, places[9:])
-    (again,) = second.records
-    images = [[each["images"] for each in r["touches"]] for r in (record, again)]
-    assert images[0][:5] == images[1][:5]
-    assert [len(each) for each in images[1]] == [2, 1, 1, 1, 1, 2, 1, 1]
 
 
 def batched(holds: list[Hold]) -> Iterator[tuple[Hold, Hold]]:

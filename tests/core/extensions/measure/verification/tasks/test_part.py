@@ -1,9 +1,7 @@
 """A part as a task of a session: the simulated plate, undone points, what is kept."""
 
 import os
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,8 +17,6 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.file_format import FileFormat
 from lightpen.messages import Message
 from lightpen.model.posture import FACING
-from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.measure.measuring.alignment import THIN
 from lightpen_extensions.measure.measuring.exports import EXPORTS
 from lightpen_extensions.measure.measuring.part import taught_plan
 from lightpen_extensions.measure.measuring.plan import (
@@ -30,13 +26,12 @@ from lightpen_extensions.measure.measuring.plan import (
     free_plan,
 )
 from lightpen_extensions.measure.measuring.qif import qif_text
-from lightpen_extensions.measure.measuring.surfaces import CENTRED, FeatureKind
+from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.session import (
     advance_session,
     end_task,
-    with_moved_part,
     without_last_touch,
 )
 from lightpen_extensions.measure.verification.session.session_state import (
@@ -46,14 +41,10 @@ from lightpen_extensions.measure.verification.session.session_state import (
 )
 from lightpen_extensions.measure.verification.tasks.part import PART, Part
 from lightpen_extensions.measure.verification.tasks.part_course import (
-    SIMULATED_AXES,
-    SIMULATED_ORIGIN,
     PartOptions,
-    course,
     feature_so_far,
     planned_places,
     touches_of_part,
-    with_move,
 )
 from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
 from lightpen_extensions.measure.verification.tasks.task import Conditions
@@ -341,88 +332,6 @@ def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
     assert PART.missing(PartOptions(), BALL) is not None
 
 
-def test_a_part_moved_in_between_goes_on_after_three_datum_points(
-    instrument: Instrument,
-) -> None:
-    holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
-    distance = plate_plan().characteristics[8]  # of holes 1 and 4
-    plan = Plan("Holes", (*holes,), characteristics=(distance,))
-    at_it = station(instrument, plan)
-    at_it.probe(10)  # three holes, and a point of the fourth
-    at_it.state = without_last_touch(at_it.state)
-    at_it.setup = with_moved_part(at_it.setup, at_it.state)
-    away = np.array([4.0, -3.0, 2.0])
-    at_it.probe(9, moved=away)
-    names = [each.name for each in course(at_it.options)]
-    at_it.probe(3, moved=away)
-
-    assert names[3:] == ["hole 1@2", "hole 2@2", "hole 3@2", "hole 4@2"]
-    (result,) = at_it.found.part.results
-    assert result.value.value == pytest.approx(40, abs=result.value.uncertainty)
-    # Without the tie it would be off by the way of the part.
-    assert np.linalg.norm(away) > 10 * result.value.uncertainty
-    (motion,) = at_it.found.part.ties.values()
-    assert motion.residuals.max() < 0.05
-    (note, *_) = PART.tables(at_it.found, at_it.setup.conditions)[1].notes
-    assert note.code == "part.moved"
-    assert note.values["residual"] == motion.residuals.max()
-
-
-def test_other_datum_points_than_before_are_reported(instrument: Instrument) -> None:
-    holes = [structs.replace(each, touches=3) for each in plate_plan().features[2:6]]
-    plan = Plan("Holes", tuple(holes))
-    runs = probed_plate(instrument, plan)
-    again = [(f"{name}@2", points) for name, points in runs]
-    setup, options = station(instrument, plan).setup, PartOptions(plan)
-    swapped = [(again[0][0], runs[1][1]), (again[1][0], runs[0][1]), *again[2:]]
-
-    good = PART.measure([*runs, *again], setup.conditions, options)
-    bad = PART.measure([*runs, *swapped], setup.conditions, options)
-
-    assert good.assessment.grade is Grade.PASS
-    assert bad.assessment.reason.code == "part.datums-moved"
-
-
-def test_the_datum_points_of_a_moved_part_span_the_largest_triangle(
-    measured: Station, instrument: Instrument
-) -> None:
-    runs = [tuple(points) for _, points in probed_plate(instrument, plate_plan())]
-    features = measured.found.part.features
-    centres = {
-        name: each.feature.origin
-        for name, each in features.items()
-        if each.feature is not None and each.kind in CENTRED
-    }
-
-    def area(names: tuple[str, ...]) -> float:
-        a, b, c = (centres[name] for name in names)
-        return float(np.linalg.norm(np.cross(b - a, c - a)))
-
-    moved = with_move(measured.options, runs, measured.setup.conditions)
-
-    largest = max(area(names) for names in combinations(centres, 3))
-    assert area(moved.moves[0].datums) == pytest.approx(largest, rel=1e-3)
-
-
-@pytest.mark.parametrize(("share", "is_thin"), [(0.8, True), (1.25, False)])
-def test_datum_points_nearly_on_a_line_are_none(
-    instrument: Instrument, share: float, is_thin: bool
-) -> None:
-    places = (-40.0, 0.0), (40.0, 0.0), (0.0, share * THIN * 80.0)
-    holes = [
-        structs.replace(
-            planned, nominal=structs.replace(planned.nominal, origin=(*place, 0.0))
-        )
-        for planned, place in zip(plate_plan().features[2:5], places, strict=True)
-        if planned.nominal is not None
-    ]
-    plan = Plan("Holes", tuple(holes))
-    runs = [tuple(points) for _, points in probed_plate(instrument, plan)]
-    setup = station(instrument, plan).setup
-    with pytest.raises(CalibrationError) if is_thin else nullcontext():
-        with_move(PartOptions(plan), runs, setup.conditions)
-
-
 def test_the_ball_is_known_by_its_diameter(instrument: Instrument) -> None:
     name, points = probed_plate(instrument, plate_plan())[0]
     conditions = Conditions(instrument, ball_diameter=10.0)
@@ -446,76 +355,3 @@ def test_a_camera_that_moved_counts_in_each_point(instrument: Instrument) -> Non
         np.diag(moved.covariance - still.covariance).reshape(-1, 3),
         np.tile(drift**2, (len(points), 1)),
     )
-
-
-def test_a_part_is_not_moved_before_three_datum_points_are_probed(
-    instrument: Instrument,
-) -> None:
-    at_it = station(instrument, plate_plan())
-    at_it.probe(6)
-
-    with pytest.raises(CalibrationError, match="3 that are not on one line"):
-        with_moved_part(at_it.setup, at_it.state)
-
-
-@pytest.mark.slow
-def test_a_moved_part_is_tied_by_datum_points_probed_again(
-    instrument: Instrument,
-) -> None:
-    plan = plate_plan()
-    at_it = station(instrument, plan)
-    turn = rotation_from_vector(np.array([0.1, -0.2, 0.3]))
-    runs = []
-    for name, points in probed_plate(instrument, plan):
-        away = [
-            replace(
-                each,
-                point_cam=turn @ each.point_cam + np.array([20.0, -10.0, 30.0]),
-                rotation=turn @ each.rotation,
-            )
-            for each in points
-        ]
-        if name != "pad":
-            runs.append((name, points))
-        if name in {"pad", "dome", "hole 1", "hole 2", "hole 3"}:
-            runs.append((f"{name}@2", away))
-
-    found = PART.measure(runs, at_it.setup.conditions, at_it.options)
-
-    pad = found.part.features["pad"].in_part
-    assert pad.values[:3] == pytest.approx([0, 24, 0], abs=0.02)
-    once = PART.measure(
-        probed_plate(instrument, plan), at_it.setup.conditions, at_it.options
-    )
-    assert found.part.uncertainty("pad")[1] > once.part.uncertainty("pad")[1]
-    # A plane is probed elsewhere each time: it is no datum point.
-    few = [each for each in runs if not each[0].startswith("hole")]
-    few.append(("top@2", runs[0][1]))
-    with pytest.raises(CalibrationError, match="Position 2 shares 1 datum points"):
-        PART.measure(few, at_it.setup.conditions, at_it.options)
-
-
-def test_a_scanned_feature_needs_one_point_held_still(instrument: Instrument) -> None:
-    hole = structs.replace(plate_plan().features[2], scan=True, touches=12)
-    plan = structs.replace(
-        plate_plan(), features=(hole,), alignment=None, characteristics=()
-    )
-    at_it = station(instrument, plan)
-    assert hole.nominal is not None
-    middle = SIMULATED_ORIGIN + SIMULATED_AXES @ np.array(hole.nominal.origin)
-    radius = 12.0 - BALL / 2
-    for turn in np.radians(np.arange(0.0, 360.0, 2.5)):  # 0.3 mm each
-        place = middle + radius * np.array([np.cos(turn), 0.0, np.sin(turn)])
-        n_images = 1 if at_it.state.touches else 5
-        for seen in at_it.holder.still(Hold(tuple(place.tolist()), 0.1), n_images):
-            at_it.state = advance_session(at_it.setup, at_it.state, "image", seen).state
-        if at_it.state.done is not None:
-            break
-
-    part = at_it.found.part
-    assert len(part.touches.points_cam) == 12
-    away = np.linalg.norm(np.diff(part.touches.points_cam[1:], axis=0), axis=1)
-    assert away.min() > 0.4
-    assert np.isnan(part.touches.approaches_cam[1:]).all()
-    diameter = 2 * part.features[hole.name].in_part.values[6]
-    assert abs(diameter - 24) < 2 * part.uncertainty(hole.name)[6] + 0.02

@@ -6,22 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.artefacts import Side
 from lightpen_extensions.measure.measuring.plan import Nominal, Plan, PlannedFeature
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.tasks.part_course import (
-    Move,
     PartOptions,
-    course,
     feature_so_far,
     hand_goal,
-    planned_at,
     planned_places,
     touches_of_part,
-    with_move,
 )
 from lightpen_extensions.measure.verification.tasks.probed_point import (
     ProbedPoint,
@@ -53,82 +48,6 @@ def placed(instrument: Instrument) -> Placed:
         )
 
     return points
-
-
-def points_plan(n: int) -> PartOptions:
-    """A plan of single points."""
-    features = (
-        PlannedFeature(f"p{i}", FeatureKind.POINT, side=Side.OUTSIDE) for i in range(n)
-    )
-    return PartOptions(Plan("Points", tuple(features)))
-
-
-def test_after_a_move_datum_points_come_first_and_all_names_have_the_position() -> None:
-    options = points_plan(4)
-    moved = replace_moves(options, Move(2, ("p0", "p3")))
-    twice = replace_moves(options, Move(2, ("p0", "p3")), Move(3, ("p1",)))
-
-    def names(of: PartOptions) -> list[str]:
-        return [each.name for each in course(of)]
-
-    assert names(options) == ["p0", "p1", "p2", "p3"]
-    assert names(moved) == ["p0", "p1", "p0@2", "p3@2", "p2@2"]
-    assert names(twice) == ["p0", "p1", "p0@2", "p1@3", "p3@3", "p2@3"]
-    assert names(PartOptions()) == []
-    planned = planned_at(moved, 4)
-    assert planned is not None
-    assert planned.name == "p2@2"
-    assert planned_at(moved, 5) is None
-
-
-def replace_moves(options: PartOptions, *moves: Move) -> PartOptions:
-    return PartOptions(options.plan, options.ball_uncertainty, moves)
-
-
-def test_datum_points_span_the_largest_triangle(
-    instrument: Instrument, placed: Placed
-) -> None:
-    places: list[list[float]] = [
-        [0, 0, 0],
-        [10, 0, 0],
-        [0, 10, 0],
-        [40, 0, 0],
-        [0, 30, 5],
-    ]
-    runs = [placed([each]) for each in places]
-    moved = with_move(points_plan(5), runs, Conditions(instrument))
-    early = with_move(points_plan(5), runs[:4], Conditions(instrument))
-
-    assert moved.moves == (Move(5, ("p0", "p3", "p4")),)
-    assert early.moves == (Move(4, ("p0", "p2", "p3")),)
-    with pytest.raises(CalibrationError) as refused:
-        with_move(points_plan(5), runs[:2], Conditions(instrument))
-    said = refused.value.message.values
-    assert (said["n_points"], said["needed"]) == (2, 3)
-
-
-def test_a_small_part_has_datum_points_too(
-    instrument: Instrument, placed: Placed
-) -> None:
-    runs = [placed([each]) for each in ([0.0, 0, 0], [0.5, 0, 0], [0, 0.5, 0])]
-    moved = with_move(points_plan(3), runs, Conditions(instrument))
-
-    assert moved.moves[0].datums == ("p0", "p1", "p2")
-
-
-def test_features_without_a_centre_are_no_datum_points(
-    instrument: Instrument, placed: Placed
-) -> None:
-    corners: list[list[float]] = [[0, 0, 0], [40, 0, 0], [0, 30, 0], [40, 30, 0]]
-    plane = PlannedFeature("top", FeatureKind.PLANE)
-    plan = points_plan(2).plan
-    assert plan is not None
-    options = PartOptions(Plan("Part", (plane, *plan.features)))
-    runs = [placed(corners), *(placed([each]) for each in corners[:2])]
-
-    with pytest.raises(CalibrationError) as refused:
-        with_move(options, runs, Conditions(instrument))
-    assert refused.value.message.values["n_points"] == 2
 
 
 def test_touches_of_a_part_are_those_of_the_ball_with_what_the_camera_moved(
