@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from lightpen_program.__main__ import main
+from lightpen_program.extensions import main
 
 
 def peak_memory() -> float:

@@ -28,7 +28,6 @@ from benchmarks.small_records import small_record
 
 from lightpen.errors import LightpenError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.live.sources import SourceEnvironment, sample_files
 from lightpen.model.origin import Origin
 from lightpen.record.library.signing.keys import KEYS
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
@@ -46,6 +45,7 @@ from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,
@@ -82,13 +82,13 @@ class Data:
 
 def make_data(folder: Path) -> Data:
     """Make a data folder to be damaged."""
-    around = SourceEnvironment(Scene(camera=paper_camera(binning=4)))
-    files = sample_files(around, folder / "samples")
+    simulator = SceneSimulator(Scene(camera=paper_camera(binning=4)))
+    files = simulator.write_files(folder / "samples")
     preparation = Preparation(
         names=NAMES, camera_file=files.camera_file, pen_file=files.pen_file
     )
     swing = folder / RECORDS / "swing"
-    camera, pen, rng = around.scene.camera, paper_pen(), np.random.default_rng(SEED)
+    camera, pen, rng = simulator.scene.camera, paper_pen(), np.random.default_rng(SEED)
     poses = swing_poses(N_IMAGES, rng, pen=pen, camera=camera)
     R, t = poses.rotations, poses.translations
     pixels = simulate_centers(camera, pen, R, t, 0.03, rng)

@@ -28,7 +28,7 @@ from lightpen_app.application import Wizard, make_application
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station, StoredCamera
 from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_app_program import FACES
+from lightpen_program.extensions import faces
 
 NAMES = Names("Bench", "Ann", "SIM-1", "T-1", "C-1", 10.0)
 PAGES = ("start", "camera", "leds", "swing")
@@ -55,7 +55,7 @@ def main() -> int:
             ),
         )
         settings.set_last_station(NAMES.station)
-        wizard = Wizard(application, FACES, settings, Path(folder))
+        wizard = Wizard(application, faces(), settings, Path(folder))
         wizard.show()
         _until(
             lambda: not wizard.workbench.selection.preparation.camera_missing_inputs()

@@ -33,9 +33,9 @@ from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.application import Wizard, ended, make_application
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, Station, StoredCamera
-from lightpen_app_program import FACES
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_program.extensions import faces
 
 CAMERA = Path(__file__).with_name("linked_camera.py")
 ADDRESS, SERIAL = "127.0.0.1", "LP01"
@@ -53,7 +53,7 @@ def main() -> int:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         camera = _plugged_in(stack)
         wizard = Wizard(
-            application, FACES, _settings(Path(folder), scene), Path(folder)
+            application, faces(), _settings(Path(folder), scene), Path(folder)
         )
         wizard.show()
         _until(lambda: not wizard.workbench.selection.preparation.missing_inputs())

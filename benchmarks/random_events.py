@@ -45,7 +45,7 @@ from lightpen.formats.decoding import keep_freed_memory
 from lightpen.swing.image_sources import N_CAMERAS, SourceChoice
 from lightpen_app.application import SETTLED_MS, Wizard, make_application
 from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app_program import FACES
+from lightpen_program.extensions import faces
 
 SEED = 24
 TICK_MS, EVENT_MS, SAMPLE_MS = 10, 50, 1000
@@ -295,7 +295,7 @@ def main() -> int:
         os.environ["LIGHTPEN_KEYS"] = str(Path(folder) / "keys")
         settings = Settings(Path(folder) / "lightpen.json")
         settings.set_preferences(Preferences(muted=True))
-        wizard = Wizard(application, FACES, settings, Path(folder) / "data")
+        wizard = Wizard(application, faces(), settings, Path(folder) / "data")
         wizard.crash_hook.install()
         wizard.window.resize(1280, 800)
         wizard.show()

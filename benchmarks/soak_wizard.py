@@ -32,7 +32,7 @@ from lightpen.record.swings.names import Names
 from lightpen.swing.capture.state import Phase, SwingState
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app_program import FACES
+from lightpen_program.extensions import faces
 
 TIMER_MS = 10
 SAMPLE_MS = 1000
@@ -157,7 +157,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
         settings.set_preferences(Preferences(muted=True))
-        wizard = Wizard(application, FACES, settings, Path(folder))
+        wizard = Wizard(application, faces(), settings, Path(folder))
         wizard.window.resize(1920, 1080)
         wizard.show()
         workbench = wizard.workbench

@@ -22,7 +22,7 @@ def main() -> int:
 
     from lightpen_app.application import Wizard, make_application
     from lightpen_app.work.settings import Settings
-    from lightpen_app_program import FACES
+    from lightpen_program.extensions import faces
 
     class Paint(QObject):
         """Answers a key once the first page is painted."""
@@ -45,7 +45,7 @@ def main() -> int:
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.json")
-        wizard = Wizard(application, FACES, settings, Path(folder))
+        wizard = Wizard(application, faces(), settings, Path(folder))
         paint = Paint()
         wizard.window.page().installEventFilter(paint)
         wizard.show()

@@ -16,7 +16,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.live.sources import sample_files
+from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.names import Names
@@ -24,6 +24,7 @@ from lightpen.swing.capture.state import SwingEvent, SwingEventKind
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
+from lightpen_extensions.simulator.simulator import SceneSimulator
 
 NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
 ENDLESS = SwingLimits(min_images=100_000, max_images=100_000)
@@ -33,7 +34,9 @@ def main() -> int:
     """Swing until this process is killed."""
     folder = Path(sys.argv[1])
     application = QCoreApplication(sys.argv[:1])
-    workbench = Workbench(Settings(folder / "lightpen.json"), folder)
+    simulator = SceneSimulator()
+    around = SourceEnvironment(simulator)
+    workbench = Workbench(Settings(folder / "lightpen.json"), folder, around)
     run = workbench.run
 
     def tell(event: SwingEvent) -> None:
@@ -41,7 +44,7 @@ def main() -> int:
             _say("kept", run.status.record_folder.name, *event.numbers)
 
     run.happened.connect(tell)
-    files = sample_files(workbench.around, folder / "samples")
+    files = simulator.write_files(folder / "samples")
     workbench.selection.set_preparation(
         replace(
             workbench.selection.preparation,

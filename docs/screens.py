@@ -46,7 +46,7 @@ from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, Stats
 from lightpen.detection.pen_detection import detect_from_centers, detect_pen
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.pipeline import LiveImage
-from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import message
 from lightpen.model.origin import Origin
 from lightpen.record.results.result_folder import RECORDS, SIMULATED, FolderArchive
@@ -67,7 +67,6 @@ from lightpen_app.work.live_images import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.verification_run import VerificationRun
-from lightpen_app_program import FACES
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.session import advance_session
@@ -88,7 +87,9 @@ from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
 from lightpen_extensions.simulator.motion import lean_vectors, postures_of
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import simulate_centers
+from lightpen_program.extensions import faces
 from lightpen_resources import languages
 
 Seen = TypeVar("Seen")
@@ -215,14 +216,15 @@ class Stage:
         settings = Settings(DATA / "lightpen.json")
         settings.set_preferences(Preferences())
         FolderArchive(DATA).store(_earlier_result())
-        around = SourceEnvironment(self._scene, SkippingClock(), lambda: NOW, tuple)
-        self.wizard = Wizard(application, FACES, settings, DATA, around)
+        simulator = SceneSimulator(self._scene)
+        around = SourceEnvironment(simulator, SkippingClock(), lambda: NOW, tuple)
+        self.wizard = Wizard(application, faces(), settings, DATA, around)
         self.wizard.window.pages()  # they follow what is chosen below
         workbench = self._workbench = self.wizard.workbench
         (self._measure,) = (
             each for each in self.wizard.services if isinstance(each, MeasureService)
         )
-        files = sample_files(around, DATA / SIMULATED)
+        files = simulator.write_files(DATA / SIMULATED)
         workbench.selection.set_preparation(
             replace(
                 workbench.selection.preparation,

@@ -133,7 +133,7 @@ def compare_tips(trial: Trial, there: Mapping[str, Any]) -> None:
     """Compare the tip of a self-test with that of one on this computer."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "report.json"
-        words = [sys.executable, "-m", "lightpen_app", "--self-test", str(file)]
+        words = [sys.executable, "-m", "lightpen_program", "--self-test", str(file)]
         environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
         subprocess.run(words, env=environment, check=True)
         here = json.loads(file.read_text("utf-8"))

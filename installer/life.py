@@ -19,8 +19,8 @@ from installer.trial import (
 
 from lightpen.record.swings.reading import OPENER, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen_app.self_test.desk import NAMES, record_swing
-from lightpen_app.self_test.run import FILE_LIST, damaged_files
+from lightpen_program.self_test.desk import NAMES, record_swing
+from lightpen_program.self_test.run import FILE_LIST, damaged_files
 
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere
@@ -117,7 +117,7 @@ def try_entry_points(trial: Trial, version: str) -> None:
 
 def try_demo(trial: Trial) -> None:
     """Play the whole demo unseen, by the words that its button goes by."""
-    played = trial.console("-m", "lightpen_app", "--demo")
+    played = trial.console("-m", "lightpen_program", "--demo")
     tip = re.search(r"^ *joint .*[0-9]", played.output, re.MULTILINE)
     is_accepted = played.status == 0 and tip is not None
     shown = "" if tip is None else tip[0].strip()

@@ -53,7 +53,7 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 WATCHED = """
 import sys
 from pathlib import Path
-from lightpen_program import main
+from lightpen_program.extensions import main
 
 status = main(sys.argv[2:])
 reported = Path("/proc/self/status")
@@ -249,7 +249,7 @@ def basler(monkeypatch: pytest.MonkeyPatch) -> "SourcePlace":
 def lightpen() -> Callable[..., CompletedProcess[str]]:
     """Return a function that runs the command line in this process."""
     # Imported here: a broken command line must not keep the other tests from running.
-    from lightpen_program import main
+    from lightpen_program.extensions import main
 
     def run(*arguments: str | Path) -> CompletedProcess[str]:
         words = [str(argument) for argument in arguments]
@@ -568,6 +568,7 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     from lightpen_extensions.simulator.follower import GuidedOperator
     from lightpen_extensions.simulator.scene_files import write_sample_files
     from lightpen_extensions.simulator.scenes import Scene
+    from lightpen_extensions.simulator.simulator import SceneSimulator
     from lightpen_extensions.simulator.swings import paper_camera
 
     scene = Scene(camera=paper_camera(binning=2))
@@ -584,7 +585,7 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
         second = SecondCamera(rig_file=read_rig(files.rig))
         preparation = replace(preparation, second=second)
         sources.append(second.source)
-    live = cameras_of(sources, SourceEnvironment(scene, clock))
+    live = cameras_of(sources, SourceEnvironment(SceneSimulator(scene), clock))
     for camera in live:
         camera.open()
         if by_two:  # looking at two images a moment takes long

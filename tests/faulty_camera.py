@@ -8,8 +8,17 @@ from typing_extensions import override
 
 from lightpen.cameras.device_errors import busy, lost, not_found
 from lightpen.cameras.protocol import Frame, FrameIncomplete
+from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import message
 from lightpen_extensions.simulator.camera import SimulatedCamera
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
+
+
+def scene_of(around: SourceEnvironment) -> Scene:
+    """Return what simulated cameras see."""
+    assert isinstance(around.simulator, SceneSimulator)
+    return around.simulator.scene
 
 
 class FaultyCamera(SimulatedCamera):

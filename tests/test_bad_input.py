@@ -402,7 +402,7 @@ def peak_megabytes(arguments: list[str | Path]) -> tuple[CompletedProcess[str], 
     """Run the program and measure the memory of its process alone."""
     code = (
         "import re, sys\n"
-        "from lightpen_program import main\n"
+        "from lightpen_program.extensions import main\n"
         "status = main(sys.argv[1:])\n"
         "text = open('/proc/self/status').read()\n"
         "print(re.search(r'VmHWM:\\s+(\\d+)', text)[1], end='', file=sys.stderr)\n"

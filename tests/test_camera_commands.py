@@ -20,7 +20,7 @@ from lightpen_extensions.boards.simulated_boards import (
     simulate_board_poses,
 )
 from lightpen_extensions.simulator.sensor import Sensor
-from lightpen_program import main
+from lightpen_program.extensions import main
 
 BOARD = "chessboard:7x5:20"
 CAMERA = Camera(200, 160, 300.0, 299.6, 101.0, 78.0)

@@ -22,7 +22,7 @@ from lightpen import __version__
 from lightpen.arrays import FloatArray
 from lightpen.formats.observation_files import read_poses
 from lightpen.logs import log_file
-from lightpen_program import main
+from lightpen_program.extensions import main
 from lightpen_resources import languages
 
 Run = Callable[..., CompletedProcess[str]]

@@ -12,7 +12,7 @@ from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen_extensions.simulator.swings import swing_from_postures
-from lightpen_program import main
+from lightpen_program.extensions import main
 
 STATION = random_station(6, n_images=160)
 SIZE = f"{STATION.camera.width}x{STATION.camera.height}"

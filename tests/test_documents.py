@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.cli import COMMANDS
-from lightpen_program import EXTENSIONS
+from lightpen_program.extensions import EXTENSIONS
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(

@@ -38,13 +38,14 @@ from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen.record.swings.interrupted import (find_unfinished,)
 from lightpen.swing.resuming import read_resumable
 from lightpen.record.swings.names import Names
-from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.live.sources import SourceEnvironment
 from lightpen.swing.capture.state import (SwingEventKind,)
 from lightpen.model.limits import SwingLimits
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_app.work.workbench import Workbench
 from lightpen_app.work.settings import Settings
+from lightpen_extensions.simulator.simulator import SceneSimulator
 
 SPEED = 8
 lightpen_extensions.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking takes long
@@ -69,9 +70,10 @@ def tell(*words):
 
 def swing(folder):
     application = QCoreApplication([])
-    around = SourceEnvironment(Scene(camera=paper_camera(binning=4)), HastyClock())
+    simulator = SceneSimulator(Scene(camera=paper_camera(binning=4)))
+    around = SourceEnvironment(simulator, HastyClock())
     workbench = Workbench(Settings(folder / "lightpen.json"), folder, around)
-    files = sample_files(around, folder / "samples")
+    files = simulator.write_files(folder / "samples")
     workbench.selection.set_preparation(
         replace(
             workbench.selection.preparation,
@@ -89,7 +91,7 @@ def swing(folder):
 
     run.happened.connect(say)
     clock = around.clock
-    camera = SimulatedCamera(around.scene, clock, Operator(clock, seated=True))
+    camera = SimulatedCamera(simulator.scene, clock, Operator(clock, seated=True))
     workbench.live.open([camera], CameraSettings(), clock)
     workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted

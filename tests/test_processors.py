@@ -28,7 +28,7 @@ from lightpen_extensions.simulator.swings import (
 CAMERA, PEN = paper_camera(), paper_pen()
 RUN = """
 import json, sys
-from lightpen_program import main
+from lightpen_program.extensions import main
 sys.exit(max(main(words) for words in json.load(sys.stdin)))
 """
 PLAN = """\

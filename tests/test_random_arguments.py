@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lightpen.cli import _parser
 from lightpen_extensions.plant.address import SERVER
-from lightpen_program import EXTENSIONS
+from lightpen_program.extensions import EXTENSIONS
 
 _, COMMANDS = _parser([], None, EXTENSIONS)
 NAMES = sorted(COMMANDS)

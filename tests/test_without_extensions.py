@@ -1,41 +1,44 @@
-"""Main works without any extension but the simulator: in a copy of the tree."""
+"""Main works without any extension, its demo with the simulator alone."""
 
 import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
-KEPT = "simulator"
+SIMULATOR = "simulator"
 OTHER = re.compile(r"lightpen_extensions\.(?!simulator)|lightpen_app_extensions")
 OF_MAIN = ("core/comparisons", "core/live", "core/pen_check", "core/swing", "app/shell")
 OPENED = """
 import sys
 from pathlib import Path
 from PySide6.QtCore import QTimer
+from lightpen.live.sources import SourceEnvironment
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.work.settings import Settings
-from lightpen_app_program import FACES
+from lightpen_program.extensions import faces, simulator
 
 application = make_application(["lightpen"])
-wizard = Wizard(application, FACES, Settings(Path("s.json")), Path("data"))
+around = SourceEnvironment(simulator())
+settings = Settings(Path("s.json"))
+wizard = Wizard(application, faces(), settings, Path("data"), around)
 wizard.started.connect(wizard.window.close)
 wizard.show()
 application.exec()
 print(*(step.title for step in wizard.window.steps()))
 """
+PROGRAM = ("-m", "lightpen_program")
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
 
-@pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the tree without extensions, named by its roots no more."""
-    copy = tmp_path_factory.mktemp("tree")
+def copy_tree(copy: Path, kept: Collection[str]) -> Path:
+    """Copy the tree without other extensions, named by its root no more."""
     for folder in ("core", "app", "resources", "tests", "benchmarks", "docs"):
         ignored = shutil.ignore_patterns("__pycache__", "screens")
         shutil.copytree(ROOT / folder, copy / folder, ignore=ignored)
@@ -44,20 +47,31 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         copy / "core" / "lightpen_extensions",
         copy / "app" / "lightpen_app_extensions",
     )
-    gone = {each.name for each in core.iterdir() if each.is_dir()} - {KEPT}
+    gone = {each.name for each in core.iterdir() if each.is_dir()} - {*kept}
     for each in (*core.iterdir(), *app.iterdir()):
         if each.is_dir() and each.name in gone:
             shutil.rmtree(each)
-    for program in ("core/lightpen_program", "app/lightpen_app_program"):
-        root = copy / program / "__init__.py"
-        lines = root.read_text("utf-8").splitlines(keepends=True)
-        kept = (line for line in lines if not any(k in line.lower() for k in gone))
-        root.write_text("".join(kept), "utf-8")
+    root = copy / "app" / "lightpen_program" / "extensions.py"
+    lines = root.read_text("utf-8").splitlines(keepends=True)
+    names = re.compile(rf"\b({'|'.join(map(str.upper, gone))})\b")
+    root.write_text("".join(each for each in lines if not names.search(each)), "utf-8")
     return copy
 
 
-def run(tree: Path, folder: Path, *words: str) -> str:
-    """Run Python on a copy of the tree in a folder, unseen."""
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the tree with the simulator alone."""
+    return copy_tree(tmp_path_factory.mktemp("tree"), [SIMULATOR])
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the tree without any extension."""
+    return copy_tree(tmp_path_factory.mktemp("bare"), [])
+
+
+def run(tree: Path, folder: Path, *words: str, status: int = 0) -> str:
+    """Run Python on a copy of the tree in a folder, unseen; return what it prints."""
     path = os.pathsep.join(str(tree / name) for name in ("core", "app", "resources"))
     homes = {f"XDG_{name}_HOME": str(folder) for name in ("CONFIG", "DATA")}
     unseen = {"QT_QPA_PLATFORM": "offscreen", "HOME": str(folder)}
@@ -69,41 +83,55 @@ def run(tree: Path, folder: Path, *words: str) -> str:
         encoding="utf-8",
         check=False,
     )
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    return done.stdout
+    assert done.returncode == status, done.stdout[-3000:] + done.stderr[-3000:]
+    return done.stdout if status == 0 else done.stderr
 
 
-def test_the_command_line_has_main_and_what_is_kept(tree: Path, tmp_path: Path) -> None:
-    said = run(tree, tmp_path, "-m", "lightpen_program", "--help")
+def test_the_command_line_has_main_and_what_is_kept(
+    tree: Path, bare: Path, tmp_path: Path
+) -> None:
+    said = run(tree, tmp_path, *PROGRAM, "--help")
+    said_bare = run(bare, tmp_path, *PROGRAM, "--help")
 
     assert "  calibrate " in said
+    assert "  calibrate " in said_bare
     assert "  simulate " in said
+    assert "  simulate " not in said_bare
     assert "  verify " not in said
 
 
-def test_calibrate_finds_the_tip(tree: Path, tmp_path: Path) -> None:
-    program = ("-m", "lightpen_program")
-    run(tree, tmp_path, *program, "simulate", "set", "--images", "20")
+def test_calibrate_finds_the_tip_without_any_extension(
+    tree: Path, bare: Path, tmp_path: Path
+) -> None:
+    run(tree, tmp_path, *PROGRAM, "simulate", "set", "--images", "20")
 
     files = ("--camera", "set/camera.yaml", "--pen", "set/leds.csv")
-    said = run(tree, tmp_path, *program, "calibrate", "set/images", *files)
+    said = run(bare, tmp_path, *PROGRAM, "calibrate", "set/images", *files)
 
     assert re.search(r"^ *joint .*\d", said, re.MULTILINE)
 
 
-def test_the_window_opens_with_the_steps_of_main(tree: Path, tmp_path: Path) -> None:
-    said = run(tree, tmp_path, "-c", OPENED)
+def test_the_window_opens_with_the_steps_of_main(bare: Path, tmp_path: Path) -> None:
+    said = run(bare, tmp_path, "-c", OPENED)
 
     assert said.split() == ["Start", "Camera", "LEDs", "Swing", "Review", "History"]
 
 
 def test_the_demo_accepts_a_tip(tree: Path, tmp_path: Path) -> None:
-    said = run(tree, tmp_path, "-m", "lightpen_app", "--demo")
+    said = run(tree, tmp_path, *PROGRAM, "--demo")
 
     assert re.search(r"^ *joint .*\d", said, re.MULTILINE)
 
 
-def test_the_tests_of_main_pass(tree: Path, tmp_path: Path) -> None:
+def test_the_demo_without_the_simulator_says_what_it_needs(
+    bare: Path, tmp_path: Path
+) -> None:
+    said = run(bare, tmp_path, *PROGRAM, "--demo", status=2)
+
+    assert "extension that simulates a pen" in said
+
+
+def test_the_tests_of_main_pass(tree: Path) -> None:
     files = [
         str(file)
         for folder in OF_MAIN

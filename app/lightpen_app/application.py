@@ -23,13 +23,13 @@ from PySide6.QtWidgets import QApplication
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
-from lightpen.live.sources import SourceEnvironment
+from lightpen.live.sources import Simulator, SourceEnvironment
 from lightpen.logs import end_log, log_file, write_log_to
 from lightpen.messages import printable
 from lightpen.record.library.signing.keys import KEYS
 from lightpen_app.crash import CrashHook, versions
 from lightpen_app.end_signals import EndSignals
-from lightpen_app.face import Face
+from lightpen_app.faced import Face
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import MutedSounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
@@ -42,7 +42,6 @@ from lightpen_app.work.job import Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.simulator.camera import SERIAL
 
 # s after which a thread that computes lets the window continue. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
@@ -177,7 +176,9 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     return application
 
 
-def run(faces: Sequence[Face], swing: Path | None = None) -> int:
+def run(
+    faces: Sequence[Face], simulator: Simulator | None, swing: Path | None = None
+) -> int:
     """Show the wizard until its window closes, and return the exit status.
 
     The swing is shown, see `lightpen.record.results.opening`. Raises `UsageError` if
@@ -191,7 +192,8 @@ def run(faces: Sequence[Face], swing: Path | None = None) -> int:
         folder = data_folder(settings.preferences())
         write_log_to(folder)
         _logger.info("window with the data folder %s", folder)
-        wizard = Wizard(application, faces, settings, folder)
+        around = SourceEnvironment(simulator)
+        wizard = Wizard(application, faces, settings, folder, around)
         log_versions = Job(lambda _: _logger.info("versions: %s", versions()), wizard)
         QTimer.singleShot(SETTLED_MS, log_versions.start)
         if swing is not None:
@@ -201,17 +203,18 @@ def run(faces: Sequence[Face], swing: Path | None = None) -> int:
     return ended(wizard, status)
 
 
-def run_demo(faces: Sequence[Face]) -> int:
+def run_demo(faces: Sequence[Face], simulator: Simulator | None) -> int:
     """Play the demo with these extensions, and return the exit status.
 
     Without a display it is played unseen, in its own time that waits for a machine
     too slow for it; what happens is printed, and at the end the tip. Settings and
-    records of the user are left alone.
+    records of the user are left alone. Raises `UsageError` without a simulator.
     """
+    if simulator is None:
+        raise UsageError("application.no-simulator")
     is_seen = has_display() and os.environ.get("QT_QPA_PLATFORM") != "offscreen"
-    around = SourceEnvironment(
-        clock=MachineClock() if is_seen else SkippingClock(rests=True)
-    )
+    clock = MachineClock() if is_seen else SkippingClock(rests=True)
+    around = SourceEnvironment(simulator, clock)
     if not is_seen:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         qInstallMessageHandler(_print_but_hints)
@@ -224,7 +227,8 @@ def run_demo(faces: Sequence[Face]) -> int:
         settings = Settings(Path(folder) / "lightpen.json")
         settings.set_preferences(Settings(settings_file()).preferences())
         if not is_seen:
-            settings.set_camera(SERIAL, CameraSettings(frame_rate=UNSEEN_FRAME_RATE))
+            slow = CameraSettings(frame_rate=UNSEEN_FRAME_RATE)
+            settings.set_camera(simulator.serial, slow)
         wizard = Wizard(application, faces, settings, Path(folder), around)
         from lightpen_app.demo import Demo
 

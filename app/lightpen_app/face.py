@@ -12,7 +12,6 @@ from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
     from lightpen.archive.chains.entries import Event
@@ -188,7 +187,3 @@ def can_discover(services: Services) -> bool:
 def can_calibrate(services: Services) -> bool:
     """Return whether a camera can be calibrated."""
     return any(each.calibrates_cameras for each in services)
-
-
-Face: TypeAlias = Callable[[Workbench], Service]
-"""An extension of the window: makes its service for a workbench."""

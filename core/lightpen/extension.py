@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from lightpen.archive.logbook.logbook import Replicate
+    from lightpen.live.sources import Simulator
 
 SubParsers: TypeAlias = "_SubParsersAction[ArgumentParser]"
 
@@ -30,3 +31,5 @@ class Extension:
     # Adds actions to ``lightpen archive``, and options to its action ``check``.
     add_archive_actions: Callable[[SubParsers, ArgumentParser], None] | None = None
     replicate: "Replicate | None" = None  # delivers entries to a server
+    # Imports what simulates pen and cameras: for trial, demo and self-test.
+    load_simulator: "Callable[[], Simulator] | None" = None

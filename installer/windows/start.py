@@ -35,10 +35,10 @@ def start() -> int:
     sys.frozen = True  # type: ignore[attr-defined]
     if sys.argv[1:2] == ["--multiprocessing-fork"]:
         multiprocessing.freeze_support()  # works, and does not return
-    if sys.argv[1:3] == ["-m", "lightpen_app"]:
+    if sys.argv[1:3] == ["-m", "lightpen_program"]:
         del sys.argv[1:3]
     try:
-        from lightpen_app.__main__ import main
+        from lightpen_program.__main__ import main
     except (ImportError, OSError, SyntaxError, ValueError, EOFError):
         return _complain(traceback.format_exc())
     return main()

@@ -50,7 +50,7 @@ from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.formats.opened_files import OpenedFiles
-from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import Record
 from lightpen.record.swings.solving import solve_record
@@ -62,10 +62,11 @@ from lightpen_app.work.garbage import collect_if_due
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_program import FACES
 from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import paper_camera
+from lightpen_program.extensions import faces
 
 
 class PatientBot(QtBot):
@@ -177,7 +178,9 @@ def small_scene() -> Scene:
 @pytest.fixture(scope="session")
 def around(small_scene: Scene) -> SourceEnvironment:
     """Return the small scene, in which all goes four times as fast as usual."""
-    return SourceEnvironment(small_scene, HastyClock(), found_cameras=tuple)
+    return SourceEnvironment(
+        SceneSimulator(small_scene), HastyClock(), found_cameras=tuple
+    )
 
 
 SolvingOn: TypeAlias = Callable[[], AbstractContextManager[None]]
@@ -190,7 +193,7 @@ def samples(
 ) -> OpenedFiles:
     """The simulated pen's files, written and read once; copy before you change them."""
     folder = tmp_path_factory.mktemp("samples")
-    return sample_files(SourceEnvironment(small_scene), folder)
+    return SceneSimulator(small_scene).write_files(folder)
 
 
 @pytest.fixture
@@ -447,7 +450,7 @@ class Walker:
     def operator(self) -> Operator:
         """Who holds the simulated pen."""
         operator = self.workbench.live.operator
-        assert operator is not None
+        assert isinstance(operator, Operator)
         return operator
 
     def swing(self) -> None:
@@ -571,7 +574,7 @@ def open_wizard(
     def start(source: SourceEnvironment = around) -> Walker:
         folder = tmp_path / "data"
         dressed.setStyleSheet("")  # which the wizard gives it
-        wizard = Wizard(dressed, FACES, settings, folder, source)
+        wizard = Wizard(dressed, faces(), settings, folder, source)
         opened.append(Walker(qtbot, wizard))
         return opened[-1]
 

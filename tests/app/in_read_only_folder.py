@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import QLabel
 
-from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.names import Names
 from lightpen_app.look.theme import TextSize
 from lightpen_app.work.settings import Settings
@@ -28,7 +28,8 @@ def test_a_read_only_data_folder_is_reported_with_the_way_to_another(
     data.mkdir()
     for words in (["--bind", str(data)], ["-o", "remount,ro,bind"]):
         subprocess.run(["mount", *words, str(data)], check=True)
-    files = sample_files(around, tmp_path / "files")
+    assert around.simulator is not None
+    files = around.simulator.write_files(tmp_path / "files")
     assert files.camera_file is not None
     assert files.pen_file is not None
     settings.set_station(

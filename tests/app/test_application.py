@@ -47,7 +47,7 @@ BEFORE_THE_PAINT = """
 import sys
 from PySide6.QtWidgets import QApplication
 from lightpen_app import application
-from lightpen_app_program import FACES
+from lightpen_program.extensions import faces
 
 make_pages = application.make_pages
 
@@ -59,7 +59,7 @@ def pages(*given):
     QApplication.quit()
 
 application.make_pages = pages
-sys.exit(application.run(FACES))
+sys.exit(application.run(faces()))
 """
 LATER = {
     *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters", "pypylon"),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 from PySide6.QtCore import QThreadPool
 from pytestqt.qtbot import QtBot
+from tests.faulty_camera import scene_of
 from typing_extensions import override
 
 from lightpen.cameras.protocol import CameraSettings
@@ -47,6 +48,7 @@ from lightpen_app.application import run
 from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
 from lightpen_app.face import Service
+from tests.faulty_camera import scene_of
 
 Workbench.shut_down.__defaults__ = (float(sys.argv.pop()),)
 
@@ -147,7 +149,7 @@ def swing_before(workbench: Workbench, stuck: Stuck) -> None:
     """Swing before a camera that will not close."""
     around = workbench.around
     camera = StuckCamera(
-        around.scene, around.clock, Operator(around.clock, seated=True)
+        scene_of(around), around.clock, Operator(around.clock, seated=True)
     )
     camera.stuck = stuck
     workbench.live.open([camera], CameraSettings(), around.clock)
@@ -237,7 +239,7 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
 ) -> None:
     around, append = workbench.around, RecordWriter.append
     camera = SimulatedCamera(
-        around.scene, around.clock, Operator(around.clock, seated=True)
+        scene_of(around), around.clock, Operator(around.clock, seated=True)
     )
     workbench.live.open([camera], CameraSettings(), around.clock)
     workbench.live.set_following(True)

@@ -12,6 +12,7 @@ from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_extensions.simulator.hand import Operator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -55,12 +56,13 @@ def swing_and_accept(walker: "Walker") -> None:
     walker.press(Qt.Key.Key_Return)
     walker.until_shows("Swing")
     walker.until(lambda: run.status.state is not None and run.status.result is None)
-    assert live.operator is not None
-    live.operator.seat()
+    operator = live.operator
+    assert isinstance(operator, Operator)
+    operator.seat()
     live.set_following(True)
     walker.until(lambda: run.status.verdict is not None)
     live.set_following(False)
-    live.operator.lean_towards(0.0, 0.0, 0.0)  # upright and still: to the review
+    operator.lean_towards(0.0, 0.0, 0.0)  # upright and still: to the review
     walker.until_shows("Review")
     walker.until(walker.main_button().isEnabled)
     walker.press(Qt.Key.Key_Return)

@@ -74,7 +74,7 @@ def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
 
 FAILING = """
 import sys
-from lightpen_app.__main__ import main
+from lightpen_program.__main__ import main
 from lightpen_app.demo import Demo
 def has_failed(self):
     state = self._workbench.run.status.state

@@ -37,7 +37,7 @@ from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.demo import Demo
-from lightpen_app_program import FACES
+from lightpen_program.extensions import faces
 from lightpen_app.work.settings import Settings
 
 lightpen_extensions.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking takes long
@@ -45,8 +45,8 @@ folder = Path(sys.argv[1])
 application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")
 scene = Scene(camera=paper_camera(binning=2))
-around = SourceEnvironment(scene, SkippingClock(rests=True))
-wizard = Wizard(application, FACES, settings, folder, around)
+around = SourceEnvironment(SceneSimulator(scene), SkippingClock(rests=True))
+wizard = Wizard(application, faces(), settings, folder, around)
 demo = Demo(wizard.window, wizard.workbench, is_watched=False)
 demo.ended.connect(wizard.window.close_unasked)
 wizard.show()
@@ -62,6 +62,7 @@ print(here.name(), here.toString(1.5), accepted, ended)
 
 TIMER_BY_KEYWORD = """
 from PySide6.QtCore import QCoreApplication, QTimer
+from lightpen_extensions.simulator.simulator import SceneSimulator
 application = QCoreApplication([])
 QTimer(application, interval=0)
 """

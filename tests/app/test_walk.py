@@ -38,7 +38,7 @@ from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.wizard_pages import page_titles
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.stations import Station, StoredCamera
-from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -132,7 +132,7 @@ def test_a_recorded_swing_gives_its_tip(
     begins_by_card: bool,
 ) -> None:
     folder = shared_data / "swing-clean"
-    walker = open_wizard(replace(around, scene=Scene()))
+    walker = open_wizard(replace(around, simulator=SceneSimulator()))
     if begins_by_card:
         _begin_with_images(walker, folder)
     else:

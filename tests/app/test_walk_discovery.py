@@ -9,6 +9,7 @@ from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 from tests.app.walks import NAMES, page_text, read_out, result_on_disk, set_up
+from tests.faulty_camera import scene_of
 
 from lightpen.record.swings.recordings import files_beside
 from lightpen_app.widgets.number_field import NumberField
@@ -69,7 +70,7 @@ def find_and_accept(walker: "Walker", step: str) -> None:
     else:
         walker.click_on(begin)
 
-    leds = walker.workbench.around.scene.pen.leds
+    leds = scene_of(walker.workbench.around).pen.leds
     length = window.findChildren(NumberField)[0].value()
     assert length == np.linalg.norm(leds[:, None] - leds, axis=2).max()
     walker.click_on(walker.control("Find pen and camera", window))
@@ -89,7 +90,7 @@ def find_and_accept(walker: "Walker", step: str) -> None:
     walker.click("Review")
     walker.until(walker.main_button().isEnabled)
     assert walker.says("PASS: Within limits"), page_text(walker)
-    shown, true = read_out(walker), walker.workbench.around.scene.tip_pen
+    shown, true = read_out(walker), scene_of(walker.workbench.around).tip_pen
     assert (np.abs(shown.tip - true) < 1.5 * shown.u).all()
     walker.click("Accept")
     walker.until(lambda: walker.workbench.run.status.result is not None)

@@ -25,6 +25,7 @@ from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.follower import GuidedOperator
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -82,7 +83,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     )
     settings.set_last_station("Hall 2")
 
-    walker = open_wizard(SourceEnvironment(scene, clock))
+    walker = open_wizard(SourceEnvironment(SceneSimulator(scene), clock))
     rendered.operator.seat()
     walker.click_step("Camera")
     walker.until_tells("10 of 10 LEDs")

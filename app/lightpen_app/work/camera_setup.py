@@ -6,7 +6,7 @@ from dataclasses import replace
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.source import FoundDevice, SourceNeeds
+from lightpen.cameras.source import FoundDevice, Source, SourceNeeds
 from lightpen.cameras.sources import source_named
 from lightpen.live.sources import SourceEnvironment, cameras_of
 from lightpen.swing.image_sources import CameraInUse
@@ -52,6 +52,11 @@ class CameraSetup(QObject):
         live.configured.connect(self._on_configured)
         selection.changed.connect(self._on_selected)
 
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The sources to choose from."""
+        return self._around.sources
+
     def open(self) -> None:
         """Open the source, or open it again after it failed; then follow its choice.
 
@@ -59,10 +64,10 @@ class CameraSetup(QObject):
         """
         self._is_started = True
         source, *others = self._selection.preparation.sources
-        if source.lacks_place:
+        if not self._around.has(source):
             self.live.close()
             return
-        there = [other for other in others if not other.lacks_place]
+        there = [other for other in others if self._around.has(other)]
         cameras = cameras_of([source, *there], self._around)
         clock, known = self._around.clock, self._settings.cameras()
         _logger.info("opening %s", [source, *there])

@@ -7,7 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 
 from lightpen.formats.opened_files import OpenedFiles, open_files
-from lightpen.live.sources import SourceEnvironment, sample_files
+from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.recordings import FilesBeside
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen.swing.preparation import Preparation
@@ -87,7 +87,8 @@ class ChosenFiles(QObject):
         self._read(self._write_samples, self._on_chosen_read)
 
     def _write_samples(self, _: Report) -> OpenedFiles:
-        return sample_files(self._around, self._samples)
+        simulator = self._around.simulator
+        return simulator.write_files(self._samples) if simulator else OpenedFiles()
 
     def _read_station(self, files: FilePaths) -> None:
         """Read the files of a station; what cannot be read must be chosen again."""

@@ -29,13 +29,11 @@ from lightpen.cameras.worker_events import (
 from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import LightpenError
 from lightpen.live.pipeline import ImageCapture, ImageListener, Live, Sink
+from lightpen.live.sources import OperatedCamera, Operator
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.live_images import QueuedListener
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.follower import GuidedOperator
-from lightpen_extensions.simulator.hand import Operator
 
 WITHOUT_IMAGES = "without-images"  # cause of a notification
 CLOSING_TIME = 10.0  # s for everything in progress; a dead camera may take 8
@@ -73,8 +71,8 @@ class LiveView(QObject):
         self._region = RegionOfInterest()
         self._sink: Sink | None = None
         self._is_watched = True
-        self._simulated: list[SimulatedCamera] = []
-        self._operator: Operator | None = None
+        self._simulated: list[OperatedCamera] = []
+        self._operated: OperatedCamera | None = None  # the first, if it is simulated
         self._listener: QueuedListener | None = None
         self._closing: list[Thread] = []
         self._notifications = notifications
@@ -103,7 +101,7 @@ class LiveView(QObject):
         """
         self.close()
         first = cameras[0]
-        self._operator = first.operator if isinstance(first, SimulatedCamera) else None
+        self._operated = first if isinstance(first, OperatedCamera) else None
         self._chosen = min(self._chosen, len(cameras) - 1)
         self._states = [_CameraState() for _ in cameras]
         self._listener = listener = QueuedListener(self)
@@ -122,7 +120,7 @@ class LiveView(QObject):
         )
         live.set_region(self._region)
         live.set_sink(self._sink)
-        self._simulated = [c for c in cameras if isinstance(c, SimulatedCamera)]
+        self._simulated = [c for c in cameras if isinstance(c, OperatedCamera)]
         self.set_watched(self._is_watched)
         live.start()
 
@@ -140,7 +138,7 @@ class LiveView(QObject):
         for c in range(self.n_cameras):
             self._withdraw(c)
         self.set_following(False)
-        self._operator, self._simulated = None, []
+        self._operated, self._simulated = None, []
         self._closing = [thread for thread in self._closing if thread.is_alive()]
         thread = Thread(
             target=self._stop, args=(live, listener), name="closing", daemon=True
@@ -243,7 +241,7 @@ class LiveView(QObject):
     @property
     def operator(self) -> Operator | None:
         """The simulated operator, where the pen is simulated."""
-        return self._operator
+        return None if self._operated is None else self._operated.operator
 
     def set_region(self, region: RegionOfInterest) -> None:
         """Set the region of interest in the images of this camera and later ones."""
@@ -285,8 +283,8 @@ class LiveView(QObject):
 
         Only while nothing else is asked of him.
         """
-        if self._operator is not None and self._operator.is_free:
-            self._operator.seat()
+        if self.operator is not None and self.operator.is_free:
+            self.operator.seat()
 
     def configure(self, settings: CameraSettings) -> None:
         """Request other settings; the camera stops briefly to apply them."""
@@ -295,8 +293,8 @@ class LiveView(QObject):
 
     def set_following(self, follows: bool) -> None:
         """Set whether the simulated operator follows the swing."""
-        operator = self._operator
-        self._run.follower = GuidedOperator(operator) if follows and operator else None
+        led = self._operated if follows else None
+        self._run.follower = None if led is None else led.follower()
 
     def _stop(self, live: Live, listener: QueuedListener) -> None:
         try:

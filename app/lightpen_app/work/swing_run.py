@@ -8,13 +8,13 @@ from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.live.sources import Follower
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.swing.capture.state import SwingEvent
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView
-from lightpen_extensions.simulator.follower import GuidedOperator
 
 
 class SwingRun(RunView[SwingStatus, SwingEvent]):
@@ -39,7 +39,7 @@ class SwingRun(RunView[SwingStatus, SwingEvent]):
         self._folder = folder
         self.logbook = LazyLogbook(folder)  # any thread may use it
         self.archive = FolderArchive(folder)
-        self.follower: GuidedOperator | None = None  # leads a simulated hand
+        self.follower: Follower | None = None  # leads a simulated hand
         self.runner = SwingRunner(
             self.records_folder, self.archive, self, now, self.logbook
         )

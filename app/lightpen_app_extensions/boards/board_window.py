@@ -40,6 +40,7 @@ from lightpen_app_extensions.boards.board_view import BoardOverlay, BoardView
 from lightpen_extensions.boards.boards import Board
 from lightpen_extensions.boards.calibration import MIN_VIEWS, CameraCalibration
 from lightpen_extensions.boards.simulated_boards import HeldBoard
+from lightpen_extensions.simulator.hand import Operator
 
 SIDE_WIDTH = 48 * GRID
 LEAST_LIST = 28 * GRID  # px, of the views
@@ -166,9 +167,9 @@ class BoardWindow(FittedWindow, Translated, QWidget):
 
     def _hold_simulated(self, board: Board | None) -> None:
         """Let a simulated operator hold the board in view, or the pen again."""
-        if self._live.operator is not None:
-            held = None if board is None else HeldBoard(board)
-            self._live.operator.in_view = held
+        operator = self._live.operator
+        if isinstance(operator, Operator):
+            operator.in_view = None if board is None else HeldBoard(board)
 
     def _named_board(self) -> Board | None:
         """Return the board of the fields, or report why there is none."""

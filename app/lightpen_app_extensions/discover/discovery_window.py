@@ -275,9 +275,10 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         return words.format(*pair)
 
     def _enter_simulated_length(self) -> None:
-        if self._workbench.live.operator is None:
+        simulator = self._workbench.around.simulator
+        if self._workbench.live.operator is None or simulator is None:
             return
-        leds = self._workbench.around.scene.pen.leds
+        leds = simulator.pen.leds
         apart = np.linalg.norm(leds[:, None] - leds, axis=2)
         self._length.set_value(float(apart.max()))
         self._u.set_value(SIMULATED_U)

@@ -36,6 +36,7 @@ from lightpen_extensions.measure.verification.storage.resuming import (
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.registry import ALL_TASKS
+from lightpen_extensions.simulator.hand import Operator
 
 KEY = "measure"
 LONGEST = 16  # characters of a name
@@ -88,7 +89,9 @@ class MeasureService(Service):
         for run in (self.verification, self.measuring):
             is_led = touches and run.runner.status.is_here
             run.probing_operator = (
-                ProbingOperator(operator) if is_led and operator else None
+                ProbingOperator(operator)
+                if is_led and isinstance(operator, Operator)
+                else None
             )
 
     @property

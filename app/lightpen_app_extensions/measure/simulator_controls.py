@@ -8,7 +8,6 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_extensions.simulator.hand import Operator
 
 
 class ProbingSimulatorControls(SimulatorControls):
@@ -59,4 +58,4 @@ class ProbingSimulatorControls(SimulatorControls):
             self._service.set_touching(self._live.operator is not None)
 
     def _on_lift_clicked(self) -> None:
-        self._command(Operator.lift)
+        self._command(lambda hand: hand.lift())

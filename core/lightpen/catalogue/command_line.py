@@ -1,6 +1,7 @@
 """Messages of the command line; English only: code, then template with named values."""
 
 MESSAGES = {
+    "application.no-simulator": "The demo needs the extension that simulates a pen. Install all extensions.",
     "application.no-display": "No display is available for the window. Start the program in a desktop session, or use a command; lightpen --help lists them.",
     "archive.no-server": "No archive server is set. Set the variable {variable} to its address, postgresql://user:password@host/database.",
     "log.no-such-level": "{variable} is {found}, which is not a log level. Set it to one of: {levels}.",

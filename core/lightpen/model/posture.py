@@ -35,6 +35,10 @@ class Posture:
     turn: float
 
 
+UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
+FIRST_LEAN = Posture(tilt=0.35, direction=0.0, turn=0.0)  # asked for after upright
+
+
 def rotations_of(
     pen: Pen, tilts: FloatArray, directions: FloatArray, turns: FloatArray
 ) -> FloatArray:

@@ -24,6 +24,7 @@ from lightpen.cameras.protocol import (
     sealed,
 )
 from lightpen.model.rig import Rig
+from lightpen_extensions.simulator.follower import GuidedOperator
 from lightpen_extensions.simulator.hand import HandPose, Operator
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
@@ -101,6 +102,10 @@ class SimulatedCamera:
         self._next_seq = 0
         self._is_open = self._is_streaming = False
         self._next_end = 0.0  # of the exposure of the next image
+
+    def follower(self) -> GuidedOperator:
+        """Return what leads the operator through a swing."""
+        return GuidedOperator(self.operator)
 
     @property
     def serial(self) -> str:

@@ -2,13 +2,11 @@
 
 from math import pi
 
-from lightpen.model.posture import Posture
+from lightpen.model.posture import FIRST_LEAN, UPRIGHT, Posture
 from lightpen.swing.capture.state import Phase, SwingState
 from lightpen.swing_messages import SWING_TO_SEAT
 from lightpen_extensions.simulator.hand import Operator
 
-FIRST_LEAN = Posture(tilt=0.35, direction=0.0, turn=0.0)
-UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
 GENTLE_LEANS = tuple(Posture(0.2, i * 2 * pi / 3, 0.0) for i in range(3))
 LEAN_TIME = 0.6  # s until the next one
 

@@ -8,9 +8,9 @@ from threading import Event
 
 import pytest
 
-from lightpen_app.self_test.report import Report, SelfTestError
-from lightpen_app.self_test.run import FILE_LIST, damaged_files
-from lightpen_app.self_test.run import test_program as run_self_test
+from lightpen_program.self_test.report import Report, SelfTestError
+from lightpen_program.self_test.run import FILE_LIST, damaged_files
+from lightpen_program.self_test.run import test_program as run_self_test
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_a_damaged_program_is_reported_before_anything_is_imported(
     monkeypatch.setattr(sys, "prefix", str(installed.parent / "runtime"))
     report = tmp_path / "report.json"
 
-    assert run_self_test(report, tuple) == 1
+    assert run_self_test(report) == 1
 
     written = json.loads(report.read_text(encoding="utf-8"))
     assert written["ok"] is False
@@ -57,7 +57,7 @@ def test_a_damaged_program_is_reported_before_anything_is_imported(
 def test_a_report_that_cannot_be_written_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run_self_test(tmp_path / "missing" / "report.json", tuple) == 2
+    assert run_self_test(tmp_path / "missing" / "report.json") == 2
     assert "report.json cannot be written:" in capsys.readouterr().err
 
 
@@ -102,12 +102,12 @@ def test_a_test_that_hangs_reports_what_it_does_and_where(
         report.doing = lambda: "_accept on the page review"
         assert given_up.wait(60)
 
-    monkeypatch.setattr("lightpen_app.self_test.run.LONGEST", 0.01)
-    monkeypatch.setattr("lightpen_app.self_test.run._test_all", hang)
+    monkeypatch.setattr("lightpen_program.self_test.run.LONGEST", 0.01)
+    monkeypatch.setattr("lightpen_program.self_test.run._test_all", hang)
     monkeypatch.setattr("os._exit", lambda status: given_up.set())
     file = tmp_path / "report.json"
 
-    assert run_self_test(file, tuple) == 1
+    assert run_self_test(file) == 1
 
     written = json.loads(file.read_text(encoding="utf-8"))
     assert written["doing"] == "_accept on the page review"

@@ -23,7 +23,7 @@ def watch(event, arguments):
         os._exit(9)
 
 sys.addaudithook(watch)
-from lightpen_app.__main__ import main
+from lightpen_program.__main__ import main
 sys.exit(main())
 """
 CONNECTS = "import socket; socket.create_connection(('127.0.0.1', 9)); sys.exit(main"

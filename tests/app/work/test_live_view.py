@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QObject, QSize
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
-from tests.faulty_camera import FaultyCamera
+from tests.faulty_camera import FaultyCamera, scene_of
 from typing_extensions import override
 
 from lightpen.cameras.protocol import CameraSettings, Frame, FramesSkipped
@@ -90,7 +90,7 @@ class Stage:
     def camera(self) -> FaultyCamera:
         clock = self.around.clock
         operator = Operator(clock, seated=True)
-        return FaultyCamera(self.around.scene, clock, operator)
+        return FaultyCamera(scene_of(self.around), clock, operator)
 
     def hold_up(self, n_images: int) -> None:
         """Let the GUI do nothing while so many images come."""
@@ -239,7 +239,7 @@ class StubbornCamera(FaultyCamera):
 def test_closing_does_not_wait_for_the_device(
     view: LiveView, stage: Stage, qtbot: QtBot
 ) -> None:
-    camera = StubbornCamera(stage.around.scene, stage.around.clock)
+    camera = StubbornCamera(scene_of(stage.around), stage.around.clock)
     with qtbot.waitSignal(view.image_shown):
         stage.open(camera)
     view.close()

@@ -16,7 +16,6 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import Connection
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import PenFile
-from lightpen.live.sources import sample_files
 from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
@@ -30,6 +29,7 @@ from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import FilePaths, StoredCamera
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.stream.service import StreamService
+from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.stream.server import StreamPlace
 
 OTHER = Names("Hall 3", "Bo", "LP-05", "T-11", "C-2", 6.0)
@@ -493,7 +493,7 @@ def test_why_a_rig_file_cannot_be_read_is_taken_back_with_the_second_camera(
     )
     stage.choose_station(OTHER.station)
     (reported,) = (each for each in stage.sentences if "lost.json" in each)
-    found = sample_files(stage.workbench.around, stage.folder / "rig").rig_file
+    found = SceneSimulator().write_files(stage.folder / "rig").rig_file
     assert found is not None
     with qtbot.waitSignal(stage.workbench.notifications.withdrawn) as withdrawn:
         stage.workbench.selection.set_preparation(

@@ -10,40 +10,43 @@ import pytest
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
 from lightpen.detection.pen_detection import detect_pen
-from lightpen.live.sources import SourceEnvironment, camera_of, cameras_of
+from lightpen.live.sources import SourceEnvironment, cameras_of
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.image_sources import SourceChoice, SourceKind
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.samples import beside
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
+
+SCENE = Scene(seed=7)
 
 
 @pytest.fixture
 def around() -> SourceEnvironment:
-    return SourceEnvironment(Scene(seed=7), SkippingClock())
+    return SourceEnvironment(SceneSimulator(SCENE), SkippingClock())
 
 
 def test_usually_the_simulated_pen_is_seen_in_real_time() -> None:
-    around = SourceEnvironment()
+    around = SourceEnvironment(SceneSimulator())
 
     assert isinstance(around.clock, MachineClock)
-    assert camera_of(SourceChoice(), around).serial == "SIM-1"
+    assert cameras_of([SourceChoice()], around)[0].serial == "SIM-1"
 
 
 def test_the_simulated_camera_shows_the_scene_of_the_surroundings(
     around: SourceEnvironment,
 ) -> None:
-    camera = camera_of(SourceChoice(SourceKind.SIMULATED), around)
+    camera = cameras_of([SourceChoice(SourceKind.SIMULATED)], around)[0]
 
     assert isinstance(camera, SimulatedCamera)
-    assert camera.scene is around.scene
+    assert camera.scene is SCENE
 
 
 def test_a_record_is_played_from_end_to_end_again_and_again(
     around: SourceEnvironment, swung: Callable[..., Path]
 ) -> None:
     n_images = len(open_record(swung()).images)
-    camera = camera_of(SourceChoice(SourceKind.RECORDED, str(swung())), around)
+    camera = cameras_of([SourceChoice(SourceKind.RECORDED, str(swung()))], around)[0]
     camera.open()
     camera.configure(CameraSettings(frame_rate=math.inf))
     camera.start()
@@ -58,7 +61,7 @@ def test_a_record_is_played_from_end_to_end_again_and_again(
 def test_a_recording_waits_by_the_clock_of_the_surroundings(
     around: SourceEnvironment, swung: Callable[..., Path]
 ) -> None:
-    camera = camera_of(SourceChoice(SourceKind.RECORDED, str(swung())), around)
+    camera = cameras_of([SourceChoice(SourceKind.RECORDED, str(swung()))], around)[0]
     camera.open()
     camera.start()
     for _ in range(3):
@@ -72,7 +75,7 @@ def test_a_recording_that_is_not_there_is_found_missing_when_it_is_opened(
     around: SourceEnvironment, tmp_path: Path
 ) -> None:
     choice = SourceChoice(SourceKind.RECORDED, str(tmp_path / "gone"))
-    camera = camera_of(choice, around)
+    camera = cameras_of([choice], around)[0]
     with pytest.raises(DeviceNotFound, match="no folder, video or image at"):
         camera.open()
 
@@ -92,8 +95,8 @@ def test_two_simulated_cameras_see_one_pen_from_two_places(
         camera.open()
         camera.start()
         images.append(camera.read(1.0).image)
-    rig = beside(around.scene.camera, around.scene.cone_cam)
-    pen, tip, cone = around.scene.pen, around.scene.tip_pen, around.scene.cone_cam
+    rig = beside(SCENE.camera, SCENE.cone_cam)
+    pen, tip, cone = SCENE.pen, SCENE.tip_pen, SCENE.cone_cam
     seen = [
         detect_pen(image, camera, pen)
         for image, camera in zip(images, rig.cameras, strict=True)

@@ -10,7 +10,6 @@ from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.widgets.live_markers import mask_markers, stray_markers
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.selection import Selection
-from lightpen_extensions.simulator.hand import Operator
 
 
 class MaskControl(QObject):
@@ -74,4 +73,4 @@ class MaskControl(QObject):
 
     def _on_cover_requested(self, covers: bool) -> None:
         if operator := self._live.operator:
-            (Operator.cover if covers else Operator.uncover)(operator)
+            (operator.cover if covers else operator.uncover)()

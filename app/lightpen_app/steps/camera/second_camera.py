@@ -31,7 +31,7 @@ class SecondCameraChoice(QWidget):
 
         # Widgets
         self._rig = RigPanel()
-        self.source = SourcePanel(is_second=True)
+        self.source = SourcePanel(camera.sources, is_second=True)
 
         # Layout
         vertical_layout(self, self._rig, self.source, spacing=2 * GRID)

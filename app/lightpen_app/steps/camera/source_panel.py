@@ -1,6 +1,6 @@
 """Selection of the image source."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -8,7 +8,6 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu, QWidget
 
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds
-from lightpen.cameras.sources import SOURCES
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
 from lightpen.messages import Message
 from lightpen.record.swings.recordings import FilesBeside
@@ -43,8 +42,9 @@ class SourcePanel(Translated, QGroupBox):
     # FilesBeside: files beside the recorded images to use
     files_requested = Signal(object)
 
-    def __init__(self, *, is_second: bool = False) -> None:
+    def __init__(self, sources: Sequence[Source], *, is_second: bool = False) -> None:
         super().__init__()
+        self._sources = tuple(sources)
         self._is_second = is_second
         self._value = NO_SOURCE
         self._absent: Mapping[str, Message] = {}
@@ -58,7 +58,7 @@ class SourcePanel(Translated, QGroupBox):
             ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self._kind.setMinimumWidth(22 * GRID)  # the placeholder would widen it
-        for _ in SOURCES:
+        for _ in self._sources:
             self._kind.addItem("")
         self._place = PathField()
         self._pick = PushButton()
@@ -193,7 +193,7 @@ class SourcePanel(Translated, QGroupBox):
         return button
 
     def _on_kind_chosen(self, index: int) -> None:
-        source = SOURCES[index]
+        source = self._sources[index]
         place = self._place.value() if source.needs is SourceNeeds.FILES else ""
         self._choose(SourceChoice(source.key, place))
         if source.needs is SourceNeeds.FILES and not place:
@@ -247,8 +247,9 @@ class SourcePanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         needs, absent = self._needs, self._absent.get(self._value.source.key)
-        is_open = needs is SourceNeeds.CHOICE
-        self._kind.setCurrentIndex(-1 if is_open else SOURCES.index(self._value.source))
+        is_open = self._value.source not in self._sources
+        index = -1 if is_open else self._sources.index(self._value.source)
+        self._kind.setCurrentIndex(index)
         self._offers.setVisible(is_open)
         self._place.setVisible(needs is SourceNeeds.FILES)
         is_usable = self._has_device and absent is None
@@ -300,7 +301,7 @@ class SourcePanel(Translated, QGroupBox):
         if self._is_second:
             title = self.tr("Image source of the second camera")
         self.setTitle(title)
-        for index, source in enumerate(SOURCES):
+        for index, source in enumerate(self._sources):
             name = worded(source.name)
             if source.key in self._absent:
                 name = self.tr("{0} - not installed").format(name)

@@ -40,7 +40,7 @@ class CameraPanels(ResponsiveLayout, QWidget):
 
         # Widgets
         self.swing_message = SignLabel()
-        self.source = SourcePanel()
+        self.source = SourcePanel(camera.sources)
         self.second = SecondCameraChoice(selection, camera, files)
         self.settings = SettingsPanel()
         self.intrinsics = IntrinsicsPanel(

@@ -7,7 +7,6 @@ from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.work.live_view import LiveView
-from lightpen_extensions.simulator.hand import Operator
 
 COVERED = (1, 2, 3)  # LEDs
 COVER_S = 3.0
@@ -46,7 +45,7 @@ class LedSimulatorControls(SimulatorControls):
             self.rest()
 
     def _on_lean_toggled(self, leans: bool) -> None:
-        self._command(Operator.swing if leans else Operator.hold)
+        self._command(lambda hand: hand.swing() if leans else hand.hold())
 
     def _on_cover_clicked(self) -> None:
         self._command(lambda operator: operator.cover(COVER_S, COVERED))

@@ -52,7 +52,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
         self._day = DayView()
         is_known = bool(workbench.selection.stations())
         self._setup = setup = SetupView(workbench, is_known=is_known)
-        self._welcome = WelcomeView()
+        self._welcome = WelcomeView(offers_trial=workbench.around.simulator is not None)
         self._begin = WelcomeControl(workbench, self._welcome, self)
         self._result = LastResultPanel(workbench.around.now, bool(verify))
         self._large = LargeScreenPanel(workbench.run.logbook)
@@ -152,7 +152,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
     @override
     def show_missing_input(self) -> None:
         if self._shows(WELCOME):
-            self._welcome.trial.setFocus()
+            self._welcome.first.setFocus()
             return
         if self._entries.typed().start_missing_inputs():
             self.show_setup()
@@ -160,7 +160,7 @@ class StartPage(HearsBarcodes, ResponsiveLayout, Page):
     @override
     def first_control(self) -> QWidget | None:
         if self._shows(WELCOME):
-            return self._welcome.trial
+            return self._welcome.first
         return self._day.first_control() if self.is_day else None
 
     @override

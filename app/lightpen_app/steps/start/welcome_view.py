@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget
 from typing_extensions import override
 
+from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, text_label
@@ -21,13 +22,15 @@ from lightpen_app.widgets.pen_in_space import (
 )
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
-from lightpen_extensions.simulator.swings import PAPER_TIP, paper_pen
 
 LEAST_HEIGHT, LARGEST_HEIGHT = 10 * GRID, 22 * GRID  # px, of a picture
 WORDS_HEIGHT = 21 * GRID  # px, with the margins
 LEANING = Posture(math.radians(25), math.radians(200), math.radians(15))
 RIGHT = Posture(math.radians(25), 0.0, math.radians(-15))
-SHOWN = DisplayedPosture(paper_pen(), np.array(PAPER_TIP), LEANING, RIGHT)
+COLUMNS = (0, (0, 60, 120, 180), -30), (-25, (20, 90, 160), 0), (25, (35, 105, 170), 0)
+LEDS = np.array([(x, y, z) for x, column, z in COLUMNS for y in column], np.float64)
+PEN = Pen(LEDS, np.tile([0.0, 0.0, 1.0], (len(LEDS), 1)))
+SHOWN = DisplayedPosture(PEN, np.array([0.0, -90.0, -25.0]), LEANING, RIGHT)
 Draw: TypeAlias = Callable[[QPainter, QRectF, Colors], None]
 
 
@@ -38,7 +41,7 @@ class WelcomeView(Translated, QWidget):
     images_chosen = Signal(str)  # folder of recorded images
     station_requested = Signal()  # set up a station
 
-    def __init__(self) -> None:
+    def __init__(self, *, offers_trial: bool) -> None:
         super().__init__()
 
         # Widgets
@@ -50,7 +53,8 @@ class WelcomeView(Translated, QWidget):
 
         # Layout
         layout = vertical_layout(self)
-        self._cards = self.trial, self._images, self._station
+        self._cards = (self.trial,) * offers_trial + (self._images, self._station)
+        self.first: QWidget = self._cards[0]
         cards = ((each, 1) for each in self._cards)
         horizontal_layout(layout, *cards, spacing=3 * GRID)
         layout.addStretch(1)

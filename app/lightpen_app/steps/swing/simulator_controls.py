@@ -4,6 +4,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QMenu, QWidget
 from typing_extensions import override
 
+from lightpen.live.sources import Operator
 from lightpen.model.posture import Posture
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID
@@ -12,7 +13,6 @@ from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.work.live_view import LiveView
-from lightpen_extensions.simulator.hand import Operator
 
 SLIP_MM, SLIP_S = 0.5, 1.5
 COVER_S = 2.0
@@ -40,11 +40,11 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         self._actions = tuple(
             menu.addAction("", slot)
             for slot in (
-                lambda: self._command(Operator.seat),
+                lambda: self._command(lambda hand: hand.seat()),
                 self._on_swing_clicked,
                 self._on_hold_clicked,
-                lambda: self._command(Operator.lift),
-                lambda: self._command(Operator.leave),
+                lambda: self._command(lambda hand: hand.lift()),
+                lambda: self._command(lambda hand: hand.leave()),
                 lambda: self._command(lambda hand: hand.slip(SLIP_MM, SLIP_S)),
                 lambda: self._command(lambda hand: hand.cover(COVER_S)),
             )
@@ -142,13 +142,13 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         self.led_by_itself.emit()
         self._led = self._live.operator
         self._live.set_following(True)
-        self._command(Operator.seat)
+        self._command(lambda hand: hand.seat())
 
     def _on_swing_clicked(self) -> None:
         self._lead_by_hand()
         self.led_by_itself.emit()
-        self._command(Operator.swing)
+        self._command(lambda hand: hand.swing())
 
     def _on_hold_clicked(self) -> None:
         self._lead_by_hand()
-        self._command(Operator.hold)
+        self._command(lambda hand: hand.hold())

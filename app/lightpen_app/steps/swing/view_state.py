@@ -6,15 +6,13 @@ from functools import cached_property
 from lightpen.cameras.worker_events import Connection
 from lightpen.estimation.reports.verdict import Verdict
 from lightpen.model.origin import Origin
-from lightpen.model.posture import Posture, posture_of
+from lightpen.model.posture import FIRST_LEAN, UPRIGHT, Posture, posture_of
 from lightpen.swing.capture.shortfall import Shortfall, turn_range
 from lightpen.swing.capture.state import Phase, SwingSetup, SwingState
 from lightpen_app.steps.swing.remaining_images import RemainingImages
 from lightpen_app.widgets.posture_dial import DialValue
-from lightpen_extensions.simulator.follower import FIRST_LEAN
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
-UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
 
 
 @dataclass(frozen=True, eq=False)

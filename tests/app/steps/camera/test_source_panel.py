@@ -25,7 +25,7 @@ FOUND = (
 
 @pytest.fixture
 def panel(qtbot: QtBot) -> SourcePanel:
-    panel = SourcePanel()
+    panel = SourcePanel(SOURCES)
     qtbot.addWidget(panel)
     panel.show()
     return panel

@@ -14,6 +14,7 @@ from lightpen.live.sources import SourceEnvironment
 from lightpen.model.origin import Origin
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings
+from lightpen_extensions.simulator.simulator import SceneSimulator
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -140,7 +141,9 @@ def test_a_real_station_is_at_its_first_live_image_after_four_entries(
     source = source_named("basler")
     assert source is not None
     cameras = ((source, found),)
-    walker = open_wizard(SourceEnvironment(found_cameras=lambda: cameras))
+    walker = open_wizard(
+        SourceEnvironment(SceneSimulator(), found_cameras=lambda: cameras)
+    )
     walker.until(lambda: bool(walker.workbench.selection.preparation.names.station))
     begun = time.monotonic()
 

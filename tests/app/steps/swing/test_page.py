@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QTabBar
 from pytestqt.qtbot import QtBot
 from tests.app.blank_page import BlankPage
 from tests.app.patience import PATIENCE_MS
-from tests.faulty_camera import FaultyCamera
+from tests.faulty_camera import FaultyCamera, scene_of
 
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker_events import Connection
@@ -87,7 +87,7 @@ class Desk:
 
     @property
     def operator(self) -> Operator:
-        assert self.workbench.live.operator is not None
+        assert isinstance(self.workbench.live.operator, Operator)
         return self.workbench.live.operator
 
     @property
@@ -537,7 +537,7 @@ def test_a_camera_that_is_unplugged_and_back_costs_nothing(
     qtbot: QtBot, capturing: Desk
 ) -> None:
     around = capturing.workbench.around
-    camera = FaultyCamera(around.scene, around.clock)
+    camera = FaultyCamera(scene_of(around), around.clock)
     capturing.workbench.live.open([camera], CameraSettings(), around.clock)
     keep_on(qtbot, capturing)  # on another camera, from the record
     n_before, n_played = capturing.state.n_kept, len(capturing.recorder.played)
@@ -557,7 +557,7 @@ def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(
     qtbot: QtBot, capturing: Desk
 ) -> None:
     camera = FaultyCamera(
-        capturing.workbench.around.scene, capturing.workbench.around.clock
+        scene_of(capturing.workbench.around), capturing.workbench.around.clock
     )
     capturing.workbench.live.open(
         [camera], CameraSettings(), capturing.workbench.around.clock

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -25,14 +25,15 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
 from lightpen_app.application import Wizard, has_display, make_application
 from lightpen_app.crash import versions
-from lightpen_app.face import Face
 from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
-from lightpen_app.self_test.report import SelfTestError, Tip
 from lightpen_app.work.settings import Settings
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import paper_camera
+from lightpen_program.extensions import faces
+from lightpen_program.self_test.report import SelfTestError, Tip
 
 TICK_MS = 50
 # The classes to which a platform gives fonts of its own.
@@ -160,8 +161,7 @@ class Desk:
     Records, results and settings are in a folder; nothing of the user's is touched.
     """
 
-    def __init__(self, folder: Path, faces: Sequence[Face] = ()) -> None:
-        self._faces = tuple(faces)
+    def __init__(self, folder: Path) -> None:
         self._data = folder / "data"
         self._files = folder / "files"
         self._settings = folder / "lightpen.json"
@@ -207,9 +207,9 @@ class Desk:
 
     def walked_wizard(self, picture: Path) -> str:
         """Have the wizard find and accept the tip of the swing; draw it at its end."""
-        around = SourceEnvironment(SCENE, SkippingClock(rests=True))
+        around = SourceEnvironment(SceneSimulator(SCENE), SkippingClock(rests=True))
         settings = Settings(self._settings)
-        wizard = Wizard(self._application, self._faces, settings, self._data, around)
+        wizard = Wizard(self._application, faces(), settings, self._data, around)
         self._walk = walk = Walk(wizard, self._record)
         faults: list[str] = []
 

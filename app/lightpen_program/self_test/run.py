@@ -8,7 +8,6 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from hashlib import sha256
 from importlib.util import find_spec
@@ -16,14 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Timer
 from traceback import extract_stack
-from typing import TYPE_CHECKING, TypeAlias
 
-from lightpen_app.self_test.report import Report, SelfTestError, Tip
-
-if TYPE_CHECKING:
-    from lightpen_app.face import Face
-
-LoadFaces: TypeAlias = Callable[[], Sequence["Face"]]
+from lightpen_program.self_test.report import Report, SelfTestError, Tip
 
 FILE_LIST = "files.sha256"
 
@@ -60,11 +53,10 @@ MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
 OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg")
 
 
-def test_program(file: Path, faces: LoadFaces) -> int:
+def test_program(file: Path) -> int:
     """Test the installation, write a report, and return the exit status.
 
-    The report is written in any case, with a picture of the wizard beside it. The
-    extensions are loaded once the files are found to be whole.
+    The report is written in any case, with a picture of the wizard beside it.
     """
     report = Report(file)
     try:
@@ -81,13 +73,13 @@ def test_program(file: Path, faces: LoadFaces) -> int:
         folder = Path(stack.enter_context(TemporaryDirectory(prefix="lightpen-试 ")))
         os.environ["LIGHTPEN_KEYS"] = str(folder / "keys")  # no key of the user's
         try:
-            _test_all(report, folder, faces, stack)
+            _test_all(report, folder, stack)
         except SelfTestError as failed:
             _say(str(failed))
     return 0 if report.ok else 1
 
 
-def _test_all(report: Report, folder: Path, faces: LoadFaces, stack: ExitStack) -> None:
+def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
     with report.check("files") as found:
         found.append(_checked_files())
     from lightpen.logs import recent_lines, running_log
@@ -101,10 +93,10 @@ def _test_all(report: Report, folder: Path, faces: LoadFaces, stack: ExitStack) 
             importlib.import_module(name)
         found.append(", ".join(names))
     # Everything below needs these imports.
-    from lightpen_app.self_test.desk import Desk
+    from lightpen_program.self_test.desk import Desk
 
     with report.check("window system") as found:
-        desk = Desk(folder, faces())
+        desk = Desk(folder)
         report.versions.update(desk.versions())
         found.append(desk.platform())
     with report.check("fonts") as found:

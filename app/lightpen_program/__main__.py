@@ -1,14 +1,9 @@
 """Start of the program: window, demo, self-test or command."""
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lightpen.interpreter import run_program
-
-if TYPE_CHECKING:
-    from lightpen_app.face import Face
 
 SELF_TEST = "--self-test"
 
@@ -23,23 +18,25 @@ class Launchers:
         """Open the window, at a recorded swing if a path leads to one."""
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run
+        from lightpen_program.extensions import faces, simulator
 
         keep_freed_memory()
-        return run(_faces(), swing)
+        return run(faces(), simulator(), swing)
 
     def play_demo(self) -> int:
         """Play a calibration with a simulated operator."""
         from lightpen.formats.decoding import keep_freed_memory
         from lightpen_app.application import run_demo
+        from lightpen_program.extensions import faces, simulator
 
         keep_freed_memory()
-        return run_demo(_faces())
+        return run_demo(faces(), simulator())
 
     def test_itself(self, report: Path) -> int:
         """Test the installation and write a report."""
-        from lightpen_app.self_test.run import test_program
+        from lightpen_program.self_test.run import test_program
 
-        return test_program(report, _faces)
+        return test_program(report)
 
     def install_entry(self) -> int:
         """Put the program into the menu of the desktop."""
@@ -72,12 +69,6 @@ class Launchers:
         return write_report(result, out, language)
 
 
-def _faces() -> Sequence["Face"]:
-    from lightpen_app_program import FACES
-
-    return FACES
-
-
 def main() -> int:
     """Run the program and return the exit status."""
     return run_program(_run)
@@ -87,7 +78,7 @@ def _run() -> int:
     if len(sys.argv) == 3 and sys.argv[1] == SELF_TEST:
         # Names a damaged file, also one that all commands need.
         return Launchers().test_itself(Path(sys.argv[2]))
-    from lightpen_program import main as run
+    from lightpen_program.extensions import main as run
 
     return run(desktop=Launchers())
 

@@ -1,0 +1,1 @@
+"""The program with its window and commands, put together and started."""
