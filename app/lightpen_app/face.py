@@ -2,20 +2,24 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
+from typing_extensions import override
 
 from lightpen.record.swings.names import Names
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
     from lightpen.archive.chains.entries import Event
     from lightpen.record.exports.formats import ExportFormat
+
+W = TypeVar("W", bound=QWidget)
 
 
 @dataclass(frozen=True)
@@ -159,6 +163,27 @@ class Service(QObject):
     def demo_steps(self) -> tuple[DemoStep, ...]:
         """Return what the demo shows of it."""
         return ()
+
+
+class WindowService(Service, Generic[W]):
+    """Shows a window of its own, made when it is first asked for."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__(workbench)
+        self._workbench = workbench
+        self._window: W | None = None
+
+    def _show_window(self, make: Callable[[], W]) -> W:
+        if self._window is None:
+            self._window = make()
+        self._window.show()
+        self._window.raise_()
+        return self._window
+
+    @override
+    def close(self) -> None:
+        if self._window is not None:
+            self._window.close()
 
 
 Services: TypeAlias = Sequence[Service]
