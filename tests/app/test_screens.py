@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QApplication, QTabWidget
+from PySide6.QtWidgets import QApplication, QLabel, QTabWidget
 from tests.app.room import SizeClass, room_of
 
+from lightpen.record.swings.names import Names
 from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_resources import languages
 
@@ -41,7 +42,8 @@ NAMES = [
 ]
 LEAST = QSize(853, 533) - FRAME  # 1280 x 800 at 150 %
 LOW = QSize(1270, 640)
-SIZES = (LEAST, QSize(960, 540), LOW, QSize(1280, 800))
+SVGA = QSize(800, 600) - FRAME
+SIZES = (SVGA, LEAST, QSize(960, 540), LOW, QSize(1280, 800))
 PROBING = "verify", "measure"  # seen also with all results, or after a few points
 OTHERWISE = " otherwise"
 KEYS = [
@@ -188,3 +190,28 @@ def test_all_leds_of_a_pen_are_seen_at_once(seen: Seen, language: str) -> None:
 def test_the_tabs_of_the_review_are_all_looked_at(seen: Seen) -> None:
     assert len(seen.rooms["review", "en", LEAST.width()]) == 1 + 5
     assert len(seen.rooms["review", "en", 1280]) == 1 + 5
+
+
+@pytest.mark.slow
+def test_long_names_leave_every_step_its_width(
+    dressed: QApplication, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station, operator, pen, tip, cone = (190 * letter for letter in "MWnoH")
+    long = Names(station, operator, pen, tip, cone, 10.0)
+    monkeypatch.setattr(SCREENS, "NAMES", long)
+    dressed.setStyleSheet("")
+    found = {}
+    with SCREENS.anywhere():
+        stage = SCREENS.Stage(dressed)
+        for step in SCREENS.walk(stage, SCREENS.published_looks):
+            appearance = SCREENS.published_looks(step)[-1].appearance
+            stage.set_look(SCREENS.Look("en", appearance, SVGA))
+            room = stage.still(lambda: room_of(stage.wizard.window))
+            if room.sideways or room.clipped:
+                found[step] = room.sideways, room.clipped
+        labels = stage.wizard.window.findChildren(QLabel)
+        named = [label for label in labels if long.tip in label.toolTip()]
+        stage.close()
+
+    assert found == {}
+    assert named  # its whole name is in a tool tip

@@ -12,7 +12,10 @@ from string import Template
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from typing_extensions import override
 
+from lightpen_app.look.tooltips import set_tooltip
+from lightpen_app.look.words import with_short_words
 from lightpen_resources import RESOURCES
 
 FAMILIES = ("Lightpen Sans", "Lightpen Sans SC")
@@ -211,9 +214,23 @@ def style_sheet(colors: Colors) -> str:
     return template.substitute(asdict(colors), **sizes, icons=icons, theme=theme)
 
 
+class TextLabel(QLabel):
+    """A label that fits its place, whatever it names: the tool tip has the whole."""
+
+    _is_short = False
+
+    @override
+    def setText(self, text: str) -> None:
+        shown = with_short_words(text)
+        if self._is_short or shown != text:
+            set_tooltip(self, text if shown != text else "")
+        self._is_short = shown != text
+        super().setText(shown)
+
+
 def text_label(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:
     """Return a label that wraps its words, at a place of the type scale."""
-    label = QLabel()
+    label = TextLabel()
     label.setWordWrap(True)
     label.setTextFormat(Qt.TextFormat.PlainText)
     label.setProperty("scale", size.name.lower())

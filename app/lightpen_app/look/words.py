@@ -6,6 +6,7 @@ from datetime import datetime
 from lightpen.local_time import local_time
 
 LONGEST_SHOWN = 32  # characters
+LEAST_SHOWN = 12  # characters of a name where there is little room
 LONGEST_WORD = 24  # characters; longer words may be split
 BREAK = "\u200b"  # where a line may end, though no blank is there
 JOINER = "\u2060"  # where a line may not end, though it could
@@ -15,6 +16,13 @@ PARTED = "  \u00b7  "  # between items in one line
 def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:
     """Return a name that fits into a line; its end is left out if it is long."""
     return name if len(name) <= longest else f"{name[: longest - 1]}\u2026"
+
+
+def with_short_words(text: str) -> str:
+    """Return a text that fits a narrow place: words that cannot wrap lose their end."""
+    # Qt may begin a new line beside any Chinese character.
+    word = rf"[^\s{BREAK}{JOINER}\u2e80-\uffef]{{{LONGEST_WORD + 1},}}"
+    return re.sub(word, lambda found: shortened(found.group(), LEAST_SHOWN), text)
 
 
 def breakable(text: str) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from PySide6.QtCore import QPoint, Signal
+from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtWidgets import QFrame, QWidget
 
 from lightpen.model.origin import Origin
@@ -139,14 +139,19 @@ class Sidebar(Translated, QFrame):
             (self.tr("Tip {0}"), names.tip),
             (self.tr("Cone {0}"), names.cone),
         )
-        parts = [words.format(shortened(name)) for words, name in named if name]
-        self._subject.setText("\n".join(parts))
+        parts = [words.format(name) for words, name in named if name]
+        margins, metrics = self._head.contentsMargins(), self._subject.fontMetrics()
+        width = self.width() - margins.left() - margins.right()
+        right = Qt.TextElideMode.ElideRight
+        shown = [metrics.elidedText(part, right, width) for part in parts]
+        self._subject.setText("\n".join(shown))
+        set_tooltip(self._subject, "\n".join(parts) if shown != parts else "")
         self._subject.setVisible(bool(parts))
         status = subject_message(names, self._value.origin, self._value.statuses)
         self._status.set_value(status)
         origin = origin_message(self._value.origin)
         self._origin.set_value(origin)
-        line = filter(None, (*parts, status.text, origin.text))
+        line = filter(None, (*map(shortened, parts), status.text, origin.text))
         self.subject_changed.emit(PARTED.join(line), bool(status.text))
 
     def set_room(self, room: SizeClass) -> None:

@@ -11,7 +11,7 @@ from lightpen.model.limits import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.look.words import PARTED, day_text, shortened
+from lightpen_app.look.words import LEAST_SHOWN, PARTED, day_text, shortened
 from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
@@ -129,4 +129,4 @@ class DuePanel(Translated, QWidget):
 
 def _name(tip: DueTip) -> str:
     names = tip.entry.entry.event.names
-    return PARTED.join((shortened(names.pen), shortened(names.tip)))
+    return PARTED.join(shortened(n, LEAST_SHOWN) for n in (names.pen, names.tip))

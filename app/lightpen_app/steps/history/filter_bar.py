@@ -20,7 +20,7 @@ from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
 LEAST_DATE, DATE_WIDTH = 14 * GRID, 17 * GRID
-LEAST_CHOICE = 12 * GRID
+LEAST_CHOICE = 11 * GRID  # px; six fields fit a window of 800 px
 
 
 class FilterBar(Translated, QWidget):

@@ -1,12 +1,12 @@
 """The entries of the archive as a table, the newest first, read on demand."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from itertools import chain, islice
 from typing import Any
 
 from PySide6.QtCore import QEvent, QItemSelectionModel, Qt, Signal
-from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtGui import QAction, QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QWidget
 from typing_extensions import override
 
@@ -44,7 +44,7 @@ NAMED = {  # shortest and longest names that are shown whole
     BY: ("A. Name", 16 * "n"),
 }
 MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
-CELL_MARGIN = 22  # px, beside the words
+CELL_MARGIN = 18  # px, beside the words
 LEAST_WORDS = 8 * GRID  # px, of the last column
 LEAST_ROWS = 3
 MOST_BLOCKS = 40  # that are kept
@@ -157,16 +157,26 @@ class HistoryTable(Translated, RowTable):
     block_wanted = Signal(int)
     # Other lines are current or selected, or were read by now.
     selection_changed = Signal()
+    columns_changed = Signal()  # the user chose other columns
 
     def __init__(self, kind_of: EventText) -> None:
         self._model = HistoryModel(kind_of)
         super().__init__(self._model)
         self._model.setParent(self)
         self._is_of_one_station = False
-        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        for scrolls in (self.setVerticalScrollMode, self.setHorizontalScrollMode):
+            scrolls(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self._shown = tuple(QAction(self, checkable=True) for _ in range(WORDS))
+        for each in (self, self.horizontalHeader()):
+            each.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+            each.addActions(self._shown)
         self.setMinimumHeight((LEAST_ROWS + 2) * ROW_HEIGHT)
 
         # Connections
+        for action in self._shown:
+            action.setChecked(True)
+            action.toggled.connect(self._share_width)
+            action.triggered.connect(self.columns_changed)
         self._model.block_wanted.connect(
             self.block_wanted, Qt.ConnectionType.QueuedConnection
         )
@@ -202,6 +212,15 @@ class HistoryTable(Translated, RowTable):
         """Take over which stations the entries are of."""
         self._is_of_one_station = len(stations) <= 1
         self._share_width()
+
+    def hidden_columns(self) -> tuple[int, ...]:
+        """Return the columns that the user does not want to see."""
+        return tuple(i for i, each in enumerate(self._shown) if not each.isChecked())
+
+    def set_hidden_columns(self, hidden: Sequence[int]) -> None:
+        """Hide columns; all others are shown."""
+        for i, action in enumerate(self._shown):
+            action.setChecked(i not in hidden)
 
     def n_lines(self) -> int:
         """Return the number of entries."""
@@ -251,23 +270,26 @@ class HistoryTable(Translated, RowTable):
             QFontMetrics(font(TextSize.BODY)),
             QFontMetrics(font(TextSize.SMALL)),
         )
-        is_dense = sum(self._widths(body, 0).values()) > room
+        hidden = set(self.hidden_columns())
+        is_dense = sum(self._widths(body, 0, hidden).values()) > room
         letters = small if is_dense else body
         for each in (self, self.horizontalHeader()):
             set_size(each, TextSize.SMALL if is_dense else TextSize.BODY)
-        is_without = is_dense and self._is_of_one_station
-        self.setColumnHidden(STATION, is_without)
-        least, most = self._widths(letters, 0), self._widths(letters, 1)
-        if is_without:
-            del least[STATION]
+        if is_dense and self._is_of_one_station:
+            hidden.add(STATION)
+        for column in range(WORDS):
+            self.setColumnHidden(column, column in hidden)
+        least, most = (self._widths(letters, longer, hidden) for longer in (0, 1))
         wanted = {column: most[column] - least[column] for column in least}
         spare = room - sum(least.values())
-        share = min(max(spare / sum(wanted.values()), 0.0), 1.0)
+        share = min(max(spare / max(sum(wanted.values()), 1), 0.0), 1.0)
         for column, width in least.items():
             self.setColumnWidth(column, width + int(share * wanted[column]))
         self.setColumnWidth(WORDS, LEAST_WORDS)  # and all that is left
 
-    def _widths(self, letters: QFontMetrics, longer: int) -> dict[int, int]:
+    def _widths(
+        self, letters: QFontMetrics, longer: int, hidden: Container[int]
+    ) -> dict[int, int]:
         """Return the width of each column but the last, by short or longer words."""
         texts = (*usual_words(), *rare_words()) if longer else usual_words()
         samples = {
@@ -286,11 +308,14 @@ class HistoryTable(Translated, RowTable):
                 for each in (words, str(self._model.headerData(column, across)))
             )
             for column, words in samples.items()
+            if column not in hidden
         }
 
     @override
     def _retranslate(self) -> None:
         self._share_width()
+        for action, title in zip(self._shown, self._model.titles(), strict=False):
+            action.setText(title)
         self.show_other_words()
         self.setAccessibleName(self.tr("Archive entries (newest first)"))
 

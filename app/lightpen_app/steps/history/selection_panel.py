@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
+from typing_extensions import override
 
 from lightpen.archive.chains.entries import StoredEntry
 from lightpen.comparisons.led_file import MIN_JOINT
@@ -18,7 +19,7 @@ from lightpen.comparisons.trend import (
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import grid_layout
+from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
@@ -28,18 +29,20 @@ from lightpen_app.look.words import moment_text
 from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
 PAIR = 2
 
 
-class SelectionPanel(Translated, QWidget):
+class SelectionPanel(ResponsiveLayout, Translated, QWidget):
     """Compares two entries, and shows the scatter of all selected ones.
 
     With fewer than two selected, the scatter of the whole trend is shown.
     """
 
+    narrow_below = 110 * GRID  # px; then the comparison is above the repeatability
     # Improved LED and camera files from the selected swings are requested.
     adjust_requested = Signal()
     report_requested = Signal()  # show the repeatability report
@@ -59,30 +62,29 @@ class SelectionPanel(Translated, QWidget):
         self._report = PushButton()
 
         # Layout
-        layout = grid_layout(self, spacing=(GRID, GRID // 2), margins=(0, GRID, 0, 0))
+        layout = vertical_layout(self, margins=(0, GRID, 0, 0))
+        self._sides = horizontal_layout(layout)
         sides = zip(
             self._heads,
             (self._compared, self._scattered),
             (self._change, self._verdict),
             strict=True,
         )
-        for column, rows in enumerate(sides):
-            layout.setColumnStretch(column, 1)
-            for row, widget in enumerate(rows):
-                layout.addWidget(widget, row, column)
-        for remark in (self._change, self._verdict):
-            layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
-        for row, button in enumerate((self._adjust, self._report), 5):
-            layout.addWidget(button, row, 0, Qt.AlignmentFlag.AlignLeft)
-        layout.addWidget(self._adjusted, 5, 1, Qt.AlignmentFlag.AlignVCenter)
-        layout.addWidget(self.adjusting, 6, 1)
-        layout.setRowStretch(7, 1)
+        for side in sides:
+            vertical_layout(self._sides, *side, 1, spacing=GRID // 2, stretch=1)
+        horizontal_layout(layout, self._adjust, (self._adjusted, 1))
+        horizontal_layout(layout, self._report, (self.adjusting, 1), 0)
+        layout.addStretch(1)
 
         # Connections
         self._adjust.clicked.connect(self.adjust_requested)
         self._report.clicked.connect(self.report_requested)
 
         self._retranslate()
+
+    @override
+    def _use_room(self) -> None:
+        set_stacked(self._sides, self._room.is_narrow)
 
     def set_limits(self, limits: VerificationLimits) -> None:
         """Judge by other limits."""

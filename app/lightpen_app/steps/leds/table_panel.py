@@ -45,9 +45,7 @@ class LedTablePanel(Translated, QGroupBox):
         # Widgets
         self._table = LedTable()
         self._flaw = SignLabel()
-        self._add = PushButton()
-        self._remove = PushButton()
-        self._discard = PushButton()
+        self._add, self._remove, self._discard = (PushButton(0) for _ in range(3))
         self._normals = QCheckBox()
         self._diameter_label, self._diameter = QLabel(), EnterEdit()
         self._diameter_label.setBuddy(self._diameter)

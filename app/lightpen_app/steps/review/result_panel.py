@@ -21,7 +21,7 @@ from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.look.words import day_text, shortened
+from lightpen_app.look.words import day_text
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -29,6 +29,8 @@ from lightpen_app.widgets.translated import Translated
 
 if TYPE_CHECKING:
     from lightpen.comparisons.press_test import PressTest
+
+SIDE = 3 * GRID // 2  # px, margin: figures fit a window of 800 px
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +84,8 @@ class TipSummary(Translated, QFrame):
         self._readout = TipReadout()
 
         # Layout
-        margins = 2 * GRID, GRID, 2 * GRID, GRID
-        layout = horizontal_layout(self, spacing=4 * GRID, margins=margins)
+        margins = SIDE, GRID, SIDE, GRID
+        layout = horizontal_layout(self, spacing=3 * GRID, margins=margins)
         left = vertical_layout(layout, self._of_u, spacing=0, stretch=1)
         bottom = Qt.AlignmentFlag.AlignBottom
         row = (self._u, 0, bottom), (self._limit, 0, bottom), 1
@@ -107,8 +109,7 @@ class TipSummary(Translated, QFrame):
             self._limit.clear()
             return
         text = self.tr("Tip {0} in the frame of pen {1} / mm, U\xa0(k\xa0=\xa02)")
-        names = shortened(outcome.names.tip), shortened(outcome.names.pen)
-        self._heading.setText(text.format(*names))
+        self._heading.setText(text.format(outcome.names.tip, outcome.names.pen))
         self._readout.set_value(_tip_value(outcome))
         u, limit = outcome.weakest_uncertainty, outcome.limit
         self._u.setText(f"{mm_text(u)} mm")
@@ -136,7 +137,8 @@ class ResultPanel(Translated, QFrame):
         self._images = SignLabel()
 
         # Layout
-        layout = vertical_layout(self, spacing=GRID // 2, margins=2 * GRID)
+        margins = SIDE, 2 * GRID, SIDE, 2 * GRID
+        layout = vertical_layout(self, spacing=GRID // 2, margins=margins)
         fill(layout, self._as_found, self._halves, self._self_check, self._bending)
         fill(layout, self._images)
         layout.addSpacing(GRID)

@@ -20,7 +20,7 @@ from lightpen_app.look.phrases import first_missing, grade_text
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import PARTED, on_one_line, shortened
+from lightpen_app.look.words import LEAST_SHOWN, PARTED, on_one_line, shortened
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app.widgets.status_mark import status_message
 
@@ -122,11 +122,15 @@ def tip_details(now: Preparation, statuses: StationStatus) -> str:
     tip, point = statuses.library.tip(names.tip), now.nominal_tip
     if point is None and now.pen is not None:
         point = now.pen.nominal_tip
-    parts = [translate("DayPage", "Tip {0}, pen {1}").format(names.tip, names.pen)]
+    parts = [
+        translate("DayPage", "Tip {0}, pen {1}").format(
+            *map(shortened, (names.tip, names.pen))
+        )
+    ]
     if names.ball_diameter:
         parts.append(translate("DayPage", "ball {0:g} mm").format(names.ball_diameter))
     if names.cone:
-        parts.append(translate("DayPage", "cone {0}").format(names.cone))
+        parts.append(translate("DayPage", "cone {0}").format(shortened(names.cone)))
     if point is not None:
         x, y, z = (f"{each:g}" for each in point.tolist())
         parts.append(translate("DayPage", "nominal {0} {1} {2} mm").format(x, y, z))
@@ -223,7 +227,7 @@ def _leds_message(
         return _amber(words.format(camera.misfit, USUAL_SIGMA))
     if statuses.of_item(ItemKind.PEN, pen) is TipStatus.OVERDUE:
         return _amber(translate("DayPage", "Pen {0} is overdue.").format(pen))
-    text = translate("DayPage", "LEDs of pen {0}").format(shortened(pen))
+    text = translate("DayPage", "LEDs of pen {0}").format(shortened(pen, LEAST_SHOWN))
     return StatusMessage.good(text)
 
 

@@ -249,6 +249,26 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     assert desk.statuses[-1] == "2 entries"
 
 
+def test_a_column_that_is_not_wanted_stays_hidden_and_the_others_have_its_width(
+    desk: Desk,
+) -> None:
+    desk.enter(3)
+    desk.open()
+    width = desk.table.columnWidth(PEN)
+
+    (tip,) = [each for each in desk.table.actions() if each.text() == "Tip"]
+    tip.trigger()
+
+    assert desk.table.isColumnHidden(TIP)
+    assert desk.table.columnWidth(PEN) > width
+    assert desk.workbench.settings.hidden_columns() == (TIP,)
+    again = HistoryPage(desk.workbench)
+    again.entered()
+    (table,) = again.findChildren(HistoryTable)
+    assert table.hidden_columns() == (TIP,)
+    again.shut_down()
+
+
 def test_a_pass_that_was_not_accepted_and_the_tasks_of_a_verification_are_told_apart(
     desk: Desk,
 ) -> None:
