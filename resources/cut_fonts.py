@@ -7,8 +7,8 @@ unpacked, but not installed.
 
 The Latin fonts keep the European alphabets; the Chinese ones keep all of GB 2312, in
 which names are written, what is frequent in names besides, the characters that the
-translations and the help use, and signs that Noto Sans lacks. Run it again when a test
-says that characters are missing.
+translations, the help and the reports use, and signs that Noto Sans lacks. Run it
+again when a test says that characters are missing.
 """
 
 import subprocess
@@ -96,8 +96,9 @@ def _gb2312() -> str:
 
 
 def _characters_wanted() -> list[int]:
-    """Return the characters of names, and all of the translations and the help."""
+    """Return the characters of names, and all of translations, help and reports."""
     files = [*PACKAGE.glob("translations/*.ts"), *PACKAGE.glob("help/*/*.md")]
+    files += PACKAGE.glob("reports/*.txt")
     used = "".join(file.read_text("utf-8") for file in files)
     text = SIGNS + NAMES + _gb2312() + used
     return sorted({ord(character) for character in text if character > "\x7f"})

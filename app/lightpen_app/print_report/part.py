@@ -13,19 +13,15 @@ from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.print_report.blocks import (
     MM,
-    RIGHT,
     WIDTH,
     Block,
-    Column,
     PrintSize,
     draw_text,
-    heading,
     line_pen,
-    paragraph,
-    table,
     text_height,
     text_width,
 )
+from lightpen_app.print_report.template import Content, condition, fill
 
 translate = QCoreApplication.translate
 
@@ -33,86 +29,57 @@ HEIGHT = 80 * MM  # of the plot
 DOT = 22.0  # dots, across
 WHISKER = 200.0  # times a deviation is drawn
 N_DECIMALS = 4
+FIGURES = (
+    *("nominal", "lower_limit", "upper_limit", "actual", "deviation"),
+    *("expanded_uncertainty", "probability_of_conformity"),
+)
 
 
-def part_blocks(record: Mapping[str, Any]) -> Iterator[Block]:
-    """Yield characteristics, features, alignment, points and plan."""
-    yield heading(translate("paper", "Characteristics / mm, degrees"))
-    yield from _characteristics(record["characteristics"])
-    yield heading(translate("paper", "Features / mm, degrees"))
-    yield from _features(record["features"])
-    yield from _alignment(record["alignment"])
-    yield heading(translate("paper", "Points"))
-    yield from _points(record["touches"])
-    yield heading(translate("paper", "Measuring plan"))
-    yield from _plan(record["plan"])
-
-
-def _numbers(*columns: str) -> list[Column]:
-    return [Column(each, 1.0, RIGHT) for each in columns]
+def part_blocks(record: Mapping[str, Any]) -> tuple[Block, ...]:
+    """Return characteristics, budget, features, alignment, points and plan."""
+    characteristics, alignment = record["characteristics"], record["alignment"]
+    rejected = [i for i, e in enumerate(characteristics) if e["decision"] == "rejected"]
+    point_texts, points = _points(record["touches"])
+    texts = {
+        "aligned": condition(alignment is not None),
+        "unaligned": condition(alignment is None),
+        **point_texts,
+    }
+    tables = {
+        "characteristics": [
+            (
+                each["name"],
+                *(_text(each[name]) for name in FIGURES),
+                each["decision"] or "",
+            )
+            for each in characteristics
+        ],
+        "features": [_feature_row(each) for each in record["features"]],
+        "alignment": _alignment_rows(alignment),
+        "plan": [
+            (
+                *(each["name"], each["kind"]),
+                ", ".join(f"{k} {v}" for k, v in each.get("nominal", {}).items() if v),
+            )
+            for each in record["plan"]["features"]
+        ],
+    }
+    strong = {"characteristics": rejected}
+    return fill("part", Content(texts, tables, strong, drawn={"points": points}))
 
 
 def _text(value: float | None) -> str:
     return "" if value is None else number_text(value, N_DECIMALS)
 
 
-def _characteristics(entries: list[dict[str, Any]]) -> Iterator[Block]:
-    columns = [Column(translate("paper", "Characteristic"), 2.2)]
-    columns += _numbers(
-        translate("paper", "Nominal"),
-        translate("paper", "Lower limit"),
-        translate("paper", "Upper limit"),
-        translate("paper", "Actual"),
-        translate("paper", "Deviation"),
-        translate("paper", "U (k = 2)"),
-        translate("paper", "P"),
+def _feature_row(feature: Mapping[str, Any]) -> tuple[str, ...]:
+    sizes = ", ".join(f"{k} {_text(v)}" for k, v in _sizes(feature["sizes"]))
+    return (
+        *(feature["name"], _kind(feature)),
+        *map(_text, feature["origin_mm"]),
+        _text(max(feature["expanded_uncertainty"][:3])),
+        *(sizes, _text(feature["form_error_mm"]), str(feature["n_touches"])),
     )
-    columns.append(Column(translate("paper", "Decision"), 1.2))
-    yield from table(
-        columns,
-        [
-            [
-                each["name"],
-                *(
-                    _text(each[name])
-                    for name in (
-                        *("nominal", "lower_limit", "upper_limit", "actual"),
-                        *("deviation", "expanded_uncertainty"),
-                        *("probability_of_conformity",),
-                    )
-                ),
-                each["decision"] or "",
-            ]
-            for each in entries
-        ],
-        strong=[i for i, e in enumerate(entries) if e["decision"] == "rejected"],
-        size=PrintSize.SMALL,
-    )
-    yield paragraph(
-        translate("paper", "P: probability of conformity (JCGM 106)."), PrintSize.SMALL
-    )
-
-
-def _features(entries: list[dict[str, Any]]) -> Iterator[Block]:
-    columns = [
-        Column(translate("paper", "Feature"), 1.3),
-        Column(translate("paper", "Kind"), 2.1),
-        *_numbers("x", "y", "z", translate("paper", "U (k = 2)")),
-        Column(translate("paper", "Sizes"), 2.2),
-        *_numbers(translate("paper", "Form error"), translate("paper", "Points")),
-    ]
-    rows = []
-    for each in entries:
-        sizes = ", ".join(f"{k} {_text(v)}" for k, v in _sizes(each["sizes"]))
-        rows.append(
-            [
-                *(each["name"], _kind(each)),
-                *map(_text, each["origin_mm"]),
-                _text(max(each["expanded_uncertainty"][:3])),
-                *(sizes, _text(each["form_error_mm"]), str(each["n_touches"])),
-            ]
-        )
-    yield from table(columns, rows, size=PrintSize.SMALL)
 
 
 def _kind(feature: Mapping[str, Any]) -> str:
@@ -131,39 +98,35 @@ def _sizes(sizes: Mapping[str, float]) -> Iterator[tuple[str, float]]:
         yield "angle", 2 * float(np.rad2deg(sizes["half_angle"]))
 
 
-def _alignment(alignment: dict[str, Any] | None) -> Iterator[Block]:
+def _alignment_rows(alignment: dict[str, Any] | None) -> list[tuple[str, ...]]:
     if alignment is None:
-        text = translate("paper", "Coordinates are in the frame of the camera.")
-        yield paragraph(text)
-        return
-    yield paragraph(
-        translate("paper", "Coordinates are in the frame of the part. Camera to part:")
-    )
+        return []
     turn = alignment["part_from_cam_rotation"]
     shift = alignment["part_from_cam_translation_mm"]
-    rows = [
-        ["xyz"[i], *(f"{x:.8f}" for x in turn[i]), _text(shift[i])] for i in range(3)
+    return [
+        ("xyz"[i], *(f"{x:.8f}" for x in turn[i]), _text(shift[i])) for i in range(3)
     ]
-    columns = [Column("", 0.3), *_numbers("u", "v", "w", translate("paper", "Shift"))]
-    yield from table(columns, rows, size=PrintSize.SMALL)
 
 
-def _points(touches: list[dict[str, Any]]) -> Iterator[Block]:
-    """Yield a plot of all points with their deviations, from the flattest side."""
+def _points(
+    touches: list[dict[str, Any]],
+) -> tuple[dict[str, str | None], tuple[Block, ...]]:
+    """Return a plot of all points with their deviations, from the flattest side."""
     points = np.array([each["point_cam_mm"] for each in touches])
     off = np.array([each["deviation_cam_mm"] or [0, 0, 0] for each in touches])
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    texts: dict[str, str | None] = {
+        "n_points": str(len(points)) if len(axes) > 1 else None,
+        "enlargement": f"{WHISKER:.0f}",
+        "largest_deviation": _text(float(np.linalg.norm(off, axis=1).max())),
+    }
     if len(axes) < 2:
-        return
+        return texts, ()
     flat = (points - middle) @ axes[:2].T
     ends = flat + WHISKER * off @ axes[:2].T
-    yield Block(lambda painter: _draw(painter, flat, ends, touches), HEIGHT, space=60)
-    text = translate(
-        "paper", "{0} points; deviations are drawn {1} times as large, at most {2} mm."
-    )
-    largest = number_text(float(np.linalg.norm(off, axis=1).max()), N_DECIMALS)
-    yield paragraph(text.format(len(points), round(WHISKER), largest), PrintSize.SMALL)
+    plot = Block(lambda painter: _draw(painter, flat, ends, touches), HEIGHT, space=60)
+    return texts, (plot,)
 
 
 def _draw(
@@ -211,19 +174,3 @@ def _free_area(place: QPointF, text: str, taken: list[QRectF]) -> QRectF:
         return sum(each.width() * each.height() for each in shared)
 
     return min(areas, key=covered)
-
-
-def _plan(plan: dict[str, Any]) -> Iterator[Block]:
-    columns = [
-        Column(translate("paper", "Feature"), 1.2),
-        Column(translate("paper", "Kind"), 0.8),
-        Column(translate("paper", "Nominals / mm, degrees"), 3.0),
-    ]
-    rows = [
-        [
-            *(each["name"], each["kind"]),
-            ", ".join(f"{k} {v}" for k, v in each.get("nominal", {}).items() if v),
-        ]
-        for each in plan["features"]
-    ]
-    yield from table(columns, rows, size=PrintSize.SMALL)

@@ -5,7 +5,7 @@ are defined, and nothing outside of it is needed to show it in decades. Qt write
 it draws the preview and reaches the printer; no other library is needed for it.
 """
 
-from PySide6.QtCore import QBuffer, QIODevice, QMarginsF
+from PySide6.QtCore import QBuffer, QCoreApplication, QIODevice, QMarginsF
 from PySide6.QtGui import (
     QPagedPaintDevice,
     QPageLayout,
@@ -23,14 +23,11 @@ from lightpen.record.exports.exports import export_stem
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.print_report.blocks import DOTS_AN_INCH
+from lightpen_app.print_report.calibration import calibration_blocks, status_words
+from lightpen_app.print_report.common import record_number
 from lightpen_app.print_report.pages import Margins, PrintReport, lay_out, paint_page
-from lightpen_app.print_report.sections import (
-    all_sections,
-    record_number,
-    status_words,
-    title_text,
-    translate,
-)
+
+translate = QCoreApplication.translate
 
 # Qt names it among the colours of each page and draws in none of it; PDF/A-1 has no
 # place for it beside colours of a screen. Of equal length, as a PDF counts its bytes.
@@ -53,7 +50,7 @@ def print_report_of(
     Without the reestimated images some plots are left out. ``entered`` is the archive
     entry of the calibration, the laboratory where it was made.
     """
-    blocks = all_sections(calibration_file, reestimated, entered, laboratory)
+    blocks = calibration_blocks(calibration_file, reestimated, entered, laboratory)
     return PrintReport(
         calibration_file.names.operator, _margins(calibration_file), lay_out(blocks)
     )
@@ -102,7 +99,7 @@ def _margins(calibration_file: CalibrationFile) -> Margins:
     subject = translate("paper", "Pen {0}, tip {1}, cone {2}").format(*items)
     foot = translate("paper", "SHA-256 of the JSON file: {0}")
     return Margins(
-        title=title_text(),
+        title=translate("paper", "Calibration report"),
         subject=subject,
         number=record_number(calibration_file.sha256),
         badges=_badges(calibration_file),

@@ -5,7 +5,7 @@ code here.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,26 +25,23 @@ from lightpen_app.print_report.blocks import (
     RIGHT,
     Block,
     Column,
-    PrintSize,
     facts,
     heading,
-    paragraph,
     subheading,
     table,
 )
-from lightpen_app.print_report.evidence import input_blocks
-from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
-from lightpen_app.print_report.part import part_blocks
-from lightpen_app.print_report.sections import (
-    environment_facts,
-    laboratory_blocks,
-    proof_blocks,
+from lightpen_app.print_report.common import (
+    environment_texts,
+    laboratory_texts,
+    proof_texts,
     record_number,
-    signature_blocks,
-    stated,
-    traced_blocks,
+    signatures,
+    traced_rows,
     zoned_moment_text,
 )
+from lightpen_app.print_report.pages import Margins, PrintReport, lay_out
+from lightpen_app.print_report.part import part_blocks
+from lightpen_app.print_report.template import Content, condition, fill
 
 translate = QCoreApplication.translate
 
@@ -74,21 +71,49 @@ def verification_print_report(
     record: dict[str, Any] = json.loads(file.content or b"{}")
     is_part = done.verification == MEASURED_PART
     title = translate("paper", "Verification report")
-    by = translate("paper", "Verified by")
+    by, heading_text = (
+        translate("paper", "Verified by"),
+        translate("paper", "Item under verification"),
+    )
     if is_part:
         title = translate("paper", "Measurement report")
-        by = translate("paper", "Measured by")
-    blocks = (
-        paragraph(title, PrintSize.TITLE, bold=True),
-        *_items(done),
-        *laboratory_blocks(laboratory),
-        *traced_blocks(traced),
-        *_verdict(done, record.get("verdict")),
-        *(part_blocks(record) if is_part else _figures(record)),
-        *_inputs(record.get("inputs", {})),
-        *proof_blocks(file.path.name, file.sha256, entered),
-        *signature_blocks(by),
-    )
+        by, heading_text = (
+            translate("paper", "Measured by"),
+            translate("paper", "Station"),
+        )
+    inputs = record.get("inputs", {})
+    texts = {
+        "title": title,
+        "task_heading": heading_text,
+        "task": done.verification,
+        "created": zoned_moment_text(done.created),
+        "pen": done.pen,
+        "station": done.station,
+        "tip": done.tip,
+        "operator": done.operator,
+        "origin": origin_text(done.origin),
+        **environment_texts(done.temperature_c, done.humidity_percent),
+        "program": str(done.program),
+        **laboratory_texts(laboratory, traced),
+        **_verdict_texts(done, record.get("verdict")),
+        **proof_texts(file.path.name, file.sha256, entered),
+        "n_observations": str(len(inputs.get("images", ()))),
+    }
+    judged = done.verdict if texts["unjudged"] is None else None
+    limits = {} if judged is None else judged.limits_mm
+    tables: dict[str, Sequence[Sequence[str]]] = {
+        "traced": traced_rows(traced),
+        "limits": [
+            (name.replace("_", " "), f"{limit:.{N_DECIMALS}f}")
+            for name, limit in limits.items()
+        ],
+        "files": _file_rows(inputs),
+    }
+    drawn = {
+        "figures": part_blocks(record) if is_part else tuple(_figures(record)),
+        "signatures": [signatures(by)],
+    }
+    blocks = fill("verification", Content(texts, tables, drawn=drawn))
     items = (each or "\u2013" for each in (done.pen, done.tip, done.verification))
     foot = translate("paper", "SHA-256 of the JSON file: {0}")
     margins = Margins(
@@ -115,43 +140,18 @@ def _badges(done: StoredVerification) -> tuple[str, ...]:
     return tuple(badges)
 
 
-def _items(done: StoredVerification) -> Iterator[Block]:
-    is_part = done.verification == MEASURED_PART
-    under_verification = translate("paper", "Item under verification")
-    yield heading(translate("paper", "Station") if is_part else under_verification)
-    yield from facts(
-        [
-            (translate("paper", "Task"), done.verification),
-            (translate("paper", "Verified"), zoned_moment_text(done.created)),
-            (translate("paper", "Pen serial number"), stated(done.pen)),
-            (translate("paper", "Station"), stated(done.station)),
-            (translate("paper", "Probe tip"), stated(done.tip)),
-            (translate("paper", "Operator"), stated(done.operator)),
-            (translate("paper", "Image source"), origin_text(done.origin)),
-            *environment_facts(done.temperature_c, done.humidity_percent),
-            (translate("paper", "Program"), str(done.program)),
-        ]
-    )
-
-
-def _verdict(done: StoredVerification, verdict: Any) -> Iterator[Block]:
-    yield heading(translate("paper", "Verdict"))
+def _verdict_texts(done: StoredVerification, verdict: Any) -> dict[str, str | None]:
     if done.verdict is None or not isinstance(verdict, Mapping):
-        yield paragraph(translate("paper", "Measured, not judged."))
-        return
-    grade = grade_text(Grade(done.verdict.grade))
-    yield paragraph(f"{grade}: {worded(done.why)}", bold=True)
-    limits = [
-        (name.replace("_", " "), f"{limit:.{N_DECIMALS}f}")
-        for name, limit in done.verdict.limits_mm.items()
-    ]
-    yield paragraph(str(verdict.get("decision_rule") or ""))
-    if limits:
-        yield subheading(translate("paper", "Limits / mm"))
-        yield from facts(limits)
-    if done.reason:
-        text = translate("paper", "The tip was accepted. Reason: {0}")
-        yield paragraph(text.format(done.reason))
+        names = "grade why rule limited reason"
+        return {"unjudged": "", **dict.fromkeys(names.split())}
+    return {
+        "unjudged": None,
+        "grade": grade_text(Grade(done.verdict.grade)),
+        "why": worded(done.why),
+        "rule": str(verdict.get("decision_rule") or ""),
+        "limited": condition(done.verdict.limits_mm),
+        "reason": done.reason or None,
+    }
 
 
 def _figures(record: Mapping[str, Any]) -> Iterator[Block]:
@@ -200,15 +200,15 @@ def _tables(of: Mapping[str, Any]) -> Iterator[Block]:
         yield from table(columns, rows)
 
 
-def _inputs(inputs: Any) -> Iterable[Block]:
-    """Return the files with their hashes, and how many images there are."""
+def _file_rows(inputs: Any) -> list[tuple[str, str, str]]:
+    """Return the files with their hashes."""
     files = {k: v for k, v in inputs.items() if isinstance(v, Mapping) and "file" in v}
     others = inputs.get("files", ())
     rows = [(name, each["file"], each["sha256"]) for name, each in files.items()]
     rows += [("", each["file"], each["sha256"]) for each in others]
     for each in inputs.get("touches", ()):  # of live ones, whose images it lists
         rows.append(("touches", each["folder"], each["journal_sha256"]))
-    return input_blocks(rows, len(inputs.get("images", ())))
+    return rows
 
 
 def _title(name: str) -> str:
@@ -236,7 +236,7 @@ def _plain(name: str, value: Any) -> str:
         return translate("paper", "yes") if value else translate("paper", "no")
     if isinstance(value, (int, float)):
         return _number(name, value)
-    return stated(str(value or ""))
+    return str(value or "") or translate("paper", "not stated")
 
 
 def _number(name: str, value: float) -> str:

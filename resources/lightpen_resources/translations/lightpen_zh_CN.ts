@@ -9840,10 +9840,6 @@ needed</source>
         <translation>标定报告</translation>
     </message>
     <message>
-        <source>Probe tip centre of a light pen, image-based</source>
-        <translation>基于图像的光笔测头中心</translation>
-    </message>
-    <message>
         <source>This tip has not been accepted.</source>
         <translation>该测头未被接受。</translation>
     </message>
@@ -9852,84 +9848,20 @@ needed</source>
         <translation>该测头已被接受。理由：{0}</translation>
     </message>
     <message>
-        <source>Item under calibration</source>
-        <translation>标定对象</translation>
-    </message>
-    <message>
         <source>Station</source>
         <translation>工位</translation>
-    </message>
-    <message>
-        <source>Probe tip</source>
-        <translation>测头</translation>
-    </message>
-    <message>
-        <source>Operator</source>
-        <translation>操作员</translation>
-    </message>
-    <message>
-        <source>Ball diameter</source>
-        <translation>测球直径</translation>
-    </message>
-    <message>
-        <source>Measured</source>
-        <translation>测量时间</translation>
-    </message>
-    <message>
-        <source>Computed</source>
-        <translation>计算时间</translation>
     </message>
     <message>
         <source>Cone</source>
         <translation>锥孔</translation>
     </message>
     <message>
-        <source>Accepted</source>
-        <translation>接受时间</translation>
-    </message>
-    <message>
         <source>no</source>
         <translation>未接受</translation>
     </message>
     <message>
-        <source>Image source</source>
-        <translation>图像来源</translation>
-    </message>
-    <message>
-        <source>Relative humidity</source>
-        <translation>相对湿度</translation>
-    </message>
-    <message>
-        <source>Next due</source>
-        <translation>下次到期</translation>
-    </message>
-    <message>
         <source>Practice: not used for any pen.</source>
         <translation>练习：不用于任何光笔。</translation>
-    </message>
-    <message>
-        <source>Saved</source>
-        <translation>已保存</translation>
-    </message>
-    <message>
-        <source>Status</source>
-        <translation>状态</translation>
-    </message>
-    <message>
-        <source>[U+...] is the Unicode number of a character missing in the fonts of this report.</source>
-        <translation>[U+...] 为本报告字体所缺字符的 Unicode 编码。</translation>
-    </message>
-    <message>
-        <source>Laboratory</source>
-        <translation>实验室</translation>
-    </message>
-    <message>
-        <source>Place</source>
-        <translation>地点</translation>
-    </message>
-    <message>
-        <source>Procedure</source>
-        <translation>规程</translation>
     </message>
     <message>
         <source>Camera (intrinsics)</source>
@@ -9948,30 +9880,6 @@ needed</source>
         <translation>标准器</translation>
     </message>
     <message>
-        <source>Measured with</source>
-        <translation>测量设备</translation>
-    </message>
-    <message>
-        <source>ID</source>
-        <translation>编号</translation>
-    </message>
-    <message>
-        <source>Certificate</source>
-        <translation>证书</translation>
-    </message>
-    <message>
-        <source>Date</source>
-        <translation>日期</translation>
-    </message>
-    <message>
-        <source>Traceability</source>
-        <translation>溯源</translation>
-    </message>
-    <message>
-        <source>Source of this report</source>
-        <translation>本报告所依据的文件</translation>
-    </message>
-    <message>
         <source>practice</source>
         <translation>练习</translation>
     </message>
@@ -9988,92 +9896,8 @@ needed</source>
         <translation>有效</translation>
     </message>
     <message>
-        <source>End of report</source>
-        <translation>报告结束</translation>
-    </message>
-    <message>
         <source>not measured</source>
         <translation>未测量</translation>
-    </message>
-    <message>
-        <source>Method</source>
-        <translation>方法</translation>
-    </message>
-    <message>
-        <source>Program</source>
-        <translation>程序</translation>
-    </message>
-    <message>
-        <source>Tip / mm</source>
-        <translation>测头 / mm</translation>
-    </message>
-    <message>
-        <source>U (k = 2) / mm</source>
-        <translation>U (k = 2) / mm</translation>
-    </message>
-    <message>
-        <source>Nominal tip / mm</source>
-        <translation>标称测头 / mm</translation>
-    </message>
-    <message>
-        <source>Deviation from nominal / mm</source>
-        <translation>与标称值的偏差 / mm</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the difference / mm</source>
-        <translation>差值的 U (k = 2) / mm</translation>
-    </message>
-    <message>
-        <source>In the pen frame</source>
-        <translation>光笔坐标系</translation>
-    </message>
-    <message>
-        <source>The tip is the effective one, in the scale of the LED file: min over x, c of sum |R_i x + T_i - c|² over the swing.</source>
-        <translation>测头为有效测头，以 LED 文件的尺度表示：对 x、c 取整个摆动中 |R_i x + T_i - c|² 之和的最小值。</translation>
-    </message>
-    <message>
-        <source>In the camera frame</source>
-        <translation>相机坐标系</translation>
-    </message>
-    <message>
-        <source>The largest U (k = 2) is {1} mm, along ({0}) of the pen frame. U is the standard uncertainty times k = 2, with a coverage probability of about 95 % for a normal distribution (JCGM 100:2008, GUM).</source>
-        <translation>最大的 U (k = 2) 为 {1} mm，沿光笔坐标系的 ({0}) 方向。U 为标准不确定度乘以包含因子 k = 2，对正态分布其包含概率约为 95 %（JCGM 100:2008，GUM）。</translation>
-    </message>
-    <message>
-        <source>No previous tip for comparison</source>
-        <translation>此前没有可供比较的测头</translation>
-    </message>
-    <message>
-        <source>Findings</source>
-        <translation>需要检查</translation>
-    </message>
-    <message>
-        <source>As found: the previous tip is {0} mm from the tip as left; no limit set.</source>
-        <translation>标定前状态：前一测头与标定后状态的测头相距 {0} mm；未设限值。</translation>
-    </message>
-    <message>
-        <source>As found: the previous tip is {0} mm from the tip as left, within its limit of {1} mm.</source>
-        <translation>标定前状态：前一测头与标定后状态的测头相距 {0} mm，在其限值 {1} mm 之内。</translation>
-    </message>
-    <message>
-        <source>As found: the previous tip is {0} mm from the tip as left, BEYOND its limit of {1} mm.</source>
-        <translation>标定前状态：前一测头与标定后状态的测头相距 {0} mm，超出其限值 {1} mm。</translation>
-    </message>
-    <message>
-        <source>No statement of conformity with a specification is made. The decision rule is that of the program that made this report; the verdict is that of the file.</source>
-        <translation>本报告不对测头是否符合规范作出声明。判定规则取自生成本报告的程序，结论取自文件。</translation>
-    </message>
-    <message>
-        <source>Uncertainty budget</source>
-        <translation>不确定度报告</translation>
-    </message>
-    <message>
-        <source>The contributions are combined as root sum of squares. Assumed values are stated in no file; they are set by the station or the program.</source>
-        <translation>各分量按平方和合成。“假定”值未在文件中给出，由工位设置或程序取定。</translation>
-    </message>
-    <message>
-        <source>Self-check: half of the LEDs predict the others to {0} times their uncertainty; at most {1} by chance.</source>
-        <translation>自检：一半 LED 对其余 LED 的预测误差为其不确定度的 {0} 倍；偶然最多 {1} 倍。</translation>
     </message>
     <message>
         <source>Image noise</source>
@@ -10096,168 +9920,16 @@ needed</source>
         <translation>LED 文件中的 LED 位置</translation>
     </message>
     <message>
-        <source>Pen temperature</source>
-        <translation>光笔温度</translation>
-    </message>
-    <message>
         <source>Extrinsics of the cameras</source>
         <translation>相机的外参</translation>
-    </message>
-    <message>
-        <source>Change since {0} / mm</source>
-        <translation>自 {0} 以来的变化 / mm</translation>
-    </message>
-    <message>
-        <source>Result</source>
-        <translation>结果</translation>
-    </message>
-    <message>
-        <source>Cone / mm</source>
-        <translation>锥孔 / mm</translation>
-    </message>
-    <message>
-        <source>Covariance of the tip / µm²</source>
-        <translation>测头的协方差 / µm²</translation>
-    </message>
-    <message>
-        <source>Tip as found / mm</source>
-        <translation>标定前状态的测头 / mm</translation>
-    </message>
-    <message>
-        <source>Images are correlated: noise variance × {0}</source>
-        <translation>图像相关：噪声方差 × {0}</translation>
-    </message>
-    <message>
-        <source>Odd minus even images / mm</source>
-        <translation>奇数图像减偶数图像 / mm</translation>
-    </message>
-    <message>
-        <source>Decision rule</source>
-        <translation>判定规则</translation>
     </message>
     <message>
         <source>assumed</source>
         <translation>假定</translation>
     </message>
     <message>
-        <source>Combined standard uncertainty</source>
-        <translation>合成标准不确定度</translation>
-    </message>
-    <message>
-        <source>Expanded uncertainty U (k = 2)</source>
-        <translation>扩展不确定度 U (k = 2)</translation>
-    </message>
-    <message>
-        <source>Standard uncertainty (k = 1) / µm</source>
-        <translation>标准不确定度 (k = 1) / µm</translation>
-    </message>
-    <message>
-        <source>U (k = 2), weakest direction</source>
-        <translation>U (k = 2)，最弱方向</translation>
-    </message>
-    <message>
-        <source>Images</source>
-        <translation>图像</translation>
-    </message>
-    <message>
-        <source>{0} of {1}</source>
-        <translation>{0} / {1}</translation>
-    </message>
-    <message>
-        <source>{0} to {1}°</source>
-        <translation>{0} 至 {1}°</translation>
-    </message>
-    <message>
-        <source>Image</source>
-        <translation>图像</translation>
-    </message>
-    <message>
-        <source>File</source>
-        <translation>文件</translation>
-    </message>
-    <message>
-        <source>LEDs and camera</source>
-        <translation>LED 与相机</translation>
-    </message>
-    <message>
-        <source>mean x / px</source>
-        <translation>x 均值 / px</translation>
-    </message>
-    <message>
-        <source>mean y / px</source>
-        <translation>y 均值 / px</translation>
-    </message>
-    <message>
-        <source>Included</source>
-        <translation>已计入</translation>
-    </message>
-    <message>
-        <source>Pen tilt</source>
-        <translation>光笔倾角</translation>
-    </message>
-    <message>
-        <source>Excluded</source>
-        <translation>已剔除</translation>
-    </message>
-    <message>
-        <source>Rotation about its axis</source>
-        <translation>绕自身轴转角</translation>
-    </message>
-    <message>
-        <source>Residuals, RMS</source>
-        <translation>残差，均方根</translation>
-    </message>
-    <message>
-        <source>Noise of LED centres</source>
-        <translation>LED 中心噪声</translation>
-    </message>
-    <message>
-        <source>Residuals, worst image</source>
-        <translation>残差，最差的图像</translation>
-    </message>
-    <message>
-        <source>Tip per image, RMS</source>
-        <translation>单幅图像测头，均方根</translation>
-    </message>
-    <message>
-        <source>The plot of the tip per image is available only for one camera and one cone, and for complete files.</source>
-        <translation>测头随图像变化的图仅适用于单相机、单锥孔且内容齐全的文件。</translation>
-    </message>
-    <message>
-        <source>The curves are computed from the poses of single images, the result from the joint adjustment of all images.</source>
-        <translation>曲线由各单幅图像的位姿求得，结果由全部图像整体平差求得。</translation>
-    </message>
-    <message>
         <source>outlier</source>
         <translation>离群值</translation>
-    </message>
-    <message>
-        <source>Detected</source>
-        <translation>已检测</translation>
-    </message>
-    <message>
-        <source>RMS / px</source>
-        <translation>均方根 / px</translation>
-    </message>
-    <message>
-        <source>Deviation / µm</source>
-        <translation>偏差 / µm</translation>
-    </message>
-    <message>
-        <source>Camera parameters from the images</source>
-        <translation>由图像求得的相机参数</translation>
-    </message>
-    <message>
-        <source>Parameter</source>
-        <translation>参数</translation>
-    </message>
-    <message>
-        <source>Value</source>
-        <translation>数值</translation>
-    </message>
-    <message>
-        <source>Standard uncertainty (k = 1)</source>
-        <translation>标准不确定度 (k = 1)</translation>
     </message>
     <message>
         <source>Rig</source>
@@ -10272,52 +9944,8 @@ needed</source>
         <translation>光笔</translation>
     </message>
     <message>
-        <source>Input files</source>
-        <translation>输入文件</translation>
-    </message>
-    <message>
-        <source>Images or files of LED centres: {0}. The JSON file lists each with its SHA-256.</source>
-        <translation>图像或 LED 中心文件：{0} 个。JSON 文件列出每个文件及其 SHA-256。</translation>
-    </message>
-    <message>
-        <source>Excluded images</source>
-        <translation>剔除的图像</translation>
-    </message>
-    <message>
-        <source>Reason</source>
-        <translation>理由</translation>
-    </message>
-    <message>
-        <source>And {0} more, listed in the JSON file.</source>
-        <translation>另有 {0} 幅，见 JSON 文件。</translation>
-    </message>
-    <message>
-        <source>Pen serial number</source>
-        <translation>光笔序列号</translation>
-    </message>
-    <message>
-        <source>JSON file</source>
-        <translation>JSON 文件</translation>
-    </message>
-    <message>
-        <source>Entry in the archive</source>
-        <translation>档案条目</translation>
-    </message>
-    <message>
-        <source>Its SHA-256</source>
-        <translation>该条目的 SHA-256</translation>
-    </message>
-    <message>
         <source>Calibrated by</source>
         <translation>标定人</translation>
-    </message>
-    <message>
-        <source>Chain of entries</source>
-        <translation>条目链</translation>
-    </message>
-    <message>
-        <source>All figures are taken from this file, which is the complete original. They relate only to the items named, in their condition at the time. This is a report, not a certificate of an accredited laboratory. It must not be reproduced except in full.</source>
-        <translation>所有数值均取自此文件，它是完整原件。数值仅适用于所列物品当时的状态。本文件是报告，不是认可实验室的证书。除全文外不得复制。</translation>
     </message>
     <message>
         <source>Checked by</source>
@@ -10360,98 +9988,6 @@ needed</source>
         <translation>未注明</translation>
     </message>
     <message>
-        <source>Characteristics / mm, degrees</source>
-        <translation>特性 / mm，度</translation>
-    </message>
-    <message>
-        <source>Features / mm, degrees</source>
-        <translation>要素 / mm，度</translation>
-    </message>
-    <message>
-        <source>Points</source>
-        <translation>测点数</translation>
-    </message>
-    <message>
-        <source>Measuring plan</source>
-        <translation>测量计划</translation>
-    </message>
-    <message>
-        <source>Characteristic</source>
-        <translation>特性</translation>
-    </message>
-    <message>
-        <source>Nominal</source>
-        <translation>标称</translation>
-    </message>
-    <message>
-        <source>Lower limit</source>
-        <translation>下极限</translation>
-    </message>
-    <message>
-        <source>Upper limit</source>
-        <translation>上极限</translation>
-    </message>
-    <message>
-        <source>Actual</source>
-        <translation>实际值</translation>
-    </message>
-    <message>
-        <source>Deviation</source>
-        <translation>偏差</translation>
-    </message>
-    <message>
-        <source>U (k = 2)</source>
-        <translation>U (k = 2)</translation>
-    </message>
-    <message>
-        <source>P: probability of conformity (JCGM 106).</source>
-        <translation>P：合格概率 (JCGM 106)。</translation>
-    </message>
-    <message>
-        <source>P</source>
-        <translation>P</translation>
-    </message>
-    <message>
-        <source>Decision</source>
-        <translation>判定</translation>
-    </message>
-    <message>
-        <source>Feature</source>
-        <translation>要素</translation>
-    </message>
-    <message>
-        <source>Kind</source>
-        <translation>类型</translation>
-    </message>
-    <message>
-        <source>Sizes</source>
-        <translation>尺寸</translation>
-    </message>
-    <message>
-        <source>Form error</source>
-        <translation>形状误差</translation>
-    </message>
-    <message>
-        <source>Coordinates are in the frame of the camera.</source>
-        <translation>坐标为相机坐标系。</translation>
-    </message>
-    <message>
-        <source>Coordinates are in the frame of the part. Camera to part:</source>
-        <translation>坐标为工件坐标系。相机到工件：</translation>
-    </message>
-    <message>
-        <source>Shift</source>
-        <translation>平移</translation>
-    </message>
-    <message>
-        <source>{0} points; deviations are drawn {1} times as large, at most {2} mm.</source>
-        <translation>{0} 个点；偏差放大 {1} 倍显示，最大 {2} mm。</translation>
-    </message>
-    <message>
-        <source>Nominals / mm, degrees</source>
-        <translation>标称值 / mm，度</translation>
-    </message>
-    <message>
         <source>Verification report</source>
         <translation>验证报告</translation>
     </message>
@@ -10474,26 +10010,6 @@ needed</source>
     <message>
         <source>Item under verification</source>
         <translation>被验证物品</translation>
-    </message>
-    <message>
-        <source>Task</source>
-        <translation>任务</translation>
-    </message>
-    <message>
-        <source>Verified</source>
-        <translation>已验证</translation>
-    </message>
-    <message>
-        <source>Verdict</source>
-        <translation>结论</translation>
-    </message>
-    <message>
-        <source>Measured, not judged.</source>
-        <translation>已测量，未判定。</translation>
-    </message>
-    <message>
-        <source>Limits / mm</source>
-        <translation>限值 / mm</translation>
     </message>
     <message>
         <source>Figures, as the JSON file names them</source>

@@ -277,6 +277,7 @@ def test_the_bundled_fonts_hold_every_character_that_is_shown() -> None:
     files = [
         *TRANSLATIONS.glob("*.ts"),
         *(RESOURCES / "help").rglob("*.md"),
+        *(RESOURCES / "reports").glob("*.txt"),
         *APPLICATION.rglob("*.py"),
     ]
     text = "".join(path.read_text("utf-8") for path in files)
