@@ -111,6 +111,4 @@ MESSAGES = {
     "rig.other-order": "The images of camera {camera} are paired with images of other instants: its image {own} matches image {others} of the other cameras, and so on. Give simultaneous images the same name; some may be missing at the start.",
     "rig.few-pairs": "Camera {camera} and another camera see the pen together at {n_pairs} of {n_moments} instants; {needed} are needed for the extrinsics. Give simultaneous images the same name, and point all cameras at the pen.",
     "rig.other-moments": "Camera {camera} shows another rotation of the pen than the other cameras at {n_apart} of {n_pairs} instants. Check that the images belong to the same swing and are paired correctly, that one signal triggers all cameras, and that no camera moved.",
-    "workers.no-dask": 'Dask is not installed; computing on a cluster needs it. Install the extra "cluster", or compute on this machine.',
-    "workers.no-scheduler": "No Dask scheduler responds at {address}. Check the address, such as tcp://10.0.0.5:8786, and that the scheduler is running.",
 }

@@ -1,8 +1,6 @@
 """``lightpen recalculate``: recompute calibrations and check their uncertainty."""
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +18,7 @@ from lightpen.commands.console import (
 from lightpen.comparisons.led_file import calibrate_again
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
-from lightpen.estimation.statistics.workers import Map, cluster_workers, local_workers
+from lightpen.estimation.statistics.workers import local_workers
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
 from lightpen.formats.json_records import plain
@@ -61,11 +59,6 @@ def add_recalculate(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="processes on this machine (default: one per core)",
     )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="compute on a Dask cluster, for example tcp://10.0.0.5:8786",
-    )
     add_json(parser)
 
 
@@ -83,7 +76,10 @@ def _recalculate(options: argparse.Namespace) -> None:
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     files = [read_calibration(path) for path in options.results]
     _require_files(files, options)
-    with _workers(options) as in_workers, progress("Calculating") as report:
+    with (
+        local_workers(options.workers) as in_workers,
+        progress("Calculating") as report,
+    ):
         solved = in_workers(_Solve(camera, pen), files, report)
         trials = {}
         if options.monte_carlo is not None:
@@ -113,17 +109,6 @@ class _Solve:
         except CalibrationError as error:
             return Recalculated(name, None, None, str(error.message))
         return Recalculated(name, tip, tip - file.tip_pen)
-
-
-@contextmanager
-def _workers(options: argparse.Namespace) -> Iterator[Map]:
-    opened = (
-        local_workers(options.workers)
-        if options.scheduler is None
-        else cluster_workers(options.scheduler)
-    )
-    with opened as in_workers:
-        yield in_workers
 
 
 def _require_files(files: list[CalibrationFile], options: argparse.Namespace) -> None:

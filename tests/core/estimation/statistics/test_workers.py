@@ -1,16 +1,12 @@
-"""Tests of the workers: processes here, and a real Dask cluster."""
+"""Tests of the worker processes."""
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from lightpen.errors import Cancelled, UsageError
-from lightpen.estimation.statistics.workers import cluster_workers, local_workers
-
-NO_CLUSTER = "needs the extra cluster, which the Windows installer leaves out"
+from lightpen.errors import Cancelled
+from lightpen.estimation.statistics.workers import local_workers
 
 
 def square(number: int) -> int:
@@ -20,16 +16,6 @@ def square(number: int) -> int:
 def touch_file(place: str) -> None:
     Path(place).touch()
     time.sleep(0.1)
-
-
-@pytest.fixture(scope="module")
-def scheduler() -> Iterator[str]:
-    """Return the address of a cluster of two processes on this machine."""
-    distributed: Any = pytest.importorskip("distributed", reason=NO_CLUSTER)
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None
-    ) as cluster:
-        yield cluster.scheduler_address
 
 
 def test_processes_return_what_they_made_in_order_and_tell_how_far_they_are() -> None:
@@ -53,27 +39,3 @@ def test_a_computation_that_is_cancelled_ends_and_begins_no_more(
         in_workers(touch_file, places, cancel)
 
     assert len(list(tmp_path.iterdir())) < len(places)
-
-
-def test_a_dask_cluster_does_the_same(scheduler: str) -> None:
-    reported: list[float] = []
-
-    with cluster_workers(scheduler) as in_workers:
-        found = in_workers(square, range(5), reported.append)
-
-    assert found == [0, 1, 4, 9, 16]
-    assert reported[-1] == 1.0
-
-
-@pytest.mark.slow
-def test_a_scheduler_that_does_not_answer_is_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    pytest.importorskip("distributed", reason=NO_CLUSTER)
-    monkeypatch.setattr("lightpen.estimation.statistics.workers.CONNECTING", 0.5)
-
-    with (
-        pytest.raises(UsageError, match="No Dask scheduler responds at "),
-        cluster_workers("tcp://127.0.0.1:9"),
-    ):
-        pass
