@@ -14,7 +14,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.labels import Labels, LabelStatus
 from lightpen.detection.labelling.spot_arrays import UNWHOLE
-from lightpen.detection.pose import Poses, fit_pose
+from lightpen.detection.pose import ImagePose, fit_pose
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -33,7 +33,7 @@ class Followed(NamedTuple):
 
     labels: Labels
     seen: FloatArray  # (L, 2), ellipse centres of all labelled LEDs, px; NaN elsewhere
-    poses: Poses  # of the image
+    pose: ImagePose
 
 
 def follow_spots(
@@ -81,14 +81,14 @@ def follow_spots(
     seen = centers_from_centroids(camera, seen[None], shapes[None])[0]
     pixels = np.where(whole[:, None], seen, np.nan)
     sigmas = np.where(whole, spots.sigmas[spot], np.nan)
-    poses = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
-    turned = np.sum(poses.rotations[0] * rotation) < 1 + 2 * np.cos(MAX_TURN)
-    is_poor = poses.sigma > MAX_SIGMA or (poses.weights[0, whole] < LEAST_WEIGHT).any()
+    pose = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
+    turned = np.sum(pose.rotation * rotation) < 1 + 2 * np.cos(MAX_TURN)
+    is_poor = pose.sigma > MAX_SIGMA or (pose.weights[whole] < LEAST_WEIGHT).any()
     if turned or is_poor:
         return None
     # A merged or cut spot is of an LED if it is on its disc.
     if np.any(labelled & ~whole):
-        placed = camera.project(pen.leds @ poses.rotations[0].T + poses.translations[0])
+        placed = camera.project(pen.leds @ pose.rotation.T + pose.translation)
         off = np.linalg.norm(seen - placed, axis=1)
         radii = np.sqrt(np.nanmedian(areas) / np.pi)
         labelled &= whole | (off < MAX_OFF_CENTER * radii)
@@ -96,9 +96,9 @@ def follow_spots(
     labels = Labels(
         spot=np.where(labelled, spot, -1),
         whole=whole,
-        R=poses.rotations[0],
-        t=poses.translations[0],
-        rms_px=float(poses.sigma),
+        R=pose.rotation,
+        t=pose.translation,
+        rms_px=float(pose.sigma),
         reason=LabelStatus.LABELLED,
     )
-    return Followed(labels, seen, poses)
+    return Followed(labels, seen, pose)

@@ -21,7 +21,7 @@ from lightpen.detection.labelling.labels import (
     track_spots,
 )
 from lightpen.detection.pixel_box import PixelBox
-from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_pose
+from lightpen.detection.pose import MIN_POSE_LEDS, ImagePose, fit_pose
 from lightpen.detection.reasons import UNFORESEEN, Reason
 from lightpen.detection.spots import EXACT_SIGMA, SpotFlaw, Spots, detect_spots
 from lightpen.model.camera import Camera
@@ -259,7 +259,7 @@ def _followed(
     detection = PenDetection(
         pixels, found.seen, Reason.NONE, spots=spots, labels=found.labels
     )
-    return _posed(detection, found.poses)
+    return _posed(detection, found.pose)
 
 
 def _window(camera: Camera, there: FloatArray, radius: float) -> PixelBox:
@@ -300,18 +300,18 @@ def _fitted(detection: PenDetection, camera: Camera, pen: Pen) -> PenDetection:
     """Return a detection with its pose, if it has one, fitted to the LEDs."""
     if not detection.has_pose:
         return detection
-    poses = fit_pose(
+    pose = fit_pose(
         *(camera, pen, detection.pixels),
         *(detection.rotation, detection.translation, detection.sigmas),
     )
-    return _posed(detection, poses)
+    return _posed(detection, pose)
 
 
-def _posed(detection: PenDetection, poses: Poses) -> PenDetection:
+def _posed(detection: PenDetection, pose: ImagePose) -> PenDetection:
     return replace(
         detection,
-        rotation=poses.rotations[0],
-        translation=poses.translations[0],
-        cofactors=poses.covariances[0] / poses.sigma**2,
-        sigma=poses.sigma,
+        rotation=pose.rotation,
+        translation=pose.translation,
+        cofactors=pose.cofactors,
+        sigma=pose.sigma,
     )

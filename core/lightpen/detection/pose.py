@@ -16,28 +16,33 @@ References
    tip center calibration", Measurement Science Review 13 (2013) 194-199.
 """
 
+import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.robust_residuals import (
+    CAUCHY_WIDTH,
     cauchy_weights,
     disc_residuals,
     image_sigmas,
     normal_equations,
     robust_sigma,
+    sigma_of_lengths,
 )
 from lightpen.model.camera import Camera, LensModel
+from lightpen.model.ellipse import ellipse_centers_with_jacobian
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import nearest_rotation, rotation_from_vector
+from lightpen.model.rigid import nearest_rotation, rotation_from_vector, with_turns
 
 MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 # Of an angle in rad and of a translation over its length:
 LINEAR = 3e-5  # leaves its square: the weights of LEDs are all that changes
+NEAR_STEPS = 3  # by projected centres, from a start near the solution
 SETTLED = 1e-7  # leaves a sixteenth
 MAX_STEP = 0.2  # keeps an image of wrong LEDs from flying away
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
@@ -79,6 +84,16 @@ class Poses:
             residuals=self.residuals[chosen],
             weights=self.weights[chosen],
         )
+
+
+class ImagePose(NamedTuple):
+    """Pose ``cam_from_pen`` of one image."""
+
+    rotation: FloatArray  # (3, 3)
+    translation: FloatArray  # (3,), mm
+    cofactors: FloatArray  # (6, 6), covariance over ``sigma`` squared, as of `Poses`
+    weights: FloatArray  # (L,), weight of each LED, as of `Poses`
+    sigma: float  # standard deviation of one image coordinate, px, as of `Poses`
 
 
 class Reprojection(Protocol):
@@ -140,19 +155,66 @@ def fit_pose(
     rotation: FloatArray,
     translation: FloatArray,
     sigmas: FloatArray,
-) -> Poses:
+) -> ImagePose:
     """Fit the pose of one image, (L, 2), from one near it; see `fit_poses`."""
+    seen = np.isfinite(pixels[:, 0])
+    leds, normals, there = pen.leds[seen], pen.normals[seen], pixels[seen]
+    shares = sigmas[seen].min() / sigmas[seen]
     R, t = rotation, translation
     if camera.lens is LensModel.BROWN:  # by projected centres first, which is fast
-        seen = np.isfinite(pixels[:, 0])
-        vector, moved = cv2.solvePnPRefineLM(
-            *(pen.leds[seen], pixels[seen], camera.matrix, camera.distortion),
-            *(cv2.Rodrigues(R)[0], t.copy()),
+        R, t = _by_projected_centers(camera, leds, there, R, t)
+    for _ in range(MAX_STEPS):
+        lever = leds @ R.T
+        imaged = ellipse_centers_with_jacobian(
+            camera, lever + t, normals @ R.T, pen.diameter / 2
         )
-        R = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
-        t = np.asarray(moved, dtype=np.float64).reshape(3)
-    one = pixels[None], R[None], t[None]
-    return fit_poses(camera, pen, *one, sigmas=sigmas[None], is_near=True)
+        J = with_turns(imaged.jacobian, lever) * shares[:, None, None]
+        rows, errors = J.reshape(-1, 6), (there - imaged.points) * shares[:, None]
+        left, step = errors.ravel(), np.zeros(6)
+        distance = math.hypot(*t.tolist())
+        for _ in range(MAX_STEPS):
+            H, right, _, _ = _normal(rows, left)
+            change = cv2.solve(H, right, flags=cv2.DECOMP_CHOLESKY)[1][:, 0]
+            step = step + change
+            left = errors.ravel() - rows @ step
+            turn, move = change[:3].tolist(), change[3:].tolist()
+            size = max(math.hypot(*turn), math.hypot(*move) / distance)
+            if not SETTLED < size < LINEAR:
+                break
+        step = step * (MAX_STEP / max(size, MAX_STEP))
+        R, t = cv2.Rodrigues(step[:3])[0] @ R, t + step[3:]
+        if size < LINEAR:
+            break
+    H, _, weights, sigma = _normal(rows, left)
+    own = (left * left) @ np.repeat(weights, 2) / max(2 * weights.sum() - 6, 1)
+    cofactors = np.linalg.inv(H) * (own / sigma**2 if own > (WORSE * sigma) ** 2 else 1)
+    every = np.zeros(len(pixels))
+    every[seen] = weights
+    return ImagePose(R, t, cofactors, every, sigma)
+
+
+def _by_projected_centers(
+    camera: Camera, leds: FloatArray, there: FloatArray, R: FloatArray, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the pose near another one that projects LEDs to pixels, both (L, 2)."""
+    vector, place = cv2.Rodrigues(R)[0], t[:, None]
+    for _ in range(NEAR_STEPS):
+        points, J = cv2.projectPoints(leds, vector, place, *camera.opencv)
+        left = there - points[:, 0]
+        step = cv2.solve(J[:, :6].copy(), left.reshape(-1, 1), flags=cv2.DECOMP_QR)[1]
+        vector, place = vector + step[:3], place + step[3:]
+    return np.asarray(cv2.Rodrigues(vector)[0]), np.asarray(place[:, 0])
+
+
+def _normal(
+    rows: FloatArray, errors: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return normal equations of an image, its Cauchy weights (L,), and its noise."""
+    lengths = np.hypot(errors[::2], errors[1::2])
+    sigma = sigma_of_lengths(np.sort(lengths), 6)
+    weights = 1 / (1 + (lengths / (CAUCHY_WIDTH * sigma)) ** 2)
+    weighted = rows.T * np.repeat(weights, 2)
+    return weighted @ rows * DAMPING + RIDGE, weighted @ errors, weights, sigma
 
 
 def relative_sigmas(sigmas: FloatArray) -> FloatArray | None:

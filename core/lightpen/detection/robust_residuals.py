@@ -62,13 +62,16 @@ def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
 
 
 def _sigma_of(lengths: FloatArray, n_unknowns_per_image: float) -> float:
-    n_images = len(lengths)
-    lengths = np.sort(lengths[np.isfinite(lengths)])
+    seen = np.sort(lengths[np.isfinite(lengths)])
+    return sigma_of_lengths(seen, n_unknowns_per_image * len(lengths))
+
+
+def sigma_of_lengths(lengths: FloatArray, n_unknowns: float) -> float:
+    """Return the standard deviation of a coordinate by sorted lengths (N,), px."""
     n = len(lengths)
-    n_free = max(2 * n - n_unknowns_per_image * n_images, 1)
     # np.median takes eight times as long on the ten LEDs of one image.
     median = float(lengths[(n - 1) // 2] + lengths[n // 2]) / 2 / MEDIAN_LENGTH
-    return max(median * math.sqrt(2 * n / n_free), NOISE_FLOOR)
+    return max(median * math.sqrt(2 * n / max(2 * n - n_unknowns, 1)), NOISE_FLOOR)
 
 
 def cauchy_weights(residuals: FloatArray, sigma: float | FloatArray) -> FloatArray:

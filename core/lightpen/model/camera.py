@@ -183,14 +183,15 @@ class Camera:
         return self.lens is LensModel.BROWN and 0 < normalised.size <= FEW
 
     @cached_property
-    def _opencv(self) -> tuple[FloatArray, FloatArray]:
+    def opencv(self) -> tuple[FloatArray, FloatArray]:
+        """Camera matrix and distortion, as OpenCV takes them."""
         return self.matrix, np.asarray(self.distortion, dtype=np.float64)
 
     def _by_opencv(self, normalised: FloatArray) -> PointMap:
         """Return `pixels_with_jacobian` of a few points, a quarter of its time."""
         points = np.ones((normalised.size // 2, 3))
         points[:, :2] = normalised.reshape(-1, 2)
-        pixels, J = cv2.projectPoints(points, NOWHERE, NOWHERE, *self._opencv)
+        pixels, J = cv2.projectPoints(points, NOWHERE, NOWHERE, *self.opencv)
         by_point = np.asarray(J, dtype=np.float64)[:, 3:5]  # by a shift of the camera
         return PointMap(
             np.asarray(pixels, dtype=np.float64).reshape(normalised.shape),
@@ -289,7 +290,7 @@ class Camera:
             return self._unprojected_fisheye(normalised)
         if self._is_for_opencv(pixels):
             near = cv2.undistortPointsIter(
-                pixels.reshape(-1, 1, 2), *self._opencv, IDENTITY, IDENTITY, UNDISTORTED
+                pixels.reshape(-1, 1, 2), *self.opencv, IDENTITY, IDENTITY, UNDISTORTED
             )
             normalised = np.asarray(near, dtype=np.float64).reshape(pixels.shape)
         missing = np.isnan(pixels)

@@ -16,14 +16,18 @@ References
    IEEE PAMI 22 (2000) 1066-1077: the eccentricity of projected circles.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.model.camera import Camera, PointMap
+from lightpen.model.camera import Camera, LensModel, PointMap
 
 IDENTITY = np.eye(2)
+N_CELLS = 40  # along each side of the table of the offsets of centroids
+ALONG = np.array([1, N_CELLS + 1])  # nodes of the table, by x and y
+SHAPES = 100 * np.array([[[1, 0], [0, 1]], [[2, 0], [0, 1]], [[1, 0.5], [0.5, 1]]])
 
 
 class Ellipses(NamedTuple):
@@ -115,10 +119,46 @@ def centers_from_centroids(
     ``shapes`` (..., 2, 2) are the covariances of the areas, px^2; NaN passes through.
     """
     known = np.isfinite(centroids).all(axis=-1) & np.isfinite(shapes).all(axis=(-1, -2))
+    is_smooth = camera.lens is LensModel.BROWN and camera.folded_share == 0
+    offsets_of = _tabulated_offsets if is_smooth else _centroid_offsets
     centers = centroids.copy()
-    offsets = _centroid_offsets(camera, centroids[known], shapes[known])
-    centers[known] -= offsets
+    centers[known] -= offsets_of(camera, centroids[known], shapes[known])
     return centers
+
+
+def _tabulated_offsets(
+    camera: Camera, centers: FloatArray, shapes: FloatArray
+) -> FloatArray:
+    """Return `_centroid_offsets` of discs (N, 2), which are linear in their shapes."""
+    scale, table = _offset_table(camera)
+    places = centers * scale
+    nodes = np.minimum(np.maximum(np.rint(places), 0), N_CELLS)
+    away = np.ones((len(centers), 1, 3))
+    away[:, 0, 1:] = places - nodes
+    terms = shapes.reshape(-1, 4)[:, [0, 1, 3]][..., None] * away
+    near = table[(nodes @ ALONG).astype(np.intp)]
+    return np.asarray((near @ terms.reshape(-1, 9, 1))[..., 0])
+
+
+@lru_cache(maxsize=8)
+def _offset_table(camera: Camera) -> tuple[FloatArray, FloatArray]:
+    """Return the cells in a pixel, (2,), and the Taylor series of offsets, (M, 2, 9).
+
+    These are the derivatives, 1/px, by (xx, xy, yy) of a shape at each node, and the
+    changes of these from cell to cell along x and y.
+    """
+    ends = (np.linspace(0, n - 1, N_CELLS + 1) for n in camera.image_size)
+    places = np.stack(np.meshgrid(*ends), axis=-1)
+    even, wide, leaning = (
+        _centroid_offsets(camera, places, np.broadcast_to(shape, (*places.shape, 2)))
+        for shape in SHAPES
+    )
+    by_xx, by_xy = wide - even, 2 * (leaning - even)
+    factors = np.stack([by_xx, by_xy, even - by_xx], axis=-1) / SHAPES[0, 0, 0]
+    along_y, along_x = np.gradient(factors, axis=(0, 1))
+    series = np.stack([factors, along_x, along_y], axis=-1)
+    scale = N_CELLS / (np.array(camera.image_size) - 1)
+    return scale, series.reshape(-1, 2, 9)
 
 
 def conic_centers(
