@@ -88,7 +88,9 @@ def _put_in_force(wizard: Wizard) -> dict[str, float]:
     _until(lambda: run.status.assessment is not None)
     live.set_following(False)
     run.runner.ask(
-        lambda workflow: workflow.accept("It is measured how idle the wizard is.")
+        lambda workflow: workflow.solving.accept(
+            "It is measured how idle the wizard is."
+        )
     )
     _until(lambda: run.status.result is not None)
     return shares

@@ -138,7 +138,7 @@ class Soak(QObject):
         self._seen = state
         if state is not None and state.phase is Phase.VERDICT:
             self._n_swings += 1
-            run.runner.ask(lambda workflow: workflow.set_aside())
+            run.runner.ask(lambda workflow: workflow.discard())
             chosen = self._wizard.workbench.selection.preparation
             run.runner.ask(lambda workflow: workflow.begin(chosen))
 

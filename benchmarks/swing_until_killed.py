@@ -63,7 +63,7 @@ def main() -> int:
     if offered:
         record = offered[0]
         resumable = read_resumable(record.folder)
-        run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         _say("resumed", record.folder.name, len(record.images))
     else:
         chosen = workbench.selection.preparation

@@ -343,7 +343,9 @@ class Stage:
 
     def _fill_verify(self) -> None:
         run = self._workbench.run
-        run.runner.ask(lambda workflow: workflow.accept("The station is being set up."))
+        run.runner.ask(
+            lambda workflow: workflow.solving.accept("The station is being set up.")
+        )
         self._wait_until(lambda: run.status.result is not None)
         self._fill_probing(self._measure.verification, CHOICES, _touched)
 
@@ -405,7 +407,7 @@ class Stage:
         folder = run.records_folder / "20260930-095900_LP-04_T-10-80"
         _record(folder, self._workbench.selection.preparation)
         resumable = read_resumable(folder)
-        run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         run.runner.ask(lambda workflow: workflow.finish())
         self._wait_until(lambda: run.status.solution is not None)
 

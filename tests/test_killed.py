@@ -98,7 +98,7 @@ def swing(folder):
     if offered:
         resumed = read_resumable(offered[0].folder)
         tell("resumed", resumed.record.folder.name, resumed.state.n_kept)
-        run.runner.ask(lambda workflow: workflow.go_on(resumed))
+        run.runner.ask(lambda workflow: workflow.continue_swing(resumed))
     else:
         chosen = workbench.selection.preparation
         run.runner.ask(lambda workflow: workflow.begin(chosen))

@@ -240,7 +240,7 @@ def solving_on(monkeypatch: pytest.MonkeyPatch) -> SolvingOn:
     @contextmanager
     def patched() -> Iterator[None]:
         with monkeypatch.context() as endless:
-            endless.setattr("lightpen.swing.workflow.solve_record", solve)
+            endless.setattr("lightpen.swing.solving.solve_record", solve)
             yield
 
     return patched

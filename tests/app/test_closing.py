@@ -87,7 +87,7 @@ def swing(workbench):
     folder = workbench.run.records_folder / "interrupted"
     shutil.copytree(sys.argv[1], folder)
     resumable = read_resumable(folder)
-    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    workbench.run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
     await_swing(workbench, folder)
 
 def await_swing(workbench, folder):
@@ -217,10 +217,10 @@ def test_closing_waits_for_all_that_is_under_way_together(
         stuck.wait()
         return solve_record(record, report)
 
-    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve)
+    monkeypatch.setattr("lightpen.swing.solving.solve_record", solve)
     swing_before(workbench, stuck)
     resumable = read_resumable(interrupted)
-    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    workbench.run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
     workbench.run.runner.ask(lambda workflow: workflow.finish())
     qtbot.waitUntil(stuck.is_reached.is_set)
@@ -244,7 +244,7 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     workbench.live.open([camera], CameraSettings(), around.clock)
     workbench.live.set_following(True)
     resumable = read_resumable(interrupted)
-    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    workbench.run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
 
     def write(writer: RecordWriter, *image: object) -> int:
@@ -279,9 +279,9 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     folder = run.records_folder / "interrupted"
     shutil.copytree(swung(), folder)
     with monkeypatch.context() as slow:
-        slow.setattr("lightpen.swing.workflow.solve_record", solve)
+        slow.setattr("lightpen.swing.solving.solve_record", solve)
         resumable = read_resumable(folder)
-        run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         run.runner.ask(lambda workflow: workflow.finish())
         walker.until(stuck.is_reached.is_set)
 

@@ -177,7 +177,7 @@ class Station:
     def go_on(self, folder: Path) -> None:
         """Go on with an interrupted swing, and wait until it does."""
         resumable = read_resumable(folder)
-        self.runner.ask(lambda workflow: workflow.go_on(resumable))
+        self.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         self.wait_until(lambda: self.status.record_folder == folder)
 
     def solve(self) -> None:
@@ -196,7 +196,7 @@ class Station:
             self._last = detect_pen(
                 *(frame.image, wanted.camera, wanted.pen, wanted.mask, self._last)
             )
-            self.runner.take(frame, self._last, setup)
+            self.runner.process_image(frame, self._last, setup)
 
     def see_until(self, is_so: Callable[[], bool]) -> None:
         """Have images taken until something is so."""
@@ -213,7 +213,7 @@ class Station:
 
     def accept(self, reason: str = "It is seen to.") -> None:
         """Put the tip in force, and wait until it is."""
-        self.runner.ask(lambda workflow: workflow.accept(reason))
+        self.runner.ask(lambda workflow: workflow.solving.accept(reason))
         self.wait_until(lambda: self.status.result is not None)
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:

@@ -431,7 +431,7 @@ class Live:
     ) -> None:
         caps = self._workers[0].caps
         n_images = None if caps is None else caps.n_images
-        self._runner.take(frame, detection, setup, n_images, self.stats)
+        self._runner.process_image(frame, detection, setup, n_images, self.stats)
 
     def _look(
         self,

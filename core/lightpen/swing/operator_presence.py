@@ -50,7 +50,7 @@ class OperatorPresence:
             )
         return replace(self, choices=choices, begun_with=begun)
 
-    def come(self) -> Self:
+    def arrived(self) -> Self:
         """Return a copy with the operator present and refusals cleared."""
         return replace(
             self, is_here=True, is_away=False, paused_by_leaving=False, refusal=None

@@ -24,8 +24,8 @@ from lightpen.swing.workflow import SwingWorkflow
 class SwingRunner:
     """Captures, solves and accepts one swing after another.
 
-    Every method returns at once, except `take` and `await_end`. A command that is not
-    possible in the state of the swing by then is ignored. See `SwingWorkflow`.
+    Every method returns at once, except `process_image` and `await_end`. A command that
+    is not possible in the state of the swing by then is ignored. See `SwingWorkflow`.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class SwingRunner:
         """Wait for the end after `shut_down`; return whether it came in time."""
         return self._queue.await_end(timeout_s)
 
-    def take(
+    def process_image(
         self,
         frame: Frame,
         detection: PenDetection | None,
@@ -74,5 +74,7 @@ class SwingRunner:
         image.
         """
         self._queue.ask_and_wait(
-            lambda: self._workflow.take(frame, detection, setup, n_images, stats)
+            lambda: self._workflow.process_image(
+                frame, detection, setup, n_images, stats
+            )
         )

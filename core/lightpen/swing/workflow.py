@@ -4,51 +4,31 @@ Nothing here knows threads: the owner makes all calls in turn, and runs long
 computations elsewhere.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TypeVar
 
 from lightpen.archive.logbook.lazy_logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.reasons import Reason
-from lightpen.errors import AcceptanceError, LightpenError
-from lightpen.estimation.reports.verdict import Grade
+from lightpen.errors import LightpenError
 from lightpen.formats.json_records import Plain
 from lightpen.messages import Message, message
-from lightpen.model.method import Method
-from lightpen.record.library.supervision import Signature
-from lightpen.record.results.acceptance import accept
-from lightpen.record.results.assessment import SwingAssessment, assess
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.record.results.results import Result
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.record.swings.reading import (
     PRESS_TEST,
     Record,
-    open_record,
     recorded_names,
     recorded_origin,
 )
-from lightpen.record.swings.solving import (
-    Solution,
-    report_by,
-    solve_again,
-    solve_record,
-)
-from lightpen.record.swings.writing import (
-    RecordWriter,
-    make_record_folder,
-    note_excluded,
-)
-from lightpen.runners.faults import FaultReporter
-from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread, Task
+from lightpen.record.swings.solving import Solution
+from lightpen.record.swings.writing import RecordWriter, make_record_folder
+from lightpen.runners.serial_queue import StartThread, Task
 from lightpen.swing.capture.rig_sighting import seen_by_rig
 from lightpen.swing.capture.rules import (
     advance_swing,
-    conclude,
     finish,
     forget_side,
     has_enough,
@@ -64,16 +44,14 @@ from lightpen.swing.capture.state import (
     SwingState,
     Transition,
 )
-from lightpen.swing.failed_swing import failed_swing
-from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.published import PublishedSwing
 from lightpen.swing.record_header import record_header
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
-from lightpen.swing.status import Activity, SwingListener, SwingStatus, log_change
+from lightpen.swing.solving import SwingSolving
+from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.swing_recorder import SwingRecorder
-from lightpen.swing_messages import Code
 
-T = TypeVar("T")
 PRESS_IMAGES = 60  # at least, with firm pressure
 PRESS_UNCERTAINTY = 1.0  # mm; limit of U in a press test, which ends no swing
 
@@ -95,57 +73,39 @@ class SwingWorkflow:
         logbook: LazyLogbook | None,
     ) -> None:
         self._records = records
-        self._archive = archive
-        self._listener = listener
         self._now = now
-        self._faults = FaultReporter(listener)
+        self._shown = PublishedSwing(listener)
+        self._faults = self._shown.faults
         self._logbook = logbook or LazyLogbook.none()
         self._start_beside = start
         self._catching_up: Task | None = None  # with events in files only
-        self._status = SwingStatus()
-        self._presence = OperatorPresence()
         self._recorder: SwingRecorder | None = None
-        self._record: Record | None = None  # at its entry
         self._first: tuple[SwingStatus, Record] | None = None  # during a press test
-        self._wanted: Mapping[int, str] = {}  # images to exclude
-        self._tried: Mapping[int, str] = {}  # of them, those being computed without
-        self._task = BackgroundTask(start, self.cancel, listener.on_progress)
         self._stopped_at: SwingStatus | None = None  # by a bug
+        self.solving = SwingSolving(
+            self._shown, archive, listener, now, start, self._logbook, self._end_press
+        )
 
     @property
     def status(self) -> SwingStatus:
         """The status as published last."""
-        return self._status
+        return self._shown.status
 
     def recover(self) -> None:
         """Pause after an internal error; the swing is unchanged.
 
         Images are ignored until the status changes: all of them may cause it.
         """
-        if not self._task.is_there:  # it may have ended by this bug
-            self._status = replace(self._status, activity=Activity.NONE)
+        if not self.solving.is_busy:  # it may have ended by this bug
+            self._shown.status = replace(self._shown.status, activity=Activity.NONE)
         try:
             self.pause()
-            self._republish()
+            self._shown.republish()
             self._faults.report(message("swing.bug"))
         finally:
-            self._stopped_at = self._status
+            self._stopped_at = self._shown.status
 
-    def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
-        """Set the status and notify."""
-        is_open = status.is_capturing or (status.has_verdict and not status.result)
-        has_others = is_open and self._presence.has_other_choices
-        before = self._status
-        self._status = replace(
-            status, refusal=self._presence.refusal, has_other_choices=has_others
-        )
-        log_change(before, self._status, events)
-        self._listener.on_swing(self._status, events)
-
-    def _republish(self) -> None:
-        self._publish(self._status)
-
-    def go_on(self, swing: Resumable) -> None:
+    def continue_swing(self, swing: Resumable) -> None:
         """Resume a swing that was read back, or report why it cannot be."""
         self._faults.trying(lambda: self._enter(swing))
 
@@ -153,46 +113,46 @@ class SwingWorkflow:
 
     def choose(self, preparation: Preparation) -> None:
         """Set the choices for the next swing; another source ends this one."""
-        before = self._presence.choices
-        self._presence = self._presence.choose(preparation)
+        before = self._shown.presence.choices
+        self._shown.presence = self._shown.presence.choose(preparation)
         is_other = before is not None and before.sources != preparation.sources
-        if is_other and self._status.is_capturing:
+        if is_other and self._shown.status.is_capturing:
             self.abandon()
-        self._republish()
+        self._shown.republish()
 
     def keep_choices(self) -> None:
         """Continue with the choices that the swing began with."""
-        presence = self._presence
-        self._presence = replace(presence, begun_with=presence.choices)
-        self._republish()
+        presence = self._shown.presence
+        self._shown.presence = replace(presence, begun_with=presence.choices)
+        self._shown.republish()
 
-    def come(self) -> None:
+    def note_arrival(self) -> None:
         """Begin with the next image, or resume a swing that was paused by leaving."""
-        was_paused = self._presence.paused_by_leaving
-        self._presence = self._presence.come()
-        if self._status.result is not None:  # that swing is concluded
+        was_paused = self._shown.presence.paused_by_leaving
+        self._shown.presence = self._shown.presence.arrived()
+        if self._shown.status.result is not None:  # that swing is concluded
             self.abandon()
         if was_paused:
             self._change(lambda state: Transition(resume(state)))
-        self._republish()
+        self._shown.republish()
 
-    def leave(self) -> None:
+    def note_departure(self) -> None:
         """Begin no swing, and pause the capture."""
-        self._presence = self._presence.left()
+        self._shown.presence = self._shown.presence.left()
         self._pause_unattended()
 
     def _pause_unattended(self) -> None:
         """Pause a swing without an operator."""
-        status = self._status
+        status = self._shown.status
         goes_on = status.is_capturing and not status.is_paused_by_user
-        if goes_on and self._presence.is_away:
-            self._presence = replace(self._presence, paused_by_leaving=True)
+        if goes_on and self._shown.presence.is_away:
+            self._shown.presence = replace(self._shown.presence, paused_by_leaving=True)
             self._change(lambda state: Transition(pause(state)))
 
     def try_again(self) -> None:
         """Forget why no swing could begin."""
-        self._presence = replace(self._presence, refusal=None)
-        self._republish()
+        self._shown.presence = replace(self._shown.presence, refusal=None)
+        self._shown.republish()
 
     # Capture
 
@@ -205,25 +165,25 @@ class SwingWorkflow:
             RecordWriter.create(folder, record_header(preparation, settings)).close()
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
-            self._presence = replace(self._presence, refusal=error.message)
+            self._shown.presence = replace(self._shown.presence, refusal=error.message)
             self._faults.report(error.message)
-            self._republish()
+            self._shown.republish()
 
     def _enter(self, swing: Resumable) -> None:
         """Enter a new swing, or resume an old one, as read from the disk."""
-        status, record = self._status, swing.record
+        status, record = self._shown.status, swing.record
         if status.is_capturing and record.folder == status.record_folder:
             return  # it continues already
         names = recorded_names(record)
         recorder = SwingRecorder(record)
-        self._task.drop()
+        self.solving.drop()
         self._close_record()
         self._first = None
-        self._recorder, self._record = recorder, record
+        self._recorder, self.solving.record = recorder, record
         if record.folder != status.record_folder:
-            self._presence = self._presence.begun()
+            self._shown.presence = self._shown.presence.begun()
         self._faults.end()
-        self._publish(
+        self._shown.publish(
             SwingStatus(
                 setup=swing.setup,
                 state=replace(swing.state, heading=self._heading_for(swing)),
@@ -238,12 +198,18 @@ class SwingWorkflow:
 
     def press(self) -> None:
         """Begin a short swing with firm pressure, to be compared with this one."""
-        first, record, choices = self._status, self._record, self._presence.choices
-        if first.solution is None or self._task.is_there or first.is_recording:
+        first, record, choices = (
+            self._shown.status,
+            self.solving.record,
+            self._shown.presence.choices,
+        )
+        if first.solution is None or self.solving.is_busy or first.is_recording:
             return
         if record is None or choices is None:
             return
-        is_other = self._presence.has_other_choices or choices.names != first.names
+        is_other = (
+            self._shown.presence.has_other_choices or choices.names != first.names
+        )
         if is_other or choices.missing_inputs():
             self._faults.report(message("press-test.other-choices"))
             return
@@ -251,25 +217,27 @@ class SwingWorkflow:
             choices.limits, min_images=PRESS_IMAGES, max_uncertainty=PRESS_UNCERTAINTY
         )
         self.begin(replace(choices, limits=limits), {PRESS_TEST: True})
-        if self._status.record_folder != first.record_folder:
+        if self._shown.status.record_folder != first.record_folder:
             self._first = replace(first, pressed=None), record
 
-    def _end_press(self, pressed: Solution | None) -> None:
-        """Set the swing with firm pressure aside, and return to the one before."""
-        folder = self._status.record_folder
-        assert self._first is not None
-        assert folder is not None
-        (first, self._record), self._first = self._first, None
+    def _end_press(self, pressed: Solution | None) -> bool:
+        """Return from a swing with firm pressure, if it is one, to the one before."""
+        folder = self._shown.status.record_folder
+        if self._first is None or folder is None:
+            return False
+        (first, self.solving.record), self._first = self._first, None
         assert first.solution is not None
-        self._task.drop()
+        self.solving.drop()
         self._close_record()
         self._faults.trying(lambda: discard_swing(folder))
-        self._wanted = first.solution.excluded
-        self._publish(replace(first, pressed=pressed), SwingEvent(SwingEventKind.DONE))
+        self.solving.wanted = first.solution.excluded
+        done = SwingEvent(SwingEventKind.DONE)
+        self._shown.publish(replace(first, pressed=pressed), done)
+        return True
 
     def _heading_for(self, swing: Resumable) -> float | None:
         """Return the operator's heading from this swing or from the station."""
-        status, choices = self._status, self._presence.choices
+        status, choices = self._shown.status, self._shown.presence.choices
         if swing.setup.is_recording:
             return None
         if status.record_folder == swing.record.folder and status.state is not None:
@@ -280,7 +248,7 @@ class SwingWorkflow:
         """Ask the operator again which side is the right one."""
         self._change(lambda state: Transition(forget_side(state)))
 
-    def take(
+    def process_image(
         self,
         frame: Frame,
         detection: PenDetection | None,
@@ -288,14 +256,14 @@ class SwingWorkflow:
         n_images: int | None,
         stats: Stats | None,
     ) -> None:
-        """Process an image; see `SwingRunner.take`."""
-        status, choices = self._status, self._presence.choices
+        """Process an image; see `SwingRunner.process_image`."""
+        status, choices = self._shown.status, self._shown.presence.choices
         if status is self._stopped_at:
             return
         if detection is not None and setup is not None:
             detection = seen_by_rig(setup.rig, setup.pen, detection)
         if status.state is None:
-            if self._presence.is_due and choices is not None:
+            if self._shown.presence.is_due and choices is not None:
                 self.begin(choices)
         elif detection is None:
             pass
@@ -313,7 +281,7 @@ class SwingWorkflow:
         n_images: int | None,
         stats: Stats | None,
     ) -> None:
-        setup, recorder = self._status.setup, self._recorder
+        setup, recorder = self._shown.status.setup, self._recorder
         assert setup is not None
         assert recorder is not None
         try:
@@ -332,58 +300,56 @@ class SwingWorkflow:
 
     def _watch(self, before: SwingState, detection: PenDetection, frame: Frame) -> None:
         """Watch for the confirmation: the pen held upright and still."""
-        setup = self._status.setup
+        setup = self._shown.status.setup
         assert setup is not None
         state = advance_swing(setup, before, detection, frame.host_ts_ns * 1e-9).state
         says_yes = stillness(state) == 1.0 and stillness(before) < 1.0
         events = (SwingEvent(SwingEventKind.CONFIRMED),) if says_yes else ()
-        self._publish(replace(self._status, state=state), *events)
+        self._shown.publish(replace(self._shown.status, state=state), *events)
 
     def pause(self) -> None:
         """Pause for the user."""
-        self._presence = replace(self._presence, paused_by_leaving=False)
+        self._shown.presence = replace(self._shown.presence, paused_by_leaving=False)
         self._change(lambda state: Transition(pause(state)))
 
     def resume(self) -> None:
         """Resume after a pause by the user."""
-        self._presence = replace(self._presence, paused_by_leaving=False)
+        self._shown.presence = replace(self._shown.presence, paused_by_leaving=False)
         self._change(lambda state: Transition(resume(state)))
 
     def _change(self, act: Callable[[SwingState], Transition]) -> None:
         """Apply a command to a swing that is being captured."""
-        status = self._status
+        status = self._shown.status
         if status.is_capturing and status.state is not None:
             self._become(act(status.state))
 
     def _become(self, transition: Transition, *, has_fault: bool = False) -> None:
         state = transition.state
         ends = state.phase is Phase.SOLVING
-        status = replace(self._status, state=state)
+        status = replace(self._shown.status, state=state)
         if ends:
             self._close_record()
             status = replace(status, activity=Activity.SOLVING)
         has_fault = has_fault or (status.has_fault and status.is_paused_by_user)
-        self._publish(replace(status, has_fault=has_fault), *transition.events)
+        self._shown.publish(replace(status, has_fault=has_fault), *transition.events)
         if ends:
-            self.solve()
+            self.solving.solve()
 
     def abandon(self) -> None:
         """Suspend the swing; its record stays on disk."""
-        if self._first is not None:
-            self._end_press(None)
-        self._task.drop()
+        self._end_press(None)
+        self.solving.drop()
         self._close_record()
-        self._publish(SwingStatus(setup=self._status.setup))
+        self._shown.publish(SwingStatus(setup=self._shown.status.setup))
 
-    def set_aside(self) -> None:
+    def discard(self) -> None:
         """Discard the swing, or report why that cannot be recorded."""
         self._faults.trying(self._discard)
 
     def _discard(self) -> None:
-        if self._first is not None:
-            self._end_press(None)
+        if self._end_press(None):
             return
-        status = self._status
+        status = self._shown.status
         if status.record_folder is None or status.result is not None:
             return
         if self._recorder is None:
@@ -399,15 +365,15 @@ class SwingWorkflow:
 
     def start_over(self) -> None:
         """Discard the swing, unless it is accepted, and begin a new one."""
-        if self._status.result is None:
-            self.set_aside()
+        if self._shown.status.result is None:
+            self.discard()
         else:
             self.abandon()
         self.try_again()
 
     def capture_more(self) -> None:
         """Read the images of a swing that has its verdict, and capture more."""
-        status = self._status
+        status = self._shown.status
         folder, state = status.record_folder, status.state
         if folder is None or state is None or status.result is not None:
             return
@@ -415,8 +381,8 @@ class SwingWorkflow:
             return
         if status.setup is None or status.setup.is_recording:
             return
-        self.cancel()
-        self._start(
+        self.solving.cancel()
+        self.solving.start(
             Activity.READING,
             lambda _: read_for_more(folder),
             self._on_read,
@@ -431,219 +397,16 @@ class SwingWorkflow:
 
     def _on_unread(self, why: Message) -> None:
         self._faults.report(why)
-        self._publish(replace(self._status, activity=Activity.NONE))
+        self._shown.publish(replace(self._shown.status, activity=Activity.NONE))
 
     def _close_record(self) -> None:
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             recorder.close()
 
-    # Solution
-
-    def solve(self) -> None:
-        """Start computing the tip."""
-        status, folder = self._status, self._status.record_folder
-        if folder is None or self._task.is_there:
-            return
-        if not status.is_capturing and status.result is None:
-            self._compute(lambda report: solve_record(open_record(folder), report))
-
     def finish(self) -> None:
         """End the capture with the present images."""
         self._change(finish)
-
-    def exclude(self, numbers: Iterable[int]) -> None:
-        """Exclude images and compute the tip again."""
-        self._want({**self._wanted, **dict.fromkeys(numbers, str(Reason.TAKEN_OUT))})
-
-    def use_part(self) -> None:
-        """Compute again with the longer part of a swing with a step."""
-        solution = self._status.solution
-        step = None if solution is None else solution.calibration.step
-        if solution is None or step is None:
-            return
-        begin, end = step.longer_part(len(solution.numbers))
-        outside = (*solution.numbers[: begin - 1], *solution.numbers[end:])
-        reasons = dict.fromkeys(map(int, outside), str(Reason.OUTSIDE))
-        self._want({**self._wanted, **reasons})
-
-    def include(self, numbers: Iterable[int]) -> None:
-        """Include images again and compute the tip again."""
-        back = set(numbers)
-        self._want({n: why for n, why in self._wanted.items() if n not in back})
-
-    def report_by(self, method: Method) -> None:
-        """Report the tip of a solution that is not accepted by another method."""
-        status, record = self._status, self._record
-        if status.solution is None or record is None or self._task.is_there:
-            return
-        if status.result is not None or status.solution.source.method == method:
-            return
-        solution = report_by(status.solution, method)
-        assessment = assess(self._archive, record, solution)
-        self._publish(replace(status, solution=solution, assessment=assessment))
-
-    def _want(self, excluded: Mapping[int, str]) -> None:
-        """Solve without these images, now or after the present computation."""
-        status = self._status
-        if status.solution is None or status.result is not None or status.is_reading:
-            return
-        self._wanted = excluded
-        if not self._task.is_there:
-            self._solve_again(status.solution)
-
-    def _solve_again(self, solution: Solution) -> None:
-        wanted = self._wanted
-        self._compute(lambda _: solve_again(solution, wanted))
-
-    def _compute(self, work: Callable[[Report], Solution]) -> None:
-        archive, record = self._archive, self._record
-        assert record is not None
-
-        def solved(report: Report) -> tuple[Solution, SwingAssessment]:
-            solution = work(report)
-            return solution, assess(archive, record, solution)
-
-        self._tried = self._wanted
-        self._start(Activity.SOLVING, solved, self._on_solved, self._on_unsolved)
-
-    def _start(
-        self,
-        activity: Activity,
-        work: Callable[[Report], T],
-        then: Callable[[T], None],
-        otherwise: Callable[[Message], None],
-    ) -> None:
-        self._task.begin(work, then, otherwise)
-        self._publish(replace(self._status, activity=activity))
-
-    def cancel(self) -> None:
-        """Stop computing and reading."""
-        if not self._task.is_there:
-            return
-        self._task.drop()
-        if self._status.solution is not None:
-            self._wanted = self._status.solution.excluded
-        self._publish(replace(self._status, activity=Activity.NONE))
-
-    def _on_solved(self, solved: tuple[Solution, SwingAssessment]) -> None:
-        solution, assessment = solved
-        if self._first is not None:
-            self._end_press(solution)
-            return
-        status = self._status
-        before, folder, state = status.solution, status.record_folder, status.state
-        assert folder is not None
-        assert state is not None
-        if before is None:
-            self._wanted = solution.excluded
-        elif before.excluded != solution.excluded:
-            try:
-                note_excluded(folder, solution.excluded)
-            except LightpenError as error:
-                self._keep_solution(before, error.message)
-                return
-        self._faults.end()
-        verdict = assessment.verdict
-        goes_on = self._wanted != solution.excluded
-        activity = Activity.SOLVING if goes_on else Activity.NONE
-        status = replace(
-            status,
-            solution=solution,
-            assessment=assessment,
-            failed=None,
-            result=None,
-            activity=activity,
-        )
-        self._conclude(status, verdict.reason, verdict.grade is not Grade.REPEAT)
-        if goes_on:
-            self._solve_again(solution)
-
-    def _on_unsolved(self, why: Message) -> None:
-        if self._first is not None:
-            self._faults.report(message("press-test.unsolved", why=why))
-            self._end_press(None)
-            return
-        solution = self._status.solution
-        if solution is None:
-            state, setup = self._status.state, self._status.setup
-            assert state is not None
-            assert setup is not None
-            failed = failed_swing(setup, state.kept, why)
-            status = replace(self._status, activity=Activity.NONE, failed=failed)
-            self._conclude(
-                status, message(Code.NO_TIP, why=failed.causes[0]), passed=False
-            )
-            return
-        if set(self._tried) > set(solution.excluded):
-            why = message("swing.images-stay-in", why=why)
-        self._keep_solution(solution, why)
-
-    def _keep_solution(self, solution: Solution, why: Message) -> None:
-        """Keep the solution and its images, and report why."""
-        if self._wanted != self._tried:  # the user continued meanwhile
-            self._solve_again(solution)
-            return
-        self._wanted = solution.excluded
-        self._faults.report(why)
-        self._publish(replace(self._status, activity=Activity.NONE))
-
-    def _conclude(self, status: SwingStatus, reason: Message, passed: bool) -> None:
-        assert status.state is not None
-        is_first = status.state.phase is not Phase.VERDICT
-        transition = conclude(status.state, reason, passed)
-        status = replace(status, state=transition.state)
-        self._publish(status, *(transition.events if is_first else ()))
-
-    def accept(self, reason: str = "", signature: Signature | None = None) -> None:
-        """Accept the tip, or report why it cannot be; the previous one then stays.
-
-        A reason is needed to accept it despite findings, a signature where there are
-        supervisors.
-        """
-        self._faults.trying(lambda: self._store(reason, signature))
-
-    def _store(self, reason: str, signature: Signature | None) -> None:
-        status, solution = self._status, self._status.solution
-        if solution is None or self._task.is_there or status.result is not None:
-            return
-        self._publish(replace(status, activity=Activity.ACCEPTING))
-        try:
-            now = self._now()
-            result = accept(self._archive, solution, now, reason, signature)
-            status = replace(status, result=result)
-            self._faults.end()
-            self._faults.trying(self._logbook.enter_owed)
-        except AcceptanceError:  # something else has come into force meanwhile
-            record = open_record(solution.source.folder)
-            assessment = assess(self._archive, record, solution)
-            status = replace(status, assessment=assessment)
-            raise
-        finally:
-            self._publish(status)
-
-    def revoke(
-        self,
-        result: Result,
-        operator: str,
-        reason: str = "",
-        signature: Signature | None = None,
-    ) -> None:
-        """Revoke a result in favour of the one before, or report why not.
-
-        The reason is in the words of the operator.
-        """
-        self._faults.trying(lambda: self._withdraw(result, operator, reason, signature))
-
-    def _withdraw(
-        self, result: Result, operator: str, reason: str, signature: Signature | None
-    ) -> None:
-        self._archive.revoke(result, operator, self._now(), reason, signature)
-        status, own = self._status, self._status.result
-        if own is not None and own.record == result.record:
-            status = replace(status, result=None)
-        self._faults.trying(self._logbook.enter_owed)
-        self._publish(replace(status, revoked=result))
 
     def open_logbook(self) -> None:
         """Enter events that are in files only, in the background."""

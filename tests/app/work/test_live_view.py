@@ -140,13 +140,13 @@ def test_a_gui_that_was_busy_is_shown_the_newest_image_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     looked_at: list[int] = []
-    take = run.runner.take
+    take = run.runner.process_image
 
     def note_and_take(frame: Frame, *seen: Any) -> None:
         looked_at.append(frame.seq)
         take(frame, *seen)
 
-    monkeypatch.setattr(run.runner, "take", note_and_take)
+    monkeypatch.setattr(run.runner, "process_image", note_and_take)
     with qtbot.waitSignal(view.image_shown):
         stage.open()
     n_shown, n_before = len(diary.of("image_shown")), len(looked_at)
@@ -312,7 +312,7 @@ def test_a_swing_is_captured_though_the_gui_is_busy(
     run: SwingRun, stage: Stage, interrupted: Path
 ) -> None:
     resumable = read_resumable(interrupted)
-    run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
     stage.open()
     stage.hold_up_until(lambda: n_kept(run) > N_IMAGES + 2)
 

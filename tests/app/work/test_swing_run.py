@@ -144,7 +144,7 @@ def test_all_is_reported_on_the_thread_of_the_gui(
     run.records_folder.unlink()
     run.records_folder.with_name("old").rename(run.records_folder)
     resumable = read_resumable(interrupted)
-    run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
     run.runner.ask(lambda workflow: workflow.finish())
     qtbot.waitUntil(
         lambda: run.status.solution is not None, timeout=round(1000 * TIMEOUT)

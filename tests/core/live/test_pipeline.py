@@ -419,7 +419,7 @@ def test_a_swing_begins_with_the_images_of_whoever_is_there(
 ) -> None:
     make_live()
     station.runner.ask(lambda workflow: workflow.choose(station.preparation))
-    station.runner.ask(lambda workflow: workflow.come())
+    station.runner.ask(lambda workflow: workflow.note_arrival())
     station.wait_until(lambda: station.status.is_capturing)
     station.wait_until(lambda: station.state.phase is not Phase.WAIT)
 

@@ -34,7 +34,7 @@ def in_force(solved: "Station") -> "Station":
 def present(station: "Station") -> "Station":
     """Somebody is at the swing, and all is chosen; no image has come yet."""
     station.runner.ask(lambda workflow: workflow.choose(station.preparation))
-    station.runner.ask(lambda workflow: workflow.come())
+    station.runner.ask(lambda workflow: workflow.note_arrival())
     return station
 
 

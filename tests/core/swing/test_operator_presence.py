@@ -15,7 +15,7 @@ WHY = message("system.full")
 @pytest.fixture
 def ready(prepared: Preparation) -> OperatorPresence:
     """Somebody is there and all is chosen."""
-    return OperatorPresence(choices=prepared).come()
+    return OperatorPresence(choices=prepared).arrived()
 
 
 def test_a_swing_is_due_when_somebody_is_there_and_nothing_lacks(
@@ -25,7 +25,7 @@ def test_a_swing_is_due_when_somebody_is_there_and_nothing_lacks(
 
     assert ready.is_due
     assert not OperatorPresence(choices=prepared).is_due
-    assert not OperatorPresence().come().is_due
+    assert not OperatorPresence().arrived().is_due
     assert not replace(ready, choices=lacking).is_due
     assert not ready.left().is_due
 
@@ -37,21 +37,21 @@ def test_what_was_refused_is_not_due_until_somebody_comes_or_a_swing_begins(
 
     assert not refused.is_due
     assert not refused.left().is_due
-    assert refused.come().is_due
+    assert refused.arrived().is_due
     assert refused.begun().is_due
 
 
 def test_nobody_is_away_before_somebody_has_left() -> None:
     assert not OperatorPresence().is_away
-    assert not OperatorPresence().come().is_away
-    assert OperatorPresence().come().left().is_away
-    assert not OperatorPresence().come().left().come().is_away
+    assert not OperatorPresence().arrived().is_away
+    assert OperatorPresence().arrived().left().is_away
+    assert not OperatorPresence().arrived().left().arrived().is_away
 
 
 def test_who_comes_or_begins_ends_a_pause_by_leaving(ready: OperatorPresence) -> None:
     paused = replace(ready.left(), paused_by_leaving=True)
 
-    assert not paused.come().paused_by_leaving
+    assert not paused.arrived().paused_by_leaving
     assert not paused.begun().paused_by_leaving
     assert paused.begun().is_away  # who begins may be elsewhere
 

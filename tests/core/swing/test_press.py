@@ -68,7 +68,7 @@ def test_its_solution_comes_beside_the_first_and_replaces_nothing(
 def test_it_can_be_left_for_the_first_swing(pressing: "Station") -> None:
     pressing.keep(1)
     firm = pressing.record_folder
-    pressing.runner.ask(lambda workflow: workflow.set_aside())
+    pressing.runner.ask(lambda workflow: workflow.discard())
     pressing.wait_until(lambda: pressing.status.solution is not None)
 
     assert pressing.record_folder != firm

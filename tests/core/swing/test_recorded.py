@@ -59,7 +59,7 @@ class Recording:
         assert setup is not None
         seen = detect_pen(frame.image, setup.camera, setup.pen, setup.mask)
         n_images = self.camera.caps.n_images
-        station.runner.take(frame, seen, setup, n_images)
+        station.runner.process_image(frame, seen, setup, n_images)
 
 
 @pytest.fixture

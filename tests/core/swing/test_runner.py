@@ -186,15 +186,15 @@ def test_commands_without_a_swing_do_nothing(station: "Station") -> None:
         SwingWorkflow.pause,
         SwingWorkflow.resume,
         SwingWorkflow.finish,
-        SwingWorkflow.solve,
-        SwingWorkflow.cancel,
+        lambda workflow: workflow.solving.solve(),
+        lambda workflow: workflow.solving.cancel(),
         SwingWorkflow.capture_more,
-        SwingWorkflow.accept,
-        SwingWorkflow.set_aside,
+        lambda workflow: workflow.solving.accept(),
+        SwingWorkflow.discard,
     ):
         runner.ask(act)
-    runner.ask(lambda workflow: workflow.exclude([1]))
-    runner.ask(lambda workflow: workflow.include([1]))
+    runner.ask(lambda workflow: workflow.solving.exclude([1]))
+    runner.ask(lambda workflow: workflow.solving.include([1]))
     station.see()
 
     assert station.witness.reported == []
@@ -212,7 +212,7 @@ def test_nothing_is_kept_after_the_end(station: "Station", interrupted: Path) ->
     station.solve()
     before = (interrupted / JOURNAL).read_bytes()
     frame = station.camera.read(1.0)
-    station.runner.take(frame, station.state.detection, setup)
+    station.runner.process_image(frame, station.state.detection, setup)
 
     assert (interrupted / JOURNAL).read_bytes() == before
 
@@ -226,10 +226,10 @@ def test_an_image_of_another_swing_is_not_kept(
     assert setup is not None
     frame = station.camera.read(1.0)
     for other in (None, replace(setup)):  # it was looked for something else
-        station.runner.take(frame, state.detection, other)
+        station.runner.process_image(frame, state.detection, other)
         assert station.state is state
 
-    station.runner.take(frame, state.detection, setup)
+    station.runner.process_image(frame, state.detection, setup)
     assert station.state is not state
 
 
@@ -284,9 +284,7 @@ def test_a_pause_of_the_user_is_not_taken_for_a_fault(
     assert not station.status.has_fault
 
 
-@pytest.mark.parametrize(
-    "end", ["finish", "abandon", "begin", "set_aside", "shut_down"]
-)
+@pytest.mark.parametrize("end", ["finish", "abandon", "begin", "discard", "shut_down"])
 def test_the_record_is_closed_however_the_swing_ends(
     station: "Station", interrupted: Path, end: str
 ) -> None:
@@ -378,8 +376,8 @@ def test_resuming_the_swing_that_is_under_way_changes_nothing(
     station.go_on(interrupted)
     status = station.status
     resumable = read_resumable(interrupted)
-    station.runner.ask(lambda workflow: workflow.go_on(resumable))
-    station.runner.take(station.camera.read(1.0), None)
+    station.runner.ask(lambda workflow: workflow.continue_swing(resumable))
+    station.runner.process_image(station.camera.read(1.0), None)
 
     assert station.status is status
     assert station.witness.faults == []
@@ -391,7 +389,7 @@ def test_a_swing_that_was_changed_since_it_was_read_is_refused_and_nothing_begin
     swing = read_resumable(interrupted)
     with RecordWriter.resume(swing.record) as writer:
         writer.exclude([1], "by somebody else")
-    station.runner.ask(lambda workflow: workflow.go_on(swing))
+    station.runner.ask(lambda workflow: workflow.continue_swing(swing))
     station.wait_until(lambda: len(station.witness.faults) == 1)
 
     assert "changed the swing" in station.witness.faults[0]
@@ -425,7 +423,9 @@ def test_an_end_while_images_are_captured_keeps_all_of_them(
     setup, detection = station.status.setup, station.state.detection
     station.runner.shut_down()
     assert station.runner.await_end(TIMEOUT)
-    station.runner.take(station.camera.read(1.0), detection, setup)  # comes too late
+    station.runner.process_image(
+        station.camera.read(1.0), detection, setup
+    )  # comes too late
 
     assert len(open_record(interrupted).images) == N_IMAGES + 2
     assert station.interrupted() == [interrupted]
@@ -470,7 +470,7 @@ def test_nobody_waits_longer_than_he_says_for_a_disk_that_does_not_answer(
     station: "Station", stuck: threading.Event
 ) -> None:
     stuck.set()
-    station.runner.ask(lambda workflow: workflow.set_aside())
+    station.runner.ask(lambda workflow: workflow.discard())
     station.runner.shut_down()
 
     assert not station.runner.await_end(0.05)
@@ -480,7 +480,7 @@ def test_an_image_waits_for_a_disk_that_does_not_answer_but_no_command_does(
     station: "Station", stuck: threading.Event
 ) -> None:
     stuck.set()
-    station.runner.ask(lambda workflow: workflow.set_aside())
+    station.runner.ask(lambda workflow: workflow.discard())
     looking = threading.Thread(target=station.see, daemon=True)
     looking.start()
     station.runner.ask(lambda workflow: workflow.pause())

@@ -59,13 +59,13 @@ def test_leaving_pauses_and_coming_back_goes_on(
 ) -> None:
     present.go_on(interrupted)
     present.keep(1)
-    present.runner.ask(lambda workflow: workflow.leave())
+    present.runner.ask(lambda workflow: workflow.note_departure())
     present.wait_until(lambda: present.status.is_paused_by_user)
     n_images = present.n_recorded
     present.see(30)
     assert present.n_recorded == n_images
 
-    present.runner.ask(lambda workflow: workflow.come())
+    present.runner.ask(lambda workflow: workflow.note_arrival())
     present.keep(1)
 
 
@@ -73,12 +73,12 @@ def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
     present: "Station", interrupted: Path
 ) -> None:
     present.go_on(interrupted)
-    present.runner.ask(lambda workflow: workflow.leave())
+    present.runner.ask(lambda workflow: workflow.note_departure())
     # The operator is not at the step Swing.
     present.runner.ask(lambda workflow: workflow.resume())
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
     present.see_until(lambda: present.status.has_fault)
-    present.runner.ask(lambda workflow: workflow.come())
+    present.runner.ask(lambda workflow: workflow.note_arrival())
     present.see()
 
     assert present.status.has_fault
@@ -88,13 +88,13 @@ def test_a_fault_while_nobody_is_there_is_not_over_when_somebody_comes(
 def test_a_swing_that_begins_while_everybody_is_away_waits(
     present: "Station", interrupted: Path
 ) -> None:
-    present.runner.ask(lambda workflow: workflow.leave())
+    present.runner.ask(lambda workflow: workflow.note_departure())
     present.go_on(interrupted)
     present.wait_until(lambda: present.status.is_paused_by_user)
     present.see(2)
     assert present.status.is_paused_by_user
 
-    present.runner.ask(lambda workflow: workflow.come())
+    present.runner.ask(lambda workflow: workflow.note_arrival())
     present.see()
     assert not present.status.is_paused_by_user
 
@@ -153,7 +153,7 @@ def test_a_swing_that_cannot_be_set_aside_goes_on_instead_of_starting_over(
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
     status = solved.status
-    for act in (SwingWorkflow.start_over, SwingWorkflow.set_aside):
+    for act in (SwingWorkflow.start_over, SwingWorkflow.discard):
         solved.runner.ask(act)
         solved.see()
         assert solved.status.record_folder == status.record_folder
@@ -180,10 +180,10 @@ def test_an_accepted_swing_is_left_and_the_next_begins_when_somebody_comes_again
     folder = in_force.record_folder
     journal = (folder / JOURNAL).read_bytes()
     in_force.runner.ask(lambda workflow: workflow.choose(in_force.preparation))
-    in_force.runner.ask(lambda workflow: workflow.leave())
+    in_force.runner.ask(lambda workflow: workflow.note_departure())
     in_force.see()
     assert in_force.record_folder == folder
-    in_force.runner.ask(lambda workflow: workflow.come())
+    in_force.runner.ask(lambda workflow: workflow.note_arrival())
     in_force.see()
 
     assert in_force.status.is_capturing

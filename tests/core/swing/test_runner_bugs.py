@@ -119,7 +119,7 @@ def test_a_swing_whose_entrance_fails_by_a_bug_leaves_the_one_before_whole(
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.workflow.recorded_names", fail)
         resumable = read_resumable(other)
-        station.runner.ask(lambda workflow: workflow.go_on(resumable))
+        station.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         station.wait_until(lambda: len(station.witness.faults) == 1)
     station.runner.ask(lambda workflow: workflow.resume())
     station.keep(1)
@@ -141,13 +141,13 @@ def test_a_bug_in_the_computation_of_the_tip_leaves_the_swing_to_be_solved_again
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr(f"lightpen.swing.workflow.{step}", fail)
+        broken.setattr(f"lightpen.swing.solving.{step}", fail)
         station.runner.ask(lambda workflow: workflow.finish())
         assert is_reported_once(crashes)
         station.wait_until(lambda: not station.status.is_solving)
     assert station.status.solution is None
 
-    station.runner.ask(lambda workflow: workflow.solve())
+    station.runner.ask(lambda workflow: workflow.solving.solve())
     station.wait_for_phase(Phase.VERDICT)
     assert station.status.solution is not None
 
@@ -172,8 +172,8 @@ def test_a_bug_while_a_result_is_stored_leaves_the_tip_to_be_accepted(
     solved: "Station", crashes: Crashes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.workflow.accept", fail)
-        solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+        broken.setattr("lightpen.swing.solving.accept", fail)
+        solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
         solved.wait_until(lambda: len(solved.witness.faults) == 1)
     assert is_reported_once(crashes)
     assert solved.status.activity is Activity.NONE
@@ -192,7 +192,7 @@ def test_a_bug_in_a_command_lets_what_is_computed_go_on(
     with monkeypatch.context() as broken:
         broken.setattr("lightpen.swing.operator_presence.replace", fail)
         station.runner.ask(lambda workflow: workflow.finish())
-        station.runner.ask(lambda workflow: workflow.come())
+        station.runner.ask(lambda workflow: workflow.note_arrival())
         station.wait_until(lambda: len(station.witness.faults) == 1)
     station.wait_for_phase(Phase.VERDICT)
 

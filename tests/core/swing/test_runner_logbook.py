@@ -61,7 +61,7 @@ def test_accepted_and_taken_back_tips_are_entered(
 
     result = logging.status.result
     assert result is not None
-    logging.runner.ask(lambda workflow: workflow.revoke(result, "Ben"))
+    logging.runner.ask(lambda workflow: workflow.solving.revoke(result, "Ben"))
     logging.wait_until(lambda: logging.status.revoked is not None)
     _, back = entered(logging)
     assert (back.kind, back.names.operator) == (Kind.TAKEN_BACK, "Ben")
@@ -73,7 +73,7 @@ def test_a_tip_that_is_not_accepted_is_entered_as_refused_with_its_verdict(
     logging.go_on(interrupted)
     logging.solve()
     tip, verdict = logging.tip, logging.status.verdict
-    logging.runner.ask(lambda workflow: workflow.set_aside())
+    logging.runner.ask(lambda workflow: workflow.discard())
     logging.wait_until(lambda: logging.status.record_folder is None)
     logging.see()
 
@@ -106,7 +106,7 @@ def test_what_the_files_tell_of_is_entered_at_the_start(
 def test_a_swing_without_a_tip_is_entered_as_abandoned(logging: Station) -> None:
     logging.begin()
     logging.keep(2)
-    logging.runner.ask(lambda workflow: workflow.set_aside())
+    logging.runner.ask(lambda workflow: workflow.discard())
     logging.wait_until(lambda: logging.status.record_folder is None)
     logging.see()
 
@@ -123,7 +123,7 @@ def test_no_tip_comes_into_force_while_the_archive_cannot_be_read(
     (logging.folder / ARCHIVE).write_bytes(b"no database at all " * 50)
     logging.go_on(acceptable)
     logging.solve()
-    logging.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    logging.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     logging.wait_until(lambda: logging.witness.faults != [])
 
     assert any("not a database" in fault for fault in logging.witness.faults)

@@ -84,7 +84,7 @@ def test_running_fit_and_solution_are_of_both_cameras(
     assert files == ["camera.yaml", "camera-2.yaml"]
     assert len(again["inputs"]["observations"]) == 2 * N_IMAGES
 
-    station.runner.ask(lambda workflow: workflow.exclude([3]))
+    station.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     station.wait_until(
         lambda: not station.status.is_solving and 3 in station.solution.excluded
     )
@@ -119,7 +119,7 @@ def capture_more(
         detection, beside = last
         assert detection is not None
         assert beside is not None
-        station.runner.take(
+        station.runner.process_image(
             replace(first, others=(other,)),
             replace(detection, others=(beside,)),
             station.status.setup,

@@ -68,13 +68,13 @@ def test_how_far_the_tip_is_computed_is_reported_from_0_to_1(solved: "Station") 
 def test_a_tip_that_is_reported_by_the_two_stage_method_is_accepted_so(
     solved: "Station",
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.report_by("two-stage"))
+    solved.runner.ask(lambda workflow: workflow.solving.report_by("two-stage"))
     solved.wait_until_solved()
     paper = solved.solution.calibration.two_stage.tip_pen.tolist()
-    solved.runner.ask(lambda workflow: workflow.exclude([2]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([2]))
     solved.wait_until_solved()
     assert solved.solution.calibration.method == "two-stage"
-    solved.runner.ask(lambda workflow: workflow.include([2]))
+    solved.runner.ask(lambda workflow: workflow.solving.include([2]))
     solved.wait_until_solved()
     solved.wait_until_solved()
     solved.accept()
@@ -87,13 +87,17 @@ def test_a_tip_that_is_reported_by_the_two_stage_method_is_accepted_so(
     assert np.all(np.array(record.expanded_uncertainty_mm) > np.array(joint))
 
 
+def _without(workflow: SwingWorkflow, number: int) -> None:
+    workflow.solving.exclude([number])
+
+
 @pytest.mark.slow
 def test_images_taken_out_in_quick_succession_all_count(
     solved: "Station", command: Command
 ) -> None:
     for number in range(1, 8):
-        solved.runner.ask(partial(SwingWorkflow.exclude, numbers=[number]))
-    solved.runner.ask(lambda workflow: workflow.include([4]))
+        solved.runner.ask(partial(_without, number=number))
+    solved.runner.ask(lambda workflow: workflow.solving.include([4]))
     solved.wait_until_solved()
 
     assert set(solved.solution.excluded) == {1, 2, 3, 5, 6, 7}
@@ -108,10 +112,10 @@ def test_images_taken_out_in_quick_succession_all_count(
 def test_too_few_images_left_keep_the_solution_and_the_record(
     solved: "Station",
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.exclude([1]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([1]))
     solved.wait_until_solved()
     before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
-    solved.runner.ask(lambda workflow: workflow.exclude(range(1, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude(range(1, N_IMAGES)))
     solved.wait_until_solved()
 
     assert solved.solution is before
@@ -124,15 +128,15 @@ def test_too_few_images_left_keep_the_solution_and_the_record(
     )
     assert solved.witness.reliefs == []
     # what failed is not asked for again
-    solved.runner.ask(lambda workflow: workflow.exclude([2]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([2]))
     solved.wait_until_solved()
     assert set(solved.solution.excluded) == {1, 2}
     assert solved.witness.reliefs == solved.witness.faults
 
 
 def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.exclude(range(1, N_IMAGES)))
-    solved.runner.ask(lambda workflow: workflow.include(range(4, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude(range(1, N_IMAGES)))
+    solved.runner.ask(lambda workflow: workflow.solving.include(range(4, N_IMAGES)))
     solved.wait_until_solved()
 
     assert set(solved.solution.excluded) == {1, 2, 3}
@@ -143,7 +147,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     before = solved.solution
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.wait_until_solved()
     journal.with_name("elsewhere").rename(journal)
 
@@ -152,7 +156,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -
     assert "does not exist" in sentence
     assert "stay in" not in sentence
     assert solved.witness.reliefs == []
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.wait_until_solved()
     assert solved.witness.reliefs == [sentence]
 
@@ -162,14 +166,14 @@ def test_solving_can_be_cancelled_and_done_again(
 ) -> None:
     station.go_on(interrupted)
     station.runner.ask(lambda workflow: workflow.finish())
-    station.runner.ask(lambda workflow: workflow.cancel())
+    station.runner.ask(lambda workflow: workflow.solving.cancel())
     station.see()
     assert Activity.SOLVING in [s.activity for s in station.witness.statuses]
     assert not station.status.is_solving
     assert station.state.phase is Phase.SOLVING
     assert station.status.solution is None
 
-    station.runner.ask(lambda workflow: workflow.solve())
+    station.runner.ask(lambda workflow: workflow.solving.solve())
     station.wait_for_phase(Phase.VERDICT)
     assert station.status.solution is not None
 
@@ -196,7 +200,7 @@ def test_nothing_comes_of_a_solution_after_its_swing_was_abandoned(
         is_solved.set()
         return solution
 
-    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solve_late)
+    monkeypatch.setattr("lightpen.swing.solving.solve_record", solve_late)
     station.go_on(interrupted)
     station.runner.ask(lambda workflow: workflow.finish())
     station.runner.ask(lambda workflow: workflow.abandon())
@@ -217,11 +221,11 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
     solved: "Station",
 ) -> None:
     before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
-    solved.runner.ask(lambda workflow: workflow.cancel())
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.cancel())
     solved.see()
     assert not solved.status.is_solving
-    solved.runner.ask(lambda workflow: workflow.exclude([7]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([7]))
     solved.wait_until_solved()
 
     assert before.excluded == {}
@@ -254,7 +258,7 @@ def test_holding_the_pen_upright_and_still_after_the_verdict_is_reported_once(
 def test_more_images_can_be_captured_after_the_verdict(
     solved: "Station", command: Command
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.wait_until_solved()
     solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
@@ -306,7 +310,7 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
 def test_more_images_can_be_captured_while_a_wish_is_computed(
     solved: "Station",
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.capture_more())
     solved.wait_until(lambda: solved.status.is_capturing)
     solved.keep(1)
@@ -321,17 +325,17 @@ def test_images_that_cannot_be_read_again_leave_the_solution_and_no_wish(
     before = solved.solution
     journal = solved.record_folder / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
     solved.runner.ask(lambda workflow: workflow.capture_more())
     # while they are read nothing is taken out
-    solved.runner.ask(lambda workflow: workflow.exclude([4]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([4]))
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
     solved.wait_until(lambda: solved.status.activity is Activity.NONE)
     journal.with_name("elsewhere").rename(journal)
     assert solved.solution is before
     assert not solved.status.is_capturing
 
-    solved.runner.ask(lambda workflow: workflow.exclude([7]))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([7]))
     solved.wait_until_solved()
     assert set(solved.solution.excluded) == {7}
 
@@ -341,7 +345,7 @@ def test_a_swing_that_is_captured_is_set_aside_for_good(
 ) -> None:
     station.go_on(interrupted)
     station.keep(1)
-    station.runner.ask(lambda workflow: workflow.set_aside())
+    station.runner.ask(lambda workflow: workflow.discard())
     station.wait_until(lambda: station.status.state is None)
     assert open_record(interrupted).verdict == DISCARDED
     station.begin()
@@ -401,8 +405,8 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(
 
 
 def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
-    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
+    solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     solved.see()
 
     assert solved.status.result is not None
@@ -410,8 +414,8 @@ def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
 
 
 def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
-    solved.runner.ask(lambda workflow: workflow.exclude([3]))
-    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    solved.runner.ask(lambda workflow: workflow.solving.exclude([3]))
+    solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     solved.wait_until_solved()
 
     assert solved.status.result is None
@@ -421,7 +425,7 @@ def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> N
 def test_without_a_reason_a_tip_that_is_to_be_checked_is_not_accepted(
     solved: "Station",
 ) -> None:
-    solved.runner.ask(lambda workflow: workflow.accept())
+    solved.runner.ask(lambda workflow: workflow.solving.accept())
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
 
     assert solved.status.result is None
@@ -436,7 +440,7 @@ def test_what_was_accepted_can_be_taken_back_and_accepted_again(
     solved.accept("First.")
     first = solved.status.result
     assert first is not None
-    solved.runner.ask(lambda workflow: workflow.revoke(first, "Ben"))
+    solved.runner.ask(lambda workflow: workflow.solving.revoke(first, "Ben"))
     solved.wait_until(lambda: solved.status.revoked is first)
 
     assert solved.status.result is None
@@ -454,7 +458,7 @@ def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
     first = in_force.status.result
     assert first is not None
     in_force.go_on(other)
-    in_force.runner.ask(lambda workflow: workflow.revoke(first, "Ben"))
+    in_force.runner.ask(lambda workflow: workflow.solving.revoke(first, "Ben"))
     in_force.wait_until(lambda: in_force.status.revoked is first)
 
     assert in_force.status.is_capturing
@@ -465,7 +469,7 @@ def test_a_result_that_is_not_in_force_is_not_taken_back(in_force: "Station") ->
     first = in_force.status.result
     assert first is not None
     for _ in range(2):
-        in_force.runner.ask(lambda workflow: workflow.revoke(first, "Ben"))
+        in_force.runner.ask(lambda workflow: workflow.solving.revoke(first, "Ben"))
     in_force.wait_until(lambda: len(in_force.witness.faults) == 1)
 
     assert "is no longer current" in in_force.witness.faults[0]
@@ -481,7 +485,7 @@ def test_a_tip_that_is_to_be_repeated_is_not_accepted(
     assert station.status.verdict.grade is Grade.REPEAT
     assert station.witness.event_kinds[-1] is SwingEventKind.FAILED
 
-    station.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    station.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     station.see()
     assert station.status.result is None
     assert station.in_force() is None
@@ -492,12 +496,12 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
     solution, result = in_force.solution, in_force.status.result
     journal = (in_force.record_folder / JOURNAL).read_bytes()
     runner = in_force.runner
-    runner.ask(lambda workflow: workflow.exclude([1]))
-    runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    runner.ask(lambda workflow: workflow.solving.exclude([1]))
+    runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     for act in (
-        SwingWorkflow.solve,
+        lambda workflow: workflow.solving.solve(),
         SwingWorkflow.capture_more,
-        SwingWorkflow.set_aside,
+        SwingWorkflow.discard,
     ):
         runner.ask(act)
     in_force.see()
@@ -512,7 +516,7 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> None:
     solved.results.parent.mkdir()
     solved.results.write_text("not a folder")
-    solved.runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    solved.runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     solved.wait_until(lambda: len(solved.witness.faults) == 1)
     assert solved.status.result is None
     assert solved.status.activity is Activity.NONE
@@ -533,10 +537,10 @@ def test_a_result_bears_the_time_that_the_runner_goes_by(
     )
     rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
     resumable = read_resumable(interrupted)
-    runner.ask(lambda workflow: workflow.go_on(resumable))
+    runner.ask(lambda workflow: workflow.continue_swing(resumable))
     runner.ask(lambda workflow: workflow.finish())
     station.witness.wait_until(lambda: runner.status.verdict is not None)
-    runner.ask(lambda workflow: workflow.accept("It is seen to."))
+    runner.ask(lambda workflow: workflow.solving.accept("It is seen to."))
     runner.shut_down()
     assert runner.await_end(TIMEOUT)
     result = station.in_force()

@@ -38,10 +38,10 @@ class AcceptanceControl(QObject):
             self._view.reason.ask(of_supervisor=of_supervisor)
 
     def _accept(self, reason: str, signature: Signature | None) -> None:
-        self._runner.ask(lambda workflow: workflow.accept(reason, signature))
+        self._runner.ask(lambda workflow: workflow.solving.accept(reason, signature))
 
     def _set_aside(self) -> None:
-        self._runner.ask(lambda workflow: workflow.set_aside())
+        self._runner.ask(lambda workflow: workflow.discard())
 
     def _ask_to_take_back(self) -> None:
         if self._selection.supervision.is_guarded:
@@ -54,7 +54,9 @@ class AcceptanceControl(QObject):
         if result is not None:
             operator = self._selection.preparation.names.operator
             self._runner.ask(
-                lambda workflow: workflow.revoke(result, operator, reason, signature)
+                lambda workflow: workflow.solving.revoke(
+                    result, operator, reason, signature
+                )
             )
 
     def _on_refused(self) -> None:

@@ -82,7 +82,9 @@ class ReviewPage(Page):
         self._run.progressed.connect(view.solving.set_fraction)
         self._accepted.timeout.connect(self.changed)
         self._reading.timeout.connect(self.changed)
-        view.solving.cancelled.connect(lambda: self._ask(SwingWorkflow.cancel))
+        view.solving.cancelled.connect(
+            lambda: self._ask(lambda workflow: workflow.solving.cancel())
+        )
         view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
         view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
         view.tabs.images_made.connect(self._on_images_made)
@@ -136,11 +138,11 @@ class ReviewPage(Page):
             return
         match next_step(status):
             case NextStep.ACCEPT:
-                self._ask(SwingWorkflow.accept)
+                self._ask(lambda workflow: workflow.solving.accept())
             case NextStep.CAPTURE_MORE if not status.is_recording:
                 self._ask(SwingWorkflow.capture_more)
             case NextStep.USE_PART:
-                self._ask(SwingWorkflow.use_part)
+                self._ask(lambda workflow: workflow.solving.use_part())
             case NextStep.REPORT_JOINT:
                 self._report_by("joint")
             case NextStep.SEE_TO_CAUSE:
@@ -233,15 +235,15 @@ class ReviewPage(Page):
 
     def _report_by(self, method: Method) -> None:
         """Report this swing and later ones at the station by a method."""
-        self._ask(lambda workflow: workflow.report_by(method))
+        self._ask(lambda workflow: workflow.solving.report_by(method))
         chosen = replace(self._selection.preparation, method=method)
         self._selection.set_preparation(chosen)
 
     def _exclude(self, numbers: list[int]) -> None:
-        self._ask(lambda workflow: workflow.exclude(numbers))
+        self._ask(lambda workflow: workflow.solving.exclude(numbers))
 
     def _include(self, numbers: list[int]) -> None:
-        self._ask(lambda workflow: workflow.include(numbers))
+        self._ask(lambda workflow: workflow.solving.include(numbers))
 
     def _next_tip(self) -> str:
         """Return the tip that can be swung at once, as it is chosen by now."""

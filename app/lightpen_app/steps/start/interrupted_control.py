@@ -164,7 +164,7 @@ class InterruptedControl(QObject):
         self._take_over(swing)
         self._reviewed = swing.record.folder
         runner = self._run.runner
-        runner.ask(lambda workflow: workflow.go_on(swing))
+        runner.ask(lambda workflow: workflow.continue_swing(swing))
         runner.ask(lambda workflow: workflow.finish())
 
     def _on_swing_read(self, swing: Resumable) -> None:
@@ -202,7 +202,7 @@ class InterruptedControl(QObject):
             )
         else:
             self._resumed = swing.record.folder
-            self._run.runner.ask(lambda workflow: workflow.go_on(swing))
+            self._run.runner.ask(lambda workflow: workflow.continue_swing(swing))
 
     def _take_over(self, swing: Resumable) -> None:
         """Select the item of the swing, its station and, if others are, its sources."""

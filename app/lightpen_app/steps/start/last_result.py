@@ -107,7 +107,9 @@ class LastResultPresenter(QObject):
     ) -> None:
         operator = self._selection.preparation.names.operator
         self._run.runner.ask(
-            lambda workflow: workflow.revoke(result, operator, reason, signature)
+            lambda workflow: workflow.solving.revoke(
+                result, operator, reason, signature
+            )
         )
 
 

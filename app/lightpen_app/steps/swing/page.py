@@ -130,7 +130,7 @@ class SwingPage(Page):
         is_recording = self._selection.preparation.source.kind == SourceKind.RECORDED
         if is_recording and self._run.status.state is None:
             self._camera.open()  # it begins with its first image
-        self._runner.ask(lambda workflow: workflow.come())
+        self._runner.ask(lambda workflow: workflow.note_arrival())
         self._ask_about_choices()
         self._show()
         self._plotting.start()
@@ -140,7 +140,7 @@ class SwingPage(Page):
         self._plotting.stop()
         self._question.hide()
         self._is_shown = False
-        self._runner.ask(lambda workflow: workflow.leave())
+        self._runner.ask(lambda workflow: workflow.note_departure())
         self._show()
 
     @override

@@ -60,8 +60,8 @@ PAUSES = {SideAction.PAUSE, SideAction.RESUME}
 COMMANDS = {
     SideAction.PAUSE: SwingWorkflow.pause,
     SideAction.RESUME: SwingWorkflow.resume,
-    SideAction.STOP_COMPUTING: SwingWorkflow.cancel,
-    SideAction.COMPUTE: SwingWorkflow.solve,
+    SideAction.STOP_COMPUTING: lambda workflow: workflow.solving.cancel(),
+    SideAction.COMPUTE: lambda workflow: workflow.solving.solve(),
     SideAction.CAPTURE_MORE: SwingWorkflow.capture_more,
 }
 

@@ -201,7 +201,7 @@ class Bed:
         self.rewrite_header(folder, settings)
         before = workbench.run.status.assessment
         resumable = self.solved_once.read(folder)
-        workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+        workbench.run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
         workbench.run.runner.ask(lambda workflow: workflow.finish())
         self.qtbot.waitUntil(
             lambda: workbench.run.status.assessment not in (None, before)
@@ -250,7 +250,7 @@ def bed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Bed]:
     """Lay a recorded swing ready."""
-    monkeypatch.setattr("lightpen.swing.workflow.solve_record", solved_once.solve)
+    monkeypatch.setattr("lightpen.swing.solving.solve_record", solved_once.solve)
     folder = workbench.run.records_folder / "swing"
     shutil.copytree(recorded, folder)
     bed = Bed(qtbot, workbench, folder, [], rewrite_header, solved_once)
@@ -515,7 +515,7 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     assert page.main_action() == MainAction("Capture more")
     assert not button(page, "Accept...").isEnabled()
     assert button(page, "Accept...").toolTip().startswith("Result not acceptable.")
-    workbench.run.runner.ask(lambda workflow: workflow.accept("whatever"))
+    workbench.run.runner.ask(lambda workflow: workflow.solving.accept("whatever"))
     with bed.qtbot.waitSignal(workbench.notifications.raised) as reported:
         pass
     assert reported.args[0].startswith("The tip cannot be accepted.")
@@ -1239,7 +1239,7 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
     before = workbench.run.status.solution
 
     with solving_on():
-        workbench.run.runner.ask(lambda workflow: workflow.solve())
+        workbench.run.runner.ask(lambda workflow: workflow.solving.solve())
         bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
         click(page, "Cancel")
         bed.qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
@@ -1549,10 +1549,10 @@ def failed(bed: Bed, monkeypatch: pytest.MonkeyPatch) -> ReviewPage:
     def diverges(record: Record, report: Callable[[float], None]) -> Solution:
         raise CalibrationError("joint.not-settled", n_steps=100)
 
-    monkeypatch.setattr("lightpen.swing.workflow.solve_record", diverges)
+    monkeypatch.setattr("lightpen.swing.solving.solve_record", diverges)
     workbench, folder = bed.workbench, bed.workbench.run.records_folder / "swing"
     resumable = bed.solved_once.read(folder)
-    workbench.run.runner.ask(lambda workflow: workflow.go_on(resumable))
+    workbench.run.runner.ask(lambda workflow: workflow.continue_swing(resumable))
     workbench.run.runner.ask(lambda workflow: workflow.finish())
     bed.qtbot.waitUntil(lambda: workbench.run.status.failure is not None)
     with undressed():

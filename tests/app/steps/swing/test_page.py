@@ -238,7 +238,7 @@ def capturing(qtbot: QtBot, shared_desk: Desk) -> Desk:
             replace(workbench.selection.preparation, limits=LONG)
         )
         # the next may begin at once
-        desk.run.runner.ask(lambda workflow: workflow.set_aside())
+        desk.run.runner.ask(lambda workflow: workflow.discard())
         until(
             qtbot,
             lambda: (
