@@ -82,9 +82,8 @@ class ReviewPage(Page):
         self._run.progressed.connect(view.solving.set_fraction)
         self._accepted.timeout.connect(self.changed)
         self._reading.timeout.connect(self.changed)
-        view.solving.cancelled.connect(
-            lambda: self._ask(lambda workflow: workflow.solving.cancel())
-        )
+        cancel = partial(self._ask, lambda workflow: workflow.solving.cancel())
+        view.solving.cancelled.connect(cancel)
         view.capture_more.clicked.connect(lambda: self._ask(SwingWorkflow.capture_more))
         view.verify.clicked.connect(lambda: self.step_requested.emit(verify))
         view.tabs.images_made.connect(self._on_images_made)
