@@ -14,7 +14,7 @@ from lightpen.local_time import local_now
 from lightpen.model.decision_rules import DecisionRule
 from lightpen.model.limits import StationLimits, VerificationLimits
 from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import NOBODY, CalibrationFile
+from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.folder.verifications import attributed, keep_verification
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import read_library
@@ -50,7 +50,7 @@ def limits_in_force(
     supervision = None if data is None else read_supervision(data)
     if supervision is None or not supervision.is_guarded:
         return replace(VerificationLimits(), **chosen)
-    station = (NOBODY if tip is None else tip.names).station
+    station = (Names() if tip is None else tip.names).station
     own = supervision.limits_at(station, StationLimits()).verification
     limits = replace(own, **chosen)
     wider = [
@@ -85,7 +85,7 @@ def keep_record(
     That is in the data folder of the tip; None of LED centres alone. By default the
     origin of the images is taken from the tip.
     """
-    names = NOBODY if tip is None else tip.names
+    names = Names() if tip is None else tip.names
     own = None if tip is None else tip.origin
     is_simulated = Origin.SIMULATED in (origin, own)
     if is_simulated:

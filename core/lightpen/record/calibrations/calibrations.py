@@ -19,43 +19,30 @@ from lightpen.estimation.reports.calibration_record import (
     CalibrationRecord,
     FrameRecord,
 )
-from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import LARGEST_RECORD, read_bytes
 from lightpen.formats.own_json import DamagedError, has_checksum, parse_checked
 from lightpen.formats.stored_messages import StoredMessage
 from lightpen.messages import message, printable
-from lightpen.model.origin import Origin
 from lightpen.record.calibrations.traceability import TracedItem
 from lightpen.record.library.entered_files import entered_files
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.results.opening import data_folder_of
-from lightpen.record.results.results import CALIBRATION, TipChange, parse_result
-from lightpen.record.swings.names import Names
+from lightpen.record.results.results import CALIBRATION, JudgedCalibration, parse_result
 
 CALIBRATION_FILE = message("file.calibration")
-NOBODY = Names()
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationFile:
-    """A calibration read from a file."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CalibrationFile(JudgedCalibration):
+    """A calibration read from a file; nobody may have accepted it."""
 
     path: Path
     sha256: str  # checksum of the whole file
-    calibration: CalibrationRecord
-    grade: Grade  # verdict on it when it was accepted, else by itself
-    why: StoredMessage
-    doubts: tuple[StoredMessage, ...]
-    origin: Origin | None
-    names: Names = NOBODY  # empty of a record that nobody accepted
-    accepted: datetime | None = None  # None also for such a record
-    reason: str = ""  # for acceptance despite a CHECK
-    change: TipChange | None = None
+    why: StoredMessage  # the verdict when it was accepted, else by itself
     swing: Path | None = None  # folder of the swing as a result names it
     measured: datetime | None = None  # start of its swing, if looked up
     library_status: tuple[str, ...] = ()  # retired, overdue, if looked up
     due: date | None = None  # next due date of the tip by its age, if looked up
-    supervisor: str = ""  # who signed it; empty if not needed
     traced: tuple[TracedItem, ...] = ()  # items it was measured with, if looked up
     is_entered: bool | None = None  # in the archive; None if not looked up
 
@@ -70,25 +57,9 @@ class CalibrationFile:
         return printable(self.path.name)
 
     @property
-    def tip_pen(self) -> FloatArray:
-        """Tip, pen frame, (3,), mm."""
-        return np.array(self.calibration.tip_pen_mm)
-
-    @property
-    def uncertainty(self) -> FloatArray:
-        """U (k = 2) of the tip along x, y and z, (3,), mm."""
-        return np.array(self.calibration.expanded_uncertainty_mm)
-
-    @property
     def cone_cam(self) -> FloatArray:
         """Centre of the cone, frame of the first camera, (3,), mm."""
         return np.array(self.calibration.cone_cam_mm)
-
-    @property
-    def nominal_tip(self) -> FloatArray | None:
-        """Tip by design, pen frame, (3,), mm."""
-        nominal = self.calibration.nominal_tip_mm
-        return None if nominal is None else np.array(nominal)
 
     @property
     def is_of_rig(self) -> bool:
@@ -183,9 +154,9 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
     if CALIBRATION in data:
         result = parse_result(data, path, Path)
         return CalibrationFile(
-            path,
-            digest,
-            result.calibration,
+            path=path,
+            sha256=digest,
+            calibration=result.calibration,
             grade=result.grade,
             why=result.why or result.calibration.verdict,
             doubts=result.doubts,
@@ -200,9 +171,9 @@ def parse_calibration(data: bytes, path: Path) -> CalibrationFile:
     record = _parse_record(data, path)
     verdict = record.verdict
     return CalibrationFile(
-        path,
-        digest,
-        record,
+        path=path,
+        sha256=digest,
+        calibration=record,
         grade=verdict.grade,
         why=verdict,
         doubts=tuple(each for each in record.warnings if each.code != verdict.code),

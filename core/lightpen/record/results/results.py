@@ -10,7 +10,7 @@ revokes it is a separate file, a head without a calibration.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
@@ -150,16 +150,14 @@ class _Whole(_Head):
     calibration: CalibrationRecord
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """An accepted calibration."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JudgedCalibration:
+    """A calibration with the verdict on it, accepted or not."""
 
-    names: Names
-    accepted: datetime
-    grade: Grade
-    record: Path  # folder of the swing that it comes from
-    images: tuple[int, ...]  # not excluded
     calibration: CalibrationRecord
+    grade: Grade
+    names: Names = field(default_factory=Names)  # empty if nobody accepted it
+    accepted: datetime | None = None
     origin: Origin | None = None  # None if neither it nor its swing states it
     reason: str = ""  # why it was accepted though it does not pass, by who did
     why: StoredMessage | None = None
@@ -168,13 +166,8 @@ class Result:
     supervisor: str = ""  # who approved it; empty if not needed
 
     @property
-    def is_simulated(self) -> bool:
-        """Whether it is of no real pen."""
-        return self.origin is Origin.SIMULATED
-
-    @property
     def nominal_tip(self) -> FloatArray | None:
-        """The tip by design that it was compared with, (3,), mm."""
+        """The tip by design that it was compared with, pen frame, (3,), mm."""
         nominal = self.calibration.nominal_tip_mm
         return None if nominal is None else np.array(nominal)
 
@@ -187,6 +180,21 @@ class Result:
     def uncertainty(self) -> FloatArray:
         """U (k = 2) of the tip along x, y and z, (3,), mm."""
         return np.array(self.calibration.expanded_uncertainty_mm)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Result(JudgedCalibration):
+    """An accepted calibration."""
+
+    names: Names
+    accepted: datetime
+    record: Path  # folder of the swing that it comes from
+    images: tuple[int, ...]  # not excluded
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it is of no real pen."""
+        return self.origin is Origin.SIMULATED
 
 
 def result_bytes(result: Result, record: str) -> bytes:

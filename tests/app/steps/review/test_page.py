@@ -424,7 +424,15 @@ def put_in_force(
     calibration = small_record({**tip, **entries})
     record = workbench.run.records_folder / "elsewhere"
     workbench.run.archive.store(
-        Result(names, THEN, Grade.PASS, record, (), calibration, origin)
+        Result(
+            names=names,
+            accepted=THEN,
+            grade=Grade.PASS,
+            record=record,
+            images=(),
+            calibration=calibration,
+            origin=origin,
+        )
     )
 
 

@@ -204,7 +204,11 @@ def test_retired_and_overdue_tips_are_known_by_their_data_folder(
     calibration = small_record()
     results.store(
         Result(
-            *(names, ACCEPTED, Grade.PASS, tmp_path / "records" / "swing", ()),
+            names=names,
+            accepted=ACCEPTED,
+            grade=Grade.PASS,
+            record=tmp_path / "records" / "swing",
+            images=(),
             calibration=calibration,
             origin=Origin.LIVE,
         )
@@ -240,7 +244,11 @@ def test_a_result_states_when_it_was_measured_and_when_it_is_due(
     results, calibration = FolderArchive(tmp_path), small_record()
     results.store(
         Result(
-            *(names, ACCEPTED, Grade.PASS, swing, ()),
+            names=names,
+            accepted=ACCEPTED,
+            grade=Grade.PASS,
+            record=swing,
+            images=(),
             calibration=calibration,
             origin=Origin.LIVE,
         )

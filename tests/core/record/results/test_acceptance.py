@@ -508,7 +508,16 @@ def _put_in_force(case: Case, tip: FloatArray, u: FloatArray) -> None:
         {"tip_pen_mm": tip.tolist(), "expanded_uncertainty_mm": u.tolist()}
     )
     earlier = case.records / "earlier"
-    case.archive.store(Result(names, NOON, Grade.PASS, earlier, (1, 2), calibration))
+    case.archive.store(
+        Result(
+            names=names,
+            accepted=NOON,
+            grade=Grade.PASS,
+            record=earlier,
+            images=(1, 2),
+            calibration=calibration,
+        )
+    )
 
 
 def test_a_swing_accepted_twice_has_one_result(case: Case) -> None:
