@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import in_shape
 
@@ -45,7 +44,6 @@ SMALL: Mapping[str, Any] = {
     "warnings": [],
     "uncertainty": {
         "shares": [],
-        **{f"{name.value.replace(' ', '_')}_mm": None for name in ContributionName},
         "independent_noise_mm": None,
         "blocks_mm": None,
         "block_ratio": 1.0,

@@ -104,7 +104,7 @@ class ContributionRecord(Struct, frozen=True):
 
 
 class UncertaintyRecord(Struct, frozen=True):
-    """The uncertainty budget; each contribution again by its name, k = 1.
+    """The uncertainty budget.
 
     Attributes
     ----------
@@ -131,16 +131,6 @@ class UncertaintyRecord(Struct, frozen=True):
     """
 
     shares: tuple[ContributionRecord, ...]
-    noise_mm: Triple | None
-    seat_mm: Triple | None
-    ball_and_cone_mm: Triple | None
-    drift_mm: Triple | None
-    led_geometry_mm: Triple | None
-    disc_diameter_mm: Triple | None
-    camera_mm: Triple | None
-    rig_mm: Triple | None
-    method_mm: Triple | None
-    lens_mm: Triple | None
     independent_noise_mm: Triple | None
     blocks_mm: Triple | None
     block_ratio: Number

@@ -47,7 +47,6 @@ from lightpen.estimation.reports.methods import (
 )
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.estimation.uncertainty.distance import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.estimation.uncertainty.second_cone import SecondCone
@@ -168,11 +167,6 @@ def _method(calibration: Calibration, name: Method) -> MethodRecord:
 
 def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
     budget, halves = reported(calibration).budget, calibration.halves
-    found = {share.name: share.standard_uncertainty for share in budget.shares}
-    by_name = {
-        f"{name.value.replace(' ', '_')}_mm": plain(found.get(name))
-        for name in ContributionName
-    }
 
     def std(covariance: FloatArray | None) -> FloatArray | None:
         return None if covariance is None else np.sqrt(np.diag(covariance)[:3])
@@ -187,7 +181,6 @@ def _uncertainty(calibration: Calibration) -> UncertaintyRecord:
             )
             for share in budget.shares
         ),
-        **by_name,
         independent_noise_mm=plain(std(budget.independent_noise)),
         blocks_mm=plain(std(budget.blocks)),
         block_ratio=plain(budget.block_ratio),
