@@ -22,7 +22,10 @@ def scene_of(around: SourceEnvironment) -> Scene:
 
 
 class FaultyCamera(SimulatedCamera):
-    """Can be unplugged, stall, be busy, and damage images, from any thread."""
+    """Can be unplugged, stall, be busy, and damage images, from any thread.
+
+    Images that are not read in time are lost.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -76,6 +79,12 @@ class FaultyCamera(SimulatedCamera):
         if self._next_end < self._stalled_until:
             self._next_end = self._stalled_until + self._period
         return super()._schedule_next()
+
+    @override
+    def _leave_out(self, n_frames: int) -> None:
+        super()._leave_out(n_frames)
+        self._next_seq += n_frames
+        self._stats = replace(self._stats, missed=self._stats.missed + n_frames)
 
     @override
     def _take_image(self) -> Frame:

@@ -15,7 +15,6 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.print_report.pages import PrintReport
 from lightpen_app.print_report.printing import A4, paint_on, pdf_of
 from lightpen_app.widgets.fitted_window import FittedWindow
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -52,16 +51,17 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         # Widgets
         self._printer = QPrinter(QPrinter.PrinterMode.HighResolution)
         self._printer.setPageLayout(A4)
-        self._pages = QPrintPreviewWidget(self._printer)
+        self._pages = self.say(QPrintPreviewWidget(self._printer), self.tr("Pages"))
         self._pages.setZoomMode(QPrintPreviewWidget.ZoomMode.FitToWidth)
         pages = self._pages.findChild(QGraphicsView)
         assert pages is not None  # else the width changes as the bar comes
         pages.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
-        self._smaller = PushButton()
-        self._larger = PushButton()
-        self._save = PushButton()
-        self._print = PushButton()
-        self._close, self._said = PushButton(), SignLabel()
+        self._smaller = self.make_button(self.tr("Smaller"))
+        self._larger = self.make_button(self.tr("Larger"))
+        self._save = self.make_button(self.tr("Save as PDF..."), self._ask_file)
+        self._print = self.make_button(self.tr("Print..."), self._ask_printer)
+        self._close = self.make_button(self.tr("Close"))
+        self._said = SignLabel()
 
         # Layout
         layout = vertical_layout(self, (self._pages, 1), self._said, margins=GRID)
@@ -72,8 +72,6 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
         self._pages.paintRequested.connect(partial(paint_on, report))
         self._smaller.clicked.connect(self._pages.zoomOut)
         self._larger.clicked.connect(self._pages.zoomIn)
-        self._save.clicked.connect(self._ask_file)
-        self._print.clicked.connect(self._ask_printer)
         self._close.clicked.connect(self.close)
         self.saved.connect(self._on_saved)
         self.failed.connect(self._on_failed)
@@ -92,12 +90,6 @@ class PrintReportWindow(FittedWindow, Translated, QWidget):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self._report.margins.title)
-        self._pages.setAccessibleName(self.tr("Pages"))
-        self._smaller.setText(self.tr("Smaller"))
-        self._larger.setText(self.tr("Larger"))
-        self._save.setText(self.tr("Save as PDF..."))
-        self._print.setText(self.tr("Print..."))
-        self._close.setText(self.tr("Close"))
 
     def _ask_file(self) -> None:
         path = self._place.folder() / f"{self._stem}.pdf"

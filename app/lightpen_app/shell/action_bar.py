@@ -38,7 +38,7 @@ class ActionBar(Translated, QFrame):
         # Widgets
         self._why_not = text_label(TextSize.BODY, Tone.WARN)
         self._status = text_label(TextSize.SMALL, Tone.QUIET)
-        self._back = PushButton()
+        self._back = self.make_button(self.tr("Back"), self.back_pressed)
         self._main = _MainButton(MAIN_WIDTH)
         self._main.setObjectName("main_button")
 
@@ -50,12 +50,10 @@ class ActionBar(Translated, QFrame):
         fill(self._layout, self._back, self._main)
 
         # Connections
-        self._back.clicked.connect(self.back_pressed)
         self._main.clicked.connect(self._on_main_clicked)
 
         self.set_room(SizeClass())
         self.set_status("")
-        self._retranslate()
 
     def set_action(self, action: MainAction, *, can_go_back: bool) -> None:
         """Show another main action."""
@@ -120,9 +118,6 @@ class ActionBar(Translated, QFrame):
     def _on_main_clicked(self) -> None:
         if self._guard.hasExpired():
             self.main_pressed.emit()
-
-    def _retranslate(self) -> None:
-        self._back.setText(self.tr("Back"))
 
 
 class _MainButton(PushButton):

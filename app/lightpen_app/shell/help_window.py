@@ -32,20 +32,19 @@ class HelpWindow(FittedWindow, Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent, Qt.WindowType.Window)
+        self.say(self, self.tr("Help"))
         self.setObjectName("help")
         self._key = ""
         self._language = SOURCE_LANGUAGE
         self.resize(80 * GRID, 90 * GRID)
 
         # Widgets
-        self._browser = QTextBrowser()
+        self._browser = self.say(QTextBrowser(), self.tr("Help"))
         self._browser.setOpenLinks(False)
         self._browser.anchorClicked.connect(self._on_anchor_clicked)
 
         # Layout
         vertical_layout(self, self._browser, margins=2 * GRID)
-
-        self._retranslate()
 
     def text(self) -> str:
         """Return the words shown."""
@@ -65,10 +64,6 @@ class HelpWindow(FittedWindow, Translated, QWidget):
 
     def _on_anchor_clicked(self, link: QUrl) -> None:
         self.set_topic(PurePosixPath(link.path()).stem, self._language)
-
-    def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Help"))
-        self._browser.setAccessibleName(self.tr("Help"))
 
 
 def _space_out(document: QTextDocument) -> None:

@@ -30,23 +30,28 @@ class OptionsMenu(Translated, QMenu):
         self._entries: list[tuple[QAction, MenuEntry]] = []
 
         # Widgets
-        self._languages = self._choice_menu(
-            "language", languages(), preferences.language
+        self._languages = self.say(
+            self._choice_menu("language", languages(), preferences.language),
+            self.tr("Language"),
         )
-        self._appearances = self._choice_menu(
-            "appearance", tuple(Appearance), preferences.appearance
+        self._appearances = self.say(
+            self._choice_menu("appearance", tuple(Appearance), preferences.appearance),
+            self.tr("Appearance"),
         )
-        self._distances = self._choice_menu(
-            "distance_m", tuple(map(float, DISTANCES_M)), preferences.distance_m
+        self._distances = self.say(
+            self._choice_menu(
+                "distance_m", tuple(map(float, DISTANCES_M)), preferences.distance_m
+            ),
+            self.tr("Viewing distance"),
         )
-        self.mute_action = QAction(self)  # its key works in all windows it is added to
+        self.mute_action = self.say(QAction(self), self.tr("Mute sounds"))
         self.mute_action.setCheckable(True)
         self.mute_action.setChecked(preferences.muted)
         self.mute_action.setShortcut(Qt.Key.Key_B)
         self.addAction(self.mute_action)
         self.addSeparator()
-        self._data_folder = self.addAction("")
-        self._about = self.addAction("")
+        self._data_folder = self.say(self.addAction(""), self.tr("Data folder..."))
+        self._about = self.say(self.addAction(""), self.tr("About Lightpen"))
 
         # Connections
         self.mute_action.toggled.connect(lambda muted: self._choose(muted=muted))
@@ -106,12 +111,6 @@ class OptionsMenu(Translated, QMenu):
         return self.tr("{0} m").format(f"{value:g}")
 
     def _retranslate(self) -> None:
-        self._languages.setTitle(self.tr("Language"))
-        self._appearances.setTitle(self.tr("Appearance"))
-        self._distances.setTitle(self.tr("Viewing distance"))
-        self.mute_action.setText(self.tr("Mute sounds"))
-        self._data_folder.setText(self.tr("Data folder..."))
-        self._about.setText(self.tr("About Lightpen"))
         for action, entry in self._entries:
             action.setText(entry.text())
         for action, value in self._choices:

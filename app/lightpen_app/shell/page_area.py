@@ -6,7 +6,6 @@ from PySide6.QtWidgets import QBoxLayout, QFrame, QSizePolicy, QStackedWidget, Q
 from lightpen_app.look.announcements import announce
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import SizeClass
 from lightpen_app.widgets.translated import Translated
 
@@ -28,7 +27,7 @@ class NoticeBar(Translated, QFrame):
         # Widgets
         self._text = text_label(TextSize.BODY)
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._close = PushButton()
+        self._close = self.make_button(self.tr("Close"), self.clear)
 
         # Layout
         margins = (2 * GRID, GRID, GRID, GRID)
@@ -36,10 +35,6 @@ class NoticeBar(Translated, QFrame):
             self, (self._text, 1), self._close, spacing=2 * GRID, margins=margins
         )
 
-        # Connections
-        self._close.clicked.connect(self.clear)
-
-        self._retranslate()
         self.hide()
 
     def text(self) -> str:
@@ -88,9 +83,6 @@ class NoticeBar(Translated, QFrame):
             "Choose the data folder at Set up station or in the options (F10).",
         )
         return f"{text} {way}"
-
-    def _retranslate(self) -> None:
-        self._close.setText(self.tr("Close"))
 
 
 class PageArea(QFrame):

@@ -65,7 +65,7 @@ class Sidebar(Translated, QFrame):
         self._room = SizeClass()
 
         # Widgets
-        self._name = text_label(TextSize.LEAD)
+        self._name = self.say(text_label(TextSize.LEAD), self.tr("Pen tip calibration"))
         self._subject = text_label(TextSize.SMALL, Tone.QUIET)
         self._origin = SignLabel()
         self._status = SignLabel()
@@ -177,7 +177,6 @@ class Sidebar(Translated, QFrame):
 
     def _retranslate(self) -> None:
         self._show_subject()
-        self._name.setText(self.tr("Pen tip calibration"))
         for button, text, key in (
             (self._operator_view, self.tr("Operator view"), "F11"),
             (self._help, self.tr("Help"), "F1"),

@@ -199,10 +199,10 @@ class StepList(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Steps"))
         self._buttons: list[StepButton] = []
         self._is_narrow = False
         self._layout = vertical_layout(self, spacing=GRID // 2)
-        self._retranslate()
 
     def steps(self) -> tuple[Step, ...]:
         """Return the steps shown."""
@@ -233,7 +233,3 @@ class StepList(Translated, QWidget):
             button = self._buttons.pop()
             self._layout.removeWidget(button)
             button.deleteLater()
-
-    @override
-    def _retranslate(self) -> None:
-        self.setAccessibleName(self.tr("Steps"))

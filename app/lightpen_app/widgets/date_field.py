@@ -5,7 +5,6 @@ from datetime import date
 from PySide6.QtCore import Signal
 
 from lightpen_app.look.theme import Tone, set_tone
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.translated import Translated
 
@@ -23,13 +22,12 @@ class DateField(Translated, EnterEdit):
     def __init__(self, example: date = EXAMPLE) -> None:
         super().__init__()
         self._value: date | None = None
-        self._example = example
         self.setPlaceholderText(f"{example}")
+        words = self.tr("Date, for example {0}; empty for any date")
+        self.say(self, tip=words.format(example))
 
         # Connections
         self.textChanged.connect(self._on_text_changed)
-
-        self._retranslate()
 
     def value(self) -> date | None:
         """Return the day; None for any."""
@@ -49,9 +47,3 @@ class DateField(Translated, EnterEdit):
         set_tone(self, Tone.BAD if is_wrong else Tone.PLAIN)
         if self._value != before:
             self.value_changed.emit()
-
-    def _retranslate(self) -> None:
-        set_tooltip(
-            self,
-            self.tr("Date, for example {0}; empty for any date").format(self._example),
-        )

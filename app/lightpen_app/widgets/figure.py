@@ -5,7 +5,16 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TypeAlias
 
-from PySide6.QtCore import QBuffer, QByteArray, QPoint, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import (
+    QBuffer,
+    QByteArray,
+    QEvent,
+    QPoint,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -13,6 +22,7 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.formats.csv_cells import csv_table
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
+from lightpen_app.widgets.translated import anew
 
 PNG_SCALE = 2
 MARK_HEIGHT = 3 * GRID  # px, below a saved plot
@@ -40,11 +50,18 @@ class Figure(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def set_axes(self, axes: Axes) -> None:
-        """Change the words, as when the language changes."""
+        """Change the words; they follow the language."""
         self._axes = axes
         self.setAccessibleName(axes.title)
         self._restyle()
         self.titled.emit()
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            now = self._axes
+            self.set_axes(Axes(anew(now.title), anew(now.x), anew(now.y)))
 
     def png(self, mark: str = "") -> bytes:
         """Return the plot, with a mark below it, as a picture at twice the size."""

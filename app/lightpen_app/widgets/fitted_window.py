@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
-from lightpen_app.widgets.translated import WidgetMixin
+from lightpen_app.widgets.keys import WidgetMixin
 
 # Of a window, at most; not known before it is shown.
 SIDE, TITLE_BAR = GRID // 2, 4 * GRID

@@ -62,6 +62,7 @@ class ImageView(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Live image"))
         self._buffer: Image | None = None  # keeps the memory of _shown alive
         self._shown = QImage()
         self._size = QSize()
@@ -299,7 +300,6 @@ class ImageView(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self.setAccessibleName(self.tr("Live image"))
         self.setAccessibleDescription(self._message if self._shown.isNull() else "")
 
     def _show(

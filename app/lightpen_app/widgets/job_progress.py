@@ -8,7 +8,6 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.look.time_left import TimeLeft
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 STEPS = 1000
@@ -28,8 +27,8 @@ class JobProgress(Translated, QWidget):
         self._is_running = False
 
         # Widgets
-        self._bar = QProgressBar(maximum=STEPS)
-        self._cancel = PushButton()
+        self._bar = self.say(QProgressBar(maximum=STEPS), self.tr("Progress"))
+        self._cancel = self.make_button(self.tr("Cancel"), self._on_cancel_clicked)
         self._patience = QTimer(self, singleShot=True, interval=patience_ms)
 
         # Layout
@@ -37,10 +36,7 @@ class JobProgress(Translated, QWidget):
         self.hide()
 
         # Connections
-        self._cancel.clicked.connect(self._on_cancel_clicked)
         self._patience.timeout.connect(self.show)
-
-        self._retranslate()
 
     @property
     def is_running(self) -> bool:
@@ -91,7 +87,3 @@ class JobProgress(Translated, QWidget):
     def _on_cancel_clicked(self) -> None:
         self.end()
         self.cancelled.emit()
-
-    def _retranslate(self) -> None:
-        self._bar.setAccessibleName(self.tr("Progress"))
-        self._cancel.setText(self.tr("Cancel"))

@@ -52,6 +52,7 @@ class OperatorView(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__(None, Qt.WindowType.Window)
+        self.say(self, self.tr("Operator view"))
         self._value = OperatorValue()
         self._distance_m = 3.0
         self.setAutoFillBackground(True)
@@ -196,7 +197,6 @@ class OperatorView(Translated, QWidget):
             widget.setFixedHeight(min(widget.sizeHint().height(), room))
 
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Operator view"))
         self._show_keys()
 
     def _show_keys(self) -> None:

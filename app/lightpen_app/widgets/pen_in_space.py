@@ -43,6 +43,7 @@ class PenInSpace(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("The pen in space"))
         self._value: DisplayedPosture | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._retranslate()
@@ -93,7 +94,6 @@ class PenInSpace(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self.setAccessibleName(self.tr("The pen in space"))
         set_tooltip(
             self, self.tr("Current tilt of the pen and outline of the target posture")
         )

@@ -82,6 +82,7 @@ class PenView(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("The LEDs in space"))
         self._value = PenPicture()
         self._chosen = 0
         self._yaw, self._pitch = START_YAW, START_PITCH
@@ -360,7 +361,6 @@ class PenView(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self.update()
-        self.setAccessibleName(self.tr("The LEDs in space"))
         pen = self._value.pen
         n_leds = 0 if pen is None else pen.n_leds
         self.setAccessibleDescription(self.tr("{0} LEDs").format(n_leds))

@@ -7,7 +7,7 @@ from PySide6.QtGui import QResizeEvent
 from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
-from lightpen_app.widgets.translated import WidgetMixin
+from lightpen_app.widgets.keys import WidgetMixin
 
 
 @dataclass(frozen=True)

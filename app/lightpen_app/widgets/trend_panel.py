@@ -131,11 +131,13 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
         self._text.setText(self._text_of(trend))
 
     def _make_plots(self) -> None:
-        self._plots = tuple(TrendPlot(Axes(axis)) for axis in (*AXES, "U"))
+        of_axis = self.tr("{0} / mm with U (k = 2)")
+        titles = *map(of_axis.format, AXES), self.tr("Largest U (k = 2) / mm")
+        number = self.tr("calibration no.")
+        self._plots = tuple(TrendPlot(Axes(title, number)) for title in titles)
         for plot in self._plots:
             plot.setMinimumHeight(LEAST_HEIGHT)
         self._use_room()
-        self._retranslate()
 
     def _show(self, trend: Trend) -> None:
         tips = np.array([tip.tip_pen for tip in trend.tips]).reshape(-1, 3)
@@ -167,12 +169,6 @@ class TrendPanel(ResponsiveLayout, Translated, QWidget):
             self._grid.addWidget(plot, *divmod(i, n_columns))
 
     def _retranslate(self) -> None:
-        for axis, plot in zip(AXES, self._plots, strict=False):
-            title = self.tr("{0} / mm with U (k = 2)").format(axis)
-            plot.set_axes(Axes(title, self.tr("calibration no.")))
-        for plot in self._plots[3:]:
-            title = self.tr("Largest U (k = 2) / mm")
-            plot.set_axes(Axes(title, self.tr("calibration no.")))
         self._text.setText(self._text_of(self._value))
 
     def _text_of(self, trend: Trend) -> str:

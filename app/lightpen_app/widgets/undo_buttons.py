@@ -7,7 +7,6 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.layouts import horizontal_layout
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 
@@ -39,8 +38,8 @@ class UndoButtons(Translated, QWidget):
         self._why_locked = ""
 
         # Widgets
-        self._undo = PushButton(0)
-        self._redo = PushButton(0)
+        self._undo = self.make_button(self.tr("Undo"), least_width=0)
+        self._redo = self.make_button(self.tr("Redo"), least_width=0)
 
         # Layout
         horizontal_layout(self, (self._undo, 1), (self._redo, 1))
@@ -88,8 +87,6 @@ class UndoButtons(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._undo.setText(self.tr("Undo"))
-        self._redo.setText(self.tr("Redo"))
         self._refresh()
 
 

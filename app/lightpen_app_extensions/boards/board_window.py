@@ -12,7 +12,6 @@ from typing_extensions import override
 from lightpen.errors import UsageError
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_field import is_refusing
@@ -58,6 +57,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self, live: LiveView, place: SavePlace, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
+        self.say(self, self.tr("Camera calibration"))
         self.setObjectName("board")
         self.resize(150 * GRID, 90 * GRID)
         self._live, self._place = live, place
@@ -69,20 +69,35 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._remark, self._progress = SignLabel(), JobProgress()
         self.board = BoardForm()
         self._begin = PushButton()
-        self._folder = PushButton()
-        self._compute = PushButton()
+        self._folder = self.make_button(
+            self.tr("From a folder..."), self._on_folder_clicked
+        )
+        self._compute = self.make_button(self.tr("Calibrate"))
         self._count = text_label(TextSize.BODY)
         self._facts = text_label(TextSize.BODY)
-        self._shows_residuals = PushButton(checkable=True)
-        self._shows_uncertainty = PushButton(checkable=True)
+        self._shows_residuals = self.say(
+            PushButton(checkable=True), self.tr("Residuals")
+        )
+        self._shows_uncertainty = self.say(
+            PushButton(checkable=True),
+            self.tr("Uncertainty"),
+            tip=self.tr(
+                "Standard uncertainty of the projection of a point due to the "
+                "intrinsics, over the image / px"
+            ),
+        )
         for button in (self._shows_residuals, self._shows_uncertainty):
             button.setAutoExclusive(True)
         self._shows_residuals.setChecked(True)
-        self._worst_title = text_label(TextSize.SMALL, Tone.QUIET)
-        self._worst = QListWidget()
-        self._remove = PushButton()
+        self._worst_title = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Views (worst first)")
+        )
+        self._worst = self.say(QListWidget(), self.tr("Views (worst first)"))
+        self._remove = self.make_button(
+            self.tr("Exclude view and recalibrate"), self._on_remove_clicked
+        )
         self._outcome = QWidget()
-        self._save = PushButton()
+        self._save = self.make_button(self.tr("Save and use..."), self._on_save_clicked)
 
         # Layout
         panel = QWidget()
@@ -120,10 +135,7 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._calibration.saved.connect(self.saved)
         self._calibration.concluded.connect(self.concluded)
         self._begin.clicked.connect(self._on_begin_clicked)
-        self._folder.clicked.connect(self._on_folder_clicked)
         self._compute.clicked.connect(self._calibration.calibrate_by_capture)
-        self._remove.clicked.connect(self._on_remove_clicked)
-        self._save.clicked.connect(self._on_save_clicked)
         self._worst.currentRowChanged.connect(self._refresh)
         self._shows_residuals.toggled.connect(self._refresh)
 
@@ -232,22 +244,6 @@ class BoardWindow(FittedWindow, Translated, QWidget):
         self._worst.setCurrentRow(chosen)
 
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Camera calibration"))
-        self._folder.setText(self.tr("From a folder..."))
-        self._compute.setText(self.tr("Calibrate"))
-        self._worst_title.setText(self.tr("Views (worst first)"))
-        self._worst.setAccessibleName(self.tr("Views (worst first)"))
-        self._shows_residuals.setText(self.tr("Residuals"))
-        self._shows_uncertainty.setText(self.tr("Uncertainty"))
-        set_tooltip(
-            self._shows_uncertainty,
-            self.tr(
-                "Standard uncertainty of the projection of a point due to the "
-                "intrinsics, over the image / px"
-            ),
-        )
-        self._remove.setText(self.tr("Exclude view and recalibrate"))
-        self._save.setText(self.tr("Save and use..."))
         self._list_views()
         self._refresh()
 

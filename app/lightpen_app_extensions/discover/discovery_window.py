@@ -56,6 +56,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent, Qt.WindowType.Window)
+        self.say(self, self.tr("Find pen and camera"))
         self.setObjectName("discovery")
         self.resize(150 * GRID, 96 * GRID)
         self._workbench = workbench
@@ -75,7 +76,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self._names = [text_label(TextSize.BODY) for _ in range(3)]
         self._compute = PushButton()
         self._facts = text_label(TextSize.BODY)
-        self._save = PushButton()
+        self._save = self.make_button(self.tr("Save both files and calibrate the tip"))
         self._u.set_value(USUAL_U)
         self._disc.set_value(DISC_DIAMETER)
 
@@ -165,9 +166,7 @@ class DiscoveryWindow(FittedWindow, Translated, QWidget):
         self.close()
 
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Find pen and camera"))
         self._image.set_message(self.tr("No image"))
-        self._save.setText(self.tr("Save both files and calibrate the tip"))
         self._length.set_empty_text(self.tr("Not specified"))
         for label, name in zip(
             self._names,

@@ -8,7 +8,6 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
@@ -43,18 +42,38 @@ class StreamDialog(FittedWindow, Translated, QDialog):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.say(self, self.tr("Live stream"))
         self._state = StreamState()
 
         # Widgets
-        self._lead = text_label(TextSize.BODY)
-        self._on = QCheckBox()
-        self._address = ChoiceField()
+        self._lead = self.say(
+            text_label(TextSize.BODY),
+            self.tr(
+                "Sends pose and tip live by OpenIGTLink to other programs such as "
+                "3D Slicer."
+            ),
+        )
+        self._on = self.say(QCheckBox(), self.tr("Stream pose and tip"))
+        self._address = self.say(
+            ChoiceField(),
+            self.tr("Address"),
+            tip=self.tr(
+                "{0} for this computer only, {1} for all networks, or an address of "
+                "this computer."
+            ).format(LOOPBACK, EVERYWHERE),
+        )
         self._address.setEditable(True)
         self._address.addItems([LOOPBACK, EVERYWHERE])
-        self._port = NumberField("", (FIRST_PORT, LAST_PORT), 0)
-        self._address_label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._port = self.say(
+            NumberField("", (FIRST_PORT, LAST_PORT), 0), self.tr("Port")
+        )
+        self._address_label = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Address")
+        )
         self._address_label.setBuddy(self._address)
-        self._port_label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._port_label = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Port")
+        )
         self._port_label.setBuddy(self._port)
         self._reach = SignLabel()
         self._state_label = SignLabel()
@@ -133,25 +152,6 @@ class StreamDialog(FittedWindow, Translated, QDialog):
 
     @override
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Live stream"))
-        self._lead.setText(
-            self.tr(
-                "Sends pose and tip live by OpenIGTLink to other programs such as "
-                "3D Slicer."
-            )
-        )
-        self._address_label.setText(self.tr("Address"))
-        self._address.setAccessibleName(self.tr("Address"))
-        set_tooltip(
-            self._address,
-            self.tr(
-                "{0} for this computer only, {1} for all networks, or an address of "
-                "this computer."
-            ).format(LOOPBACK, EVERYWHERE),
-        )
-        self._port_label.setText(self.tr("Port"))
-        self._port.setAccessibleName(self.tr("Port"))
-        self._on.setText(self.tr("Stream pose and tip"))
         close = QDialogButtonBox.StandardButton.Close
         self._buttons.button(close).setText(self.tr("Close"))
         self._refresh()

@@ -57,7 +57,7 @@ class SimulatedCamera:
     """A camera with a simulated operator and pen in view.
 
     With a `SkippingClock` images come as fast as they are made, and waits for its
-    reader; else it is a live camera, which loses images that are not read in time.
+    reader; else a busy computer gets fewer images.
 
     Parameters
     ----------
@@ -244,13 +244,12 @@ class SimulatedCamera:
         """Return the end of the exposure of the next image, s."""
         n_late = ceil((self._now - self._next_end) / self._period - N_BUFFERED)
         if n_late > 0:
-            self._lose(n_late)
-            self._next_end += n_late * self._period
+            self._leave_out(n_late)
         return self._next_end
 
-    def _lose(self, n_frames: int) -> None:
-        self._next_seq += n_frames
-        self._stats = replace(self._stats, missed=self._stats.missed + n_frames)
+    def _leave_out(self, n_frames: int) -> None:
+        """Make no images of a time that is over; they are not lost on any way."""
+        self._next_end += n_frames * self._period
 
     def _take_image(self) -> Frame:
         end = self._next_end

@@ -285,7 +285,7 @@ def test_the_budget_is_sorted_and_says_what_is_assumed_and_the_limit(
         (ContributionName.FORM, 0.004, True),
         (ContributionName.CAMERA, 0.0, False),
     )
-    plot = BudgetPlot()
+    plot = BudgetPlot(Axes(""))
     show(qtbot, plot)
 
     plot.set_value(budget_figure(shares, 0.005, 0.012))
@@ -307,7 +307,7 @@ def test_the_budget_is_sorted_and_says_what_is_assumed_and_the_limit(
 
 
 def test_the_bars_of_a_budget_are_as_long_as_their_values(qtbot: QtBot) -> None:
-    plot = BudgetPlot()
+    plot = BudgetPlot(Axes(""))
     show(qtbot, plot)
     shares = ((ContributionName.NOISE, 0.001, False),)
 

@@ -22,6 +22,7 @@ class ExposureBar(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("LED exposure"))
         self._value = Exposure()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._retranslate()
@@ -113,7 +114,6 @@ class ExposureBar(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self.update()
-        self.setAccessibleName(self.tr("LED exposure"))
         self.setAccessibleDescription(self.verdict())
         set_tooltip(self, self.levels())
 

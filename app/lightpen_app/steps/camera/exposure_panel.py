@@ -41,11 +41,13 @@ class ExposurePanel(Translated, QFrame):
         # Widgets
         self._bar = ExposureBar()
         self._advice = text_label(TextSize.SMALL, Tone.QUIET)
-        self._exposure_name = QLabel()
-        self._exposure = SettingField("ms", (0.01, 1000.0), 2)
+        self._exposure_name = self.say(QLabel(), self.tr("E&xposure"))
+        self._exposure = self.say(
+            SettingField("ms", (0.01, 1000.0), 2), self.tr("Exposure")
+        )
         self._exposure_name.setBuddy(self._exposure)
-        self._gain_name = QLabel()
-        self._gain = SettingField("dB", (0.0, 48.0), 1)
+        self._gain_name = self.say(QLabel(), self.tr("&Gain"))
+        self._gain = self.say(SettingField("dB", (0.0, 48.0), 1), self.tr("Gain"))
         self._exposure.setMinimumWidth(EXPOSURE_WIDTH)
         self._gain.setMinimumWidth(GAIN_WIDTH)
         self._gain_name.setBuddy(self._gain)
@@ -118,10 +120,6 @@ class ExposurePanel(Translated, QFrame):
         return adjustment is not None and adjustment.outcome is ExposureState.ADJUSTING
 
     def _retranslate(self) -> None:
-        self._exposure_name.setText(self.tr("E&xposure"))
-        self._exposure.setAccessibleName(self.tr("Exposure"))
-        self._gain_name.setText(self.tr("&Gain"))
-        self._gain.setAccessibleName(self.tr("Gain"))
         for field in (self._exposure, self._gain):
             set_tooltip(
                 field,
@@ -234,7 +232,12 @@ class FocusPanel(Translated, QFrame):
         self._is_saturated = self._is_recorded = False
 
         # Widgets
-        self._meter = FocusMeter()
+        self._meter = self.say(
+            FocusMeter(),
+            tip=self.tr(
+                "Edge width of the LEDs from dark to bright. Hold the pen still."
+            ),
+        )
         self._hint = text_label(TextSize.SMALL, Tone.QUIET)
         self._hint.setAlignment(Qt.AlignmentFlag.AlignTop)
 
@@ -275,7 +278,3 @@ class FocusPanel(Translated, QFrame):
 
     def _retranslate(self) -> None:
         self._refresh()
-        set_tooltip(
-            self._meter,
-            self.tr("Edge width of the LEDs from dark to bright. Hold the pen still."),
-        )

@@ -31,6 +31,7 @@ class FocusMeter(Translated, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Edge width of the LEDs"))
         self._value: tuple[float, ...] = ()
         self._is_saturated = False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -143,5 +144,4 @@ class FocusMeter(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self.update()
-        self.setAccessibleName(self.tr("Edge width of the LEDs"))
         self.setAccessibleDescription(f"{self.verdict()} {self.number()}".strip())

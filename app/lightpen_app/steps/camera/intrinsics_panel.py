@@ -14,10 +14,8 @@ from lightpen_app.look.quantities import MAX_DECIMALS, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -35,6 +33,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
     def __init__(self, can_calibrate: bool = True, can_discover: bool = True) -> None:
         super().__init__()
+        self.say(self, self.tr("Intrinsics of camera and lens"))
         self._file: CameraFile | None = None
         self._image_size: tuple[int, int] | None = None
         self._serial = ""
@@ -42,11 +41,19 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
         # Widgets
         self._path = PathField()
-        self._open = PushButton()
+        self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
-        self._part = PushButton()
-        self._calibrate = PushButton()
-        self._discover = PushButton()
+        self._part = self.make_button(
+            self.tr("Binned or cropped images..."), self.part_requested
+        )
+        self._calibrate = self.make_button(
+            self.tr("Calibrate camera..."), self.calibration_requested
+        )
+        self._discover = self.make_button(
+            self.tr("I have no such file..."),
+            self.discovery_requested,
+            tip=self.tr("Find pen, camera and tip by one swing and one length."),
+        )
         if not can_calibrate:
             self._calibrate.hide()
         if not can_discover:
@@ -80,10 +87,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
         # Connections
         self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
-        self._open.clicked.connect(self._on_open_clicked)
-        self._part.clicked.connect(self.part_requested)
-        self._calibrate.clicked.connect(self.calibration_requested)
-        self._discover.clicked.connect(self.discovery_requested)
 
         self._retranslate()
 
@@ -131,18 +134,9 @@ class IntrinsicsPanel(Translated, QGroupBox):
         )
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Intrinsics of camera and lens"))
         edit = self._path.edit
         edit.setAccessibleName(self.tr("Intrinsics file"))
         edit.setPlaceholderText(self.tr("Intrinsics file"))
-        self._open.setText(self.tr("Open..."))
-        self._part.setText(self.tr("Binned or cropped images..."))
-        self._calibrate.setText(self.tr("Calibrate camera..."))
-        self._discover.setText(self.tr("I have no such file..."))
-        set_tooltip(
-            self._discover,
-            self.tr("Find pen, camera and tip by one swing and one length."),
-        )
         for label, name in zip(
             self._names,
             (

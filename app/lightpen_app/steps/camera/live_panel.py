@@ -62,7 +62,12 @@ class LivePanel(Translated, QWidget):
         self._figures.setSizePolicy(
             QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred
         )
-        self.view = ImageView()
+        self.view = self.say(
+            ImageView(),
+            tip=self.tr(
+                "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
+            ),
+        )
 
         # Layout
         layout = vertical_layout(self, (self._switch, 0, Qt.AlignmentFlag.AlignLeft))
@@ -146,12 +151,6 @@ class LivePanel(Translated, QWidget):
         set_tooltip(self._figures, PARTED.join(self._parts))
 
     def _retranslate(self) -> None:
-        set_tooltip(
-            self.view,
-            self.tr(
-                "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
-            ),
-        )
         self._refresh()
 
     def _refresh(self) -> None:

@@ -11,7 +11,6 @@ from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -26,6 +25,7 @@ class RigPanel(Translated, QGroupBox):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Two cameras"))
         self._file: RigFile | None = None
         self._late: Message | None = None
         self._n_unpaired: int | None = None
@@ -33,7 +33,7 @@ class RigPanel(Translated, QGroupBox):
         # Widgets
         self._second = QCheckBox()
         self._path = PathField()
-        self._open = PushButton()
+        self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
         self._problem = SignLabel()
         self._remark_label = SignLabel()
@@ -52,7 +52,6 @@ class RigPanel(Translated, QGroupBox):
         # Connections
         self._second.toggled.connect(self._on_toggled)
         self._path.path_chosen.connect(self.path_chosen)
-        self._open.clicked.connect(self._on_open_clicked)
         FileDrops(self).dropped.connect(self._path.take)
 
         self._retranslate()
@@ -102,14 +101,12 @@ class RigPanel(Translated, QGroupBox):
         )
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Two cameras"))
         asked = self.tr("Use a second camera")
         self._second.setText(asked)
         self._second.setAccessibleName(asked)
         edit = self._path.edit
         edit.setAccessibleName(self.tr("Rig file"))
         edit.setPlaceholderText(self.tr("Rig file"))
-        self._open.setText(self.tr("Open..."))
         self._refresh()
 
     def _refresh(self) -> None:

@@ -14,11 +14,9 @@ from lightpen.cameras.protocol import (
 )
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.theme import TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, on_one_line
 from lightpen_app.steps.camera.setting_field import SettingField
 from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -33,28 +31,47 @@ class SettingsPanel(Translated, QGroupBox):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Camera settings"))
         self._capabilities: CameraCapabilities | None = None
         self._settings = CameraSettings()
         self._stats = Stats()
 
         # Widgets
-        self._rate_name = QLabel()
         self._rate = SettingField("", (0.1, 1000.0), 1)
-        self._format_name = QLabel()
-        self._format = ChoiceField()
-        self._trigger_name = QLabel()
-        self._trigger = ChoiceField()
-        self._packet_name = QLabel()
+        self._rate_name = self.make_label(self._rate, self.tr("Frame rate"))
+        self._format, self._trigger = ChoiceField(), ChoiceField()
+        self._format_name = self.make_label(self._format, self.tr("Pixel format"))
+        self._trigger_name = self.make_label(self._trigger, self.tr("Trigger"))
         self._packet = SettingField("B", (0, LARGEST), 0)
-        self._size_name = QLabel()
+        self._packet_name = self.make_label(
+            self._packet,
+            self.tr("Packet size"),
+            tip=self.tr(
+                "Larger packets reduce the computer load. Network card and switches "
+                "must support them (jumbo frames)."
+            ),
+        )
         self._width = SettingField("px", (1, LARGEST), 0)
-        self._height = SettingField("px", (1, LARGEST), 0)
-        self._place_name = QLabel()
+        self._size_name = self.make_label(self._width, self.tr("Region width"))
+        self.say(self._size_name, self.tr("Region"))
+        self._height = self.say(
+            SettingField("px", (1, LARGEST), 0), self.tr("Region height")
+        )
         self._x = SettingField("px", (0, LARGEST), 0)
-        self._y = SettingField("px", (0, LARGEST), 0)
-        self._whole = PushButton()
+        self._place_name = self.make_label(self._x, self.tr("Region from left"))
+        self.say(self._place_name, self.tr("from left, top"))
+        self._y = self.say(
+            SettingField("px", (0, LARGEST), 0), self.tr("Region from top")
+        )
+        self._whole = self.make_button(self.tr("Whole sensor"), self._on_whole_clicked)
         self._hint = SignLabel()
-        self._counts = text_label(TextSize.SMALL, Tone.QUIET)
+        self._counts = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET),
+            tip=self.tr(
+                "Images of this camera: received; incomplete and discarded; lost; "
+                "not processed because the computer was too slow."
+            ),
+        )
 
         # Layout
         rows: tuple[tuple[QWidget, ...], ...] = (
@@ -84,7 +101,6 @@ class SettingsPanel(Translated, QGroupBox):
         self._trigger.activated.connect(self._on_trigger_chosen)
         for field in (self._width, self._height, self._x, self._y):
             field.value_changed.connect(self._on_region_edited)
-        self._whole.clicked.connect(self._on_whole_clicked)
 
         self._retranslate()
         self.set_camera(None, CameraSettings())
@@ -215,39 +231,7 @@ class SettingsPanel(Translated, QGroupBox):
             self._trigger.setItemText(index, words[mode])
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Camera settings"))
-        named: tuple[tuple[QLabel, QWidget, str], ...] = (
-            (self._rate_name, self._rate, self.tr("Frame rate")),
-            (self._format_name, self._format, self.tr("Pixel format")),
-            (self._trigger_name, self._trigger, self.tr("Trigger")),
-            (self._packet_name, self._packet, self.tr("Packet size")),
-            (self._size_name, self._width, self.tr("Region width")),
-            (self._place_name, self._x, self.tr("Region from left")),
-        )
-        for label, field, name in named:
-            label.setText(name)
-            label.setBuddy(field)
-            field.setAccessibleName(name)
-        self._size_name.setText(self.tr("Region"))
-        self._place_name.setText(self.tr("from left, top"))
-        self._height.setAccessibleName(self.tr("Region height"))
-        self._y.setAccessibleName(self.tr("Region from top"))
-        self._whole.setText(self.tr("Whole sensor"))
-        set_tooltip(
-            self._counts,
-            self.tr(
-                "Images of this camera: received; incomplete and discarded; lost; "
-                "not processed because the computer was too slow."
-            ),
-        )
         self._rate.set_unit(self.tr("fps"))
         self._retranslate_counts()
-        set_tooltip(
-            self._packet,
-            self.tr(
-                "Larger packets reduce the computer load. Network card and switches "
-                "must support them (jumbo frames)."
-            ),
-        )
         self._retranslate_triggers()
         self._hint.set_value(self._format_hint())

@@ -52,7 +52,7 @@ class SourcePanel(Translated, QGroupBox):
         self._outcome: Callable[[], StatusMessage] = StatusMessage
 
         # Widgets
-        self._kind = ChoiceField()
+        self._kind = self.say(ChoiceField(), hint=self.tr("Choose your camera"))
         # No wider than its neighbours, however long its words.
         self._kind.setSizeAdjustPolicy(
             ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -61,22 +61,30 @@ class SourcePanel(Translated, QGroupBox):
         for _ in self._sources:
             self._kind.addItem("")
         self._place = PathField()
-        self._pick = PushButton()
+        self._pick = self.make_button(self.tr("Open..."))
         self._pick.setProperty("menu", True)
         self._place.add_button(self._pick)
         menu = QMenu(self._pick)
-        self._folder = menu.addAction("")
-        self._file = menu.addAction("")
+        self._folder = self.say(menu.addAction(""), self.tr("Folder or record..."))
+        self._file = self.say(menu.addAction(""), self.tr("Video..."))
         self._pick.setMenu(menu)
         self._producer = PathField()
-        self._open_producer = PushButton()
+        self._open_producer = self.make_button(
+            self.tr("Open..."), self._on_open_producer_clicked
+        )
         self._producer.add_button(self._open_producer)
         self._device = DeviceField()
-        self._search = PushButton()
+        self._search = self.make_button(self.tr("Search"), self.search_requested)
         self._remark_label = SignLabel()
         self._offers = QWidget()  # the cameras found, before a source is chosen
-        self._samples = PushButton()
-        self._retry = PushButton()
+        self._samples = self.make_button(
+            self.tr("Use its files"),
+            self.samples_requested,
+            tip=self.tr(
+                "Use the intrinsics file and the LED file of the simulated pen."
+            ),
+        )
+        self._retry = self.make_button(self.tr("Try again"), self.retry_requested)
         self._beside = FilesBeside()
         self._found = SignLabel()
         self._use_found = PushButton()
@@ -95,14 +103,10 @@ class SourcePanel(Translated, QGroupBox):
         self._place.value_changed.connect(self._on_place_changed)
         self._device.value_changed.connect(self._on_place_changed)
         self._producer.value_changed.connect(self._on_producer_changed)
-        self._open_producer.clicked.connect(self._on_open_producer_clicked)
         self._folder.triggered.connect(self._on_folder_triggered)
         self._file.triggered.connect(self._on_file_triggered)
-        self._search.clicked.connect(self.search_requested)
         self._use_found.clicked.connect(self._on_use_found_clicked)
         FileDrops(self).dropped.connect(self._on_dropped)
-        self._samples.clicked.connect(self.samples_requested)
-        self._retry.clicked.connect(self.retry_requested)
 
         self._retranslate()
         self.set_faulty(False)
@@ -306,26 +310,14 @@ class SourcePanel(Translated, QGroupBox):
             if source.key in self._absent:
                 name = self.tr("{0} - not installed").format(name)
             self._kind.setItemText(index, name)
-        self._kind.setPlaceholderText(self.tr("Choose your camera"))
         self._kind.setAccessibleName(title)
         # On Linux the accessible name of a drop-down list is its current choice.
         self._kind.setAccessibleDescription(title)
         edit = self._place.edit
         edit.setAccessibleName(self.tr("Folder, record or video"))
         edit.setPlaceholderText(self.tr("Folder, record or video"))
-        self._pick.setText(self.tr("Open..."))
-        self._folder.setText(self.tr("Folder or record..."))
-        self._file.setText(self.tr("Video..."))
         producer = self._producer.edit
         producer.setAccessibleName(self.tr("GenTL producer"))
         producer.setPlaceholderText(self.tr("GenTL producers of the system"))
-        self._open_producer.setText(self.tr("Open..."))
         self._device.set_name(self.tr("Serial number or address"))
-        self._search.setText(self.tr("Search"))
-        self._samples.setText(self.tr("Use its files"))
-        set_tooltip(
-            self._samples,
-            self.tr("Use the intrinsics file and the LED file of the simulated pen."),
-        )
-        self._retry.setText(self.tr("Try again"))
         self._refresh()

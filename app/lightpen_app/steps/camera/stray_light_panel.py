@@ -29,6 +29,7 @@ class StrayLightPanel(Translated, QGroupBox):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Stray light"))
         self._search: StraySearch | None = None
         self._knows_pen = False
         self._n_masked = 0
@@ -36,12 +37,22 @@ class StrayLightPanel(Translated, QGroupBox):
         self._found: FloatArray = StraySearch().circles()
 
         # Widgets
-        self._task = text_label(TextSize.BODY)
+        self._task = self.say(
+            text_label(TextSize.BODY),
+            self.tr("Cover the pen, then search for stray light."),
+        )
         self._cover = PushButton(checkable=True)
-        self._start = PushButton()
+        self._start = self.make_button(self.tr("Search"), self._on_start_clicked)
         self._mask = PushButton()
-        self._clear = PushButton()
-        self._draw = PushButton(checkable=True)
+        self._clear = self.make_button(self.tr("Clear mask"), self.clear_requested)
+        self._draw = self.say(
+            PushButton(checkable=True),
+            self.tr("Draw mask on the image"),
+            tip=self.tr(
+                "Click a spot to mask it, drag to draw a circle, or click a circle "
+                "to remove it."
+            ),
+        )
         self._outcome = SignLabel()
 
         # Layout
@@ -58,9 +69,7 @@ class StrayLightPanel(Translated, QGroupBox):
 
         # Connections
         self._cover.toggled.connect(self._on_cover_toggled)
-        self._start.clicked.connect(self._on_start_clicked)
         self._mask.clicked.connect(self._on_mask_clicked)
-        self._clear.clicked.connect(self.clear_requested)
         self._draw.toggled.connect(self.drawing_toggled)
 
         self._retranslate()
@@ -144,18 +153,6 @@ class StrayLightPanel(Translated, QGroupBox):
         self.mask_requested.emit(circles)
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Stray light"))
-        self._task.setText(self.tr("Cover the pen, then search for stray light."))
-        self._start.setText(self.tr("Search"))
-        self._clear.setText(self.tr("Clear mask"))
-        self._draw.setText(self.tr("Draw mask on the image"))
-        set_tooltip(
-            self._draw,
-            self.tr(
-                "Click a spot to mask it, drag to draw a circle, or click a circle "
-                "to remove it."
-            ),
-        )
         self._refresh()
 
     def _refresh(self) -> None:

@@ -14,7 +14,6 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.widgets.job_progress import JobProgress
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -46,8 +45,10 @@ class ArchivePanel(Translated, QWidget):
         self._delivery: ReplicationState | None = None
 
         # Widgets
-        self._check = PushButton()
-        self._save = PushButton()
+        self._check = self.make_button(
+            self.tr("Check the archive"), self.check_requested
+        )
+        self._save = self.make_button(self.tr("Save..."))
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
         self._savings: dict[SaveFormat, QAction] = {
@@ -65,7 +66,6 @@ class ArchivePanel(Translated, QWidget):
         fill(layout, self.progress, self._delivered, self._outcome, 1)
 
         # Connections
-        self._check.clicked.connect(self.check_requested)
         self.progress.cancelled.connect(self.cancel_requested)
         for saving, action in self._savings.items():
             action.triggered.connect(
@@ -99,8 +99,6 @@ class ArchivePanel(Translated, QWidget):
         return [label.value() for label in labels if label.value().text]
 
     def _retranslate(self) -> None:
-        self._check.setText(self.tr("Check the archive"))
-        self._save.setText(self.tr("Save..."))
         for saving, text in (
             (SaveFormat.TABLE, self.tr("Listed entries (CSV)...")),
             (SaveFormat.WHOLE, self.tr("All entries (JSON lines)...")),

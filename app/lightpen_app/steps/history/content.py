@@ -71,16 +71,24 @@ class HistoryContent(Translated, QWidget):
         self._due = DuePanel(workbench.around.now)
         self._archive = ArchivePanel()
         self._whole = ArchiveControl(workbench, self._archive, self._filter)
-        for panel in self._panels():
+        tabs = (
+            (self._trend_panel, self.tr("Trend")),
+            (self._entry, self.tr("Entry")),
+            (self._selection, self.tr("Repeatability")),
+            (self._due, self.tr("Due")),
+            (self._archive, self.tr("Archive")),
+        )
+        for panel, _ in tabs:
             tab = PageScroll()
             is_squeezed = panel is self._trend_panel  # the others have wrapping text
             tab.setWidget(ShrinkingScrollContent(panel) if is_squeezed else panel)
             self._tabs.addTab(tab, "")
+        self.say_items(self._tabs, (name for _, name in tabs))
         self._tabs.setMinimumHeight(LEAST_TABS)
 
         # Layout
-        table, tabs = (self.table, TABLE_SHARE), (self._tabs, TABS_SHARE)
-        vertical_layout(self, self._filter, table, tabs)
+        shares = (self.table, TABLE_SHARE), (self._tabs, TABS_SHARE)
+        vertical_layout(self, self._filter, *shares)
 
         # Connections
         reader = self._reader
@@ -109,7 +117,6 @@ class HistoryContent(Translated, QWidget):
 
         self.table.set_hidden_columns(self._settings.hidden_columns())
         self._show_rule()
-        self._retranslate()
 
     def check_result(self) -> ArchiveCheckResult | None:
         """Return the result of the last archive check."""
@@ -127,26 +134,6 @@ class HistoryContent(Translated, QWidget):
 
     def _show_fault(self, sentence: str) -> None:
         self._notices.notify(NOTICE, sentence)
-
-    def _panels(self) -> tuple[QWidget, ...]:
-        return (
-            self._trend_panel,
-            self._entry,
-            self._selection,
-            self._due,
-            self._archive,
-        )
-
-    def _retranslate(self) -> None:
-        names = (
-            self.tr("Trend"),
-            self.tr("Entry"),
-            self.tr("Repeatability"),
-            self.tr("Due"),
-            self.tr("Archive"),
-        )
-        for i, name in enumerate(names):
-            self._tabs.setTabText(i, name)
 
     # What is shown
 

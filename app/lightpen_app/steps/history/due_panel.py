@@ -12,7 +12,6 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import LEAST_SHOWN, PARTED, day_text, shortened
-from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.translated import Translated
@@ -38,21 +37,24 @@ class DuePanel(Translated, QWidget):
         self._days = NumberField("", (1, MOST_DAYS), 0)
         self._swings = NumberField("", (0, MOST_SWINGS), 0)
         self._fields = (self._days, self._swings)
-        self._labels = tuple(map(field_label, self._fields))
         self._head = text_label(TextSize.LEAD)
         self._table = NumberTable()
 
         # Layout
         layout = vertical_layout(self, margins=(0, GRID, 0, 0))
         fields = horizontal_layout(layout, spacing=2 * GRID)
-        for label, field in zip(self._labels, self._fields, strict=True):
-            field.setFixedWidth(FIELD_WIDTH)
-            add_labelled(fields, label, field)
+        days, swings = (
+            self.tr("Calibration interval (days)"),
+            self.tr("Max. swings of the pen"),
+        )
+        self.make_field(fields, self._days, days)
+        self.make_field(fields, self._swings, swings, hint=self.tr("No limit"))
         fill(fields, 1)
         fill(layout, self._head, self._table, 1)
 
         # Connections
         for field in self._fields:
+            field.setFixedWidth(FIELD_WIDTH)
             field.value_changed.connect(self._on_edited)
 
         self._retranslate()
@@ -81,14 +83,6 @@ class DuePanel(Translated, QWidget):
         self.rule_changed.emit(self.rule())
 
     def _retranslate(self) -> None:
-        words = (
-            self.tr("Calibration interval (days)"),
-            self.tr("Max. swings of the pen"),
-        )
-        for label, field, text in zip(self._labels, self._fields, words, strict=True):
-            label.setText(text)
-            field.setAccessibleName(text)
-        self._swings.set_empty_text(self.tr("No limit"))
         self._refresh()
 
     def _refresh(self) -> None:

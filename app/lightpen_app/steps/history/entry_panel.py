@@ -50,7 +50,7 @@ class EntryPanel(Translated, QWidget):
         self._changed = SignLabel()
         self._notes = text_label(TextSize.BODY)
         self._texts = (self._what, self._who, self._why, self._notes, self._kept)
-        self._note = PushButton()
+        self._note = self.make_button(self.tr("Add comment..."), self._ask)
         self._report = PushButton()
         self._reason = ReasonBar()
 
@@ -67,7 +67,6 @@ class EntryPanel(Translated, QWidget):
         fill(layout, self._reason, 1)
 
         # Connections
-        self._note.clicked.connect(self._ask)
         self._report.clicked.connect(self._request_report)
         self._reason.given.connect(self._on_given)
 
@@ -132,7 +131,6 @@ class EntryPanel(Translated, QWidget):
         for label, text in zip(self._texts, self._label_texts(line), strict=True):
             label.setText(breakable(text))
             label.setVisible(bool(text))
-        self._note.setText(self.tr("Add comment..."))
         nothing = "" if entry is not None else self.tr("Select an entry.")
         self._note.set_why_not(nothing, self.tr("Add a comment"))
         kind = None if entry is None else entry.entry.event.kind

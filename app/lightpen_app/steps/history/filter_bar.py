@@ -16,7 +16,6 @@ from lightpen_app.look.words import shortened
 from lightpen_app.steps.history.texts import kind_text
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.date_field import DateField
-from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
 LEAST_DATE, DATE_WIDTH = 14 * GRID, 17 * GRID
@@ -39,13 +38,23 @@ class FilterBar(Translated, QWidget):
             self._kind.addItem("", kind)
         self._choices = (self._pen, self._tip, self._station, self._kind)
         self._begin, self._end = DateField(), DateField()
-        self._fields = (*self._choices, self._begin, self._end)
-        self._labels = tuple(map(field_label, self._fields))
+        fields = (*self._choices, self._begin, self._end)
+        texts = (
+            self.tr("Pen"),
+            self.tr("Tip"),
+            self.tr("Station"),
+            self.tr("Entry type"),
+            self.tr("From"),
+            self.tr("To"),
+        )
 
         # Layout
         layout = horizontal_layout(self)
-        for label, field in zip(self._labels, self._fields, strict=True):
-            add_labelled(layout, label, field, stretch=1)
+        hints = 4 * ("",) + 2 * (self.tr("any day"),)
+        for field, text, hint in zip(fields, texts, hints, strict=True):
+            self.make_field(layout, field, text, hint=hint, stretch=1)
+        for choice in self._choices:
+            self.say_items(choice, (self.tr("All"),))
         for day in (self._begin, self._end):
             day.setMinimumWidth(LEAST_DATE)
             day.setMaximumWidth(DATE_WIDTH)
@@ -91,21 +100,6 @@ class FilterBar(Translated, QWidget):
         self.value_changed.emit()
 
     def _retranslate(self) -> None:
-        words = (
-            self.tr("Pen"),
-            self.tr("Tip"),
-            self.tr("Station"),
-            self.tr("Entry type"),
-            self.tr("From"),
-            self.tr("To"),
-        )
-        for label, field, text in zip(self._labels, self._fields, words, strict=True):
-            label.setText(text)
-            field.setAccessibleName(text)
-        for day in (self._begin, self._end):
-            day.setPlaceholderText(self.tr("any day"))
-        for choice in self._choices:
-            choice.setItemText(0, self.tr("All"))
         for i, kind in enumerate(Kind, start=1):
             self._kind.setItemText(i, kind_text(kind))
 

@@ -162,6 +162,7 @@ class HistoryTable(Translated, RowTable):
     def __init__(self, kind_of: EventText) -> None:
         self._model = HistoryModel(kind_of)
         super().__init__(self._model)
+        self.say(self, self.tr("Archive entries (newest first)"))
         self._model.setParent(self)
         self._is_of_one_station = False
         for scrolls in (self.setVerticalScrollMode, self.setHorizontalScrollMode):
@@ -317,7 +318,6 @@ class HistoryTable(Translated, RowTable):
         for action, title in zip(self._shown, self._model.titles(), strict=False):
             action.setText(title)
         self.show_other_words()
-        self.setAccessibleName(self.tr("Archive entries (newest first)"))
 
 
 def _text(line: Line, column: int, kind_of: EventText) -> str:

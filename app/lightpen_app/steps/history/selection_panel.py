@@ -24,11 +24,9 @@ from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import moment_text
 from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
@@ -57,9 +55,16 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         self._compared, self._scattered = NumberTable(), NumberTable()
         self._change, self._verdict = SignLabel(), SignLabel()
         self._limits = VerificationLimits()
-        self._adjust, self._adjusted = PushButton(), SignLabel()
+        self._adjust = self.make_button(
+            self.tr("Adjust together"),
+            self.adjust_requested,
+            tip=self.tr("LED file and intrinsics file by all selected swings of a pen"),
+        )
+        self._adjusted = SignLabel()
         self.adjusting = JobProgress()
-        self._report = PushButton()
+        self._report = self.make_button(
+            self.tr("Repeatability report..."), self.report_requested
+        )
 
         # Layout
         layout = vertical_layout(self, margins=(0, GRID, 0, 0))
@@ -75,10 +80,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         horizontal_layout(layout, self._adjust, (self._adjusted, 1))
         horizontal_layout(layout, self._report, (self.adjusting, 1), 0)
         layout.addStretch(1)
-
-        # Connections
-        self._adjust.clicked.connect(self.adjust_requested)
-        self._report.clicked.connect(self.report_requested)
 
         self._retranslate()
 
@@ -123,11 +124,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         return self._selected if len(self._selected) >= PAIR else self._trend.entries
 
     def _retranslate(self) -> None:
-        self._adjust.setText(self.tr("Adjust together"))
-        set_tooltip(
-            self._adjust,
-            self.tr("LED file and intrinsics file by all selected swings of a pen"),
-        )
         too_few = self.tr(
             "To adjust together, select {0} or more calibrations."
         ).format(MIN_JOINT + 1)
@@ -135,7 +131,6 @@ class SelectionPanel(ResponsiveLayout, Translated, QWidget):
         self._adjust.set_why_not(why_not)
         if why_not or self._adjusted.value().sign is Sign.RING:
             self._adjusted.set_value(StatusMessage(why_not, Sign.RING, Tone.QUIET))
-        self._report.setText(self.tr("Repeatability report..."))
         needed = self.tr("Repeatability needs two calibrations of one tip.")
         self._report.set_why_not("" if self.repeatability() else needed)
         self._show_comparison(self.comparison())

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
 from lightpen.formats.pen_content import UNITS
 from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.focus import give_focus
@@ -45,13 +44,19 @@ class LedFilePanel(Translated, QWidget):
         self._pair: tuple[int, int] | None = None
 
         # Widgets
-        self._label = QLabel()
+        self._label = self.say(QLabel(), self.tr("LED &file"))
         self._path = PathField()
-        self._open = PushButton()
+        self._open = self.make_button(self.tr("Open..."), self._on_open_clicked)
         self._path.add_button(self._open)
-        self._save = PushButton()
-        self._samples = PushButton()
-        self._discover = PushButton()
+        self._save = self.make_button(self.tr("Save as..."), self._on_save_clicked)
+        self._samples = self.make_button(
+            self.tr("Use file of the simulated pen"), self.samples_requested
+        )
+        self._discover = self.make_button(
+            self.tr("I have no such file..."),
+            self.discovery_requested,
+            tip=self.tr("Find pen, camera and tip by one swing and one length."),
+        )
         if not can_discover:
             self._discover.hide()
         self._label.setBuddy(self._path.edit)
@@ -78,10 +83,6 @@ class LedFilePanel(Translated, QWidget):
         # Connections
         self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
-        self._open.clicked.connect(self._on_open_clicked)
-        self._save.clicked.connect(self._on_save_clicked)
-        self._samples.clicked.connect(self.samples_requested)
-        self._discover.clicked.connect(self.discovery_requested)
         self._exchange.clicked.connect(self._on_exchange_clicked)
         self._units.value_changed.connect(self._on_units_chosen)
         self._question.agreed.connect(self._on_agreed)
@@ -216,17 +217,8 @@ class LedFilePanel(Translated, QWidget):
         self._path.set_value(self._value)
 
     def _retranslate(self) -> None:
-        self._label.setText(self.tr("LED &file"))
         self._path.edit.setAccessibleName(self.tr("LED file"))
         self._path.edit.setPlaceholderText(self.tr("Table (CSV) or JSON file"))
-        self._open.setText(self.tr("Open..."))
-        self._save.setText(self.tr("Save as..."))
-        self._samples.setText(self.tr("Use file of the simulated pen"))
-        self._discover.setText(self.tr("I have no such file..."))
-        set_tooltip(
-            self._discover,
-            self.tr("Find pen, camera and tip by one swing and one length."),
-        )
         self.set_exchange(self._pair)
         self._refresh_save_words()
 
@@ -246,7 +238,7 @@ class _UnitsRow(Translated, QWidget):
 
         # Widgets
         self._words = SignLabel(wraps=False)
-        self._choice = ChoiceField()
+        self._choice = self.say(ChoiceField(), self.tr("Unit of the file"))
         self._choice.addItems(["", *UNITS])
 
         # Layout
@@ -273,4 +265,3 @@ class _UnitsRow(Translated, QWidget):
     def _retranslate(self) -> None:
         words = self.tr("{0} does not state the unit of its coordinates. Choose it:")
         self._words.set_value(StatusMessage.warning(words.format(self._file_name)))
-        self._choice.setAccessibleName(self.tr("Unit of the file"))

@@ -12,7 +12,6 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.pen_view import PenPicture, PenView
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -31,6 +30,7 @@ class FramePanel(Translated, QGroupBox):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Pen and pen frame"))
         self._value: FrameCheck | None = None
 
         # Widgets
@@ -38,7 +38,14 @@ class FramePanel(Translated, QGroupBox):
         self._rules = {rule: SignLabel() for rule in Rule}
         self._amounts = {rule: text_label(TextSize.SMALL, Tone.QUIET) for rule in LONG}
         self._layout_note = SignLabel()
-        self._move = PushButton()
+        self._move = self.make_button(
+            self.tr("Transform to pen frame"),
+            self.move_requested,
+            tip=self.tr(
+                "The coordinates are in another frame, for example of a measuring "
+                "machine."
+            ),
+        )
 
         # Layout
         layout = vertical_layout(self, (self.view, 1))
@@ -54,7 +61,6 @@ class FramePanel(Translated, QGroupBox):
 
         # Connections
         self.view.led_chosen.connect(self.led_chosen)
-        self._move.clicked.connect(self.move_requested)
 
         self._retranslate()
 
@@ -68,15 +74,6 @@ class FramePanel(Translated, QGroupBox):
         self._refresh()
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Pen and pen frame"))
-        self._move.setText(self.tr("Transform to pen frame"))
-        set_tooltip(
-            self._move,
-            self.tr(
-                "The coordinates are in another frame, for example of a measuring "
-                "machine."
-            ),
-        )
         self._refresh()
 
     def _refresh(self) -> None:

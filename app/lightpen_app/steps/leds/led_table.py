@@ -43,6 +43,7 @@ class LedTable(Translated, QTableView):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("LED coordinates"))
         self.setObjectName("led_table")
 
         # Widgets
@@ -139,7 +140,6 @@ class LedTable(Translated, QTableView):
     @override
     def _retranslate(self) -> None:
         self._model.retranslate()
-        self.setAccessibleName(self.tr("LED coordinates"))
 
 
 class _DraftModel(TitledModel):

@@ -21,7 +21,6 @@ from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.push_button import PushButton
@@ -93,6 +92,7 @@ class MatchPanel(Translated, QGroupBox):
 
     def __init__(self, foot: QWidget) -> None:
         super().__init__()
+        self.say(self, self.tr("Live match"))
         self._match: PenMatch | None = None
         self._detection: PenDetection | None = None
         self._sigmas: deque[float] = deque(maxlen=N_SMOOTHED)
@@ -103,7 +103,12 @@ class MatchPanel(Translated, QGroupBox):
         self._is_aside = False
 
         # Widgets
-        self.view = ImageView()
+        self.view = self.say(
+            ImageView(),
+            tip=self.tr(
+                "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
+            ),
+        )
         self._banner = StateBanner(TextSize.TITLE)
         self._messages = tuple(FixableMessage() for _ in range(N_FINDINGS))
 
@@ -191,13 +196,6 @@ class MatchPanel(Translated, QGroupBox):
         self._counts.clear()
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Live match"))
-        set_tooltip(
-            self.view,
-            self.tr(
-                "Wheel or + and - to zoom, arrow keys to move, 0 for the whole image."
-            ),
-        )
         self.view.set_message(self.tr("No image yet"))
         self._refresh()
 

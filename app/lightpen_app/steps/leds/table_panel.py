@@ -16,7 +16,6 @@ from lightpen_app.look.theme import TextSize, Tone, text_label
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.leds.led_table import LedTable
 from lightpen_app.widgets.path_field import EnterEdit
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 
@@ -45,11 +44,20 @@ class LedTablePanel(Translated, QGroupBox):
         # Widgets
         self._table = LedTable()
         self._flaw = SignLabel()
-        self._add, self._remove, self._discard = (PushButton(0) for _ in range(3))
-        self._normals = QCheckBox()
-        self._diameter_label, self._diameter = QLabel(), EnterEdit()
+        self._add = self.make_button(
+            self.tr("Add"), self._on_add_clicked, least_width=0
+        )
+        self._remove = self.make_button(
+            self.tr("Remove"), self._on_remove_clicked, least_width=0
+        )
+        self._discard = self.make_button(
+            self.tr("Discard"), self.discard_requested, least_width=0
+        )
+        self._normals = self.say(QCheckBox(), self.tr("Show normals"))
+        self._diameter_label = self.say(QLabel(), self.tr("&Disc \u00d8, mm"))
+        self._diameter = self.say(EnterEdit(), self.tr("Diameter of the LED discs, mm"))
         self._diameter_label.setBuddy(self._diameter)
-        self._tip_label = QLabel()
+        self._tip_label = self.say(QLabel(), self.tr("&Tip x y z, mm"))
         self._tip = tuple(EnterEdit() for _ in AXES)
         self._tip_label.setBuddy(self._tip[0])
         self._override_label = text_label(TextSize.SMALL, Tone.QUIET)
@@ -76,9 +84,6 @@ class LedTablePanel(Translated, QGroupBox):
         # Connections
         self._table.value_changed.connect(self._take)
         self._table.led_chosen.connect(self._on_led_chosen)
-        self._add.clicked.connect(self._on_add_clicked)
-        self._remove.clicked.connect(self._on_remove_clicked)
-        self._discard.clicked.connect(self.discard_requested)
         self._normals.toggled.connect(self._table.show_normals)
         self._diameter.textEdited.connect(self._on_diameter_edited)
         for edit in self._tip:
@@ -181,13 +186,6 @@ class LedTablePanel(Translated, QGroupBox):
         self._override_label.setVisible(bool(self._override))
 
     def _retranslate(self) -> None:
-        self._add.setText(self.tr("Add"))
-        self._remove.setText(self.tr("Remove"))
-        self._discard.setText(self.tr("Discard"))
-        self._normals.setText(self.tr("Show normals"))
-        self._diameter_label.setText(self.tr("&Disc \u00d8, mm"))
-        self._diameter.setAccessibleName(self.tr("Diameter of the LED discs, mm"))
-        self._tip_label.setText(self.tr("&Tip x y z, mm"))
         for axis, edit in zip(AXES, self._tip, strict=True):
             name = self.tr("Nominal tip centre, {0}, mm").format(axis)
             edit.setAccessibleName(name)

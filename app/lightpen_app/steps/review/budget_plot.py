@@ -14,10 +14,10 @@ from lightpen_app.widgets.figure import Axes, Figure
 class BudgetPlot(Figure):
     """Shows the parts of U as horizontal bars, with its limit."""
 
-    def __init__(self) -> None:
+    def __init__(self, axes: Axes) -> None:
         super().__init__()
         self._value = BudgetFigure()
-        self.set_axes(Axes(""))
+        self.set_axes(axes)
 
     def value(self) -> BudgetFigure:
         """Return the figure that is shown."""

@@ -95,6 +95,7 @@ class ImageTable(Translated, RowTable):
     def __init__(self) -> None:
         self._model = ImageModel()
         super().__init__(self._model)
+        self.say(self, self.tr("Images (worst first)"))
         self._model.setParent(self)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         for column, width in ((NUMBER, 7.5), (MISFIT, 11.5), (LEDS, 6.5)):
@@ -162,7 +163,6 @@ class ImageTable(Translated, RowTable):
     @override
     def _retranslate(self) -> None:
         self.show_other_words()
-        self.setAccessibleName(self.tr("Images (worst first)"))
 
     def _on_current_row_changed(self, now: QModelIndex, _before: QModelIndex) -> None:
         if now.isValid():

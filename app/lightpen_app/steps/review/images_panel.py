@@ -28,7 +28,6 @@ from lightpen_app.steps.review.residual_view import NO_ARROWS, Arrows, ResidualV
 from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.image_view import Marker
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
@@ -79,8 +78,8 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
 
         # Widgets
         self._table = ImageTable()
-        self._exclude = PushButton()
-        self._include = PushButton()
+        self._exclude = self.make_button(self.tr("Exclude"), self._on_exclude_clicked)
+        self._include = self.make_button(self.tr("Include"), self._on_include_clicked)
         self._undo = UndoButtons(self._steps, self)
         self._count = text_label(TextSize.SMALL, Tone.QUIET)
         self._view = ResidualView()
@@ -108,8 +107,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         self._switch.value_changed.connect(self._on_choice_changed)
         self._misfits.number_chosen.connect(self._table.choose)
         self._misfits.limit_set.connect(self._exclude_images)
-        self._exclude.clicked.connect(self._on_exclude_clicked)
-        self._include.clicked.connect(self._on_include_clicked)
         self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
         self._card.saved.connect(self.saved)
         self._card.failed.connect(self.failed)
@@ -187,8 +184,6 @@ class ImagesPanel(ResponsiveLayout, Translated, QWidget):
         shortcut.activated.connect(act)
 
     def _retranslate(self) -> None:
-        self._exclude.setText(self.tr("Exclude"))
-        self._include.setText(self.tr("Include"))
         self._misfits.set_axes(
             Axes(self.tr("RMS / px (x: excluded)"), self.tr("image"))
         )

@@ -4,13 +4,11 @@ from dataclasses import astuple, replace
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QLineEdit, QWidget
-from typing_extensions import override
 
 from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.fitted_window import FittedWindow
-from lightpen_app.widgets.labelled import add_labelled, field_label
 from lightpen_app.widgets.translated import Translated
 
 LONGEST = 200  # characters
@@ -24,21 +22,39 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
 
     def __init__(self, known: Laboratory | None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.say(self, self.tr("Calibration laboratory"))
 
         # Widgets
         self._edits = [QLineEdit() for _ in range(N_FIELDS)]
-        self._place = QComboBox()
-        self._place.addItems([""] * len(PLACES))
-        self._labels = [field_label(edit) for edit in (*self._edits, self._place)]
+        places = (
+            self.tr("Laboratory"),
+            self.tr("Customer"),
+            self.tr("Branch of the laboratory"),
+            self.tr("Branch of the customer"),
+            self.tr("Elsewhere"),
+        )
+        self._place = self.say_items(QComboBox(), places)
+        texts = (
+            self.tr("Name"),
+            self.tr("E-mail address"),
+            self.tr("City"),
+            self.tr("Country code, two capital letters such as DE"),
+            self.tr("Street (optional)"),
+            self.tr("Post code (optional)"),
+            self.tr("Procedure (optional)"),
+            self.tr("Place of calibration"),
+        )
         standard = QDialogButtonBox.StandardButton
         self._buttons = QDialogButtonBox(standard.Ok | standard.Cancel)
+        self.say(self._buttons.button(standard.Ok), self.tr("Save..."))
+        self.say(self._buttons.button(standard.Cancel), self.tr("Cancel"))
 
         # Layout
         layout = vertical_layout(self, spacing=2 * GRID, margins=3 * GRID)
         grid = grid_layout(layout, spacing=(2 * GRID, 2 * GRID))
-        fields = zip(self._labels, (*self._edits, self._place), strict=True)
-        for i, (label, edit) in enumerate(fields):
-            add_labelled(grid, label, edit, at=divmod(i, 2))
+        fields = zip((*self._edits, self._place), texts, strict=True)
+        for i, (field, text) in enumerate(fields):
+            self.make_field(grid, field, text, at=divmod(i, 2))
         layout.addWidget(self._buttons)
         self.setMinimumWidth(72 * GRID)
 
@@ -50,12 +66,11 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
         self._buttons.rejected.connect(self.reject)
 
         if known is not None:
-            *texts, place = astuple(known)
-            for edit, text in zip(self._edits, texts, strict=True):
+            *given, place = astuple(known)
+            for edit, text in zip(self._edits, given, strict=True):
                 edit.setText(text)
             self._place.setCurrentIndex(PLACES.index(place) if place in PLACES else 0)
         self._refresh()
-        self._retranslate()
 
     def _refresh(self) -> None:
         texts = [edit.text().strip() for edit in self._edits[:N_NEEDED]]
@@ -67,33 +82,3 @@ class LaboratoryDialog(FittedWindow, Translated, QDialog):
         place = PLACES[self._place.currentIndex()]
         self.given.emit(replace(Laboratory(*texts), place=place))
         self.accept()
-
-    @override
-    def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Calibration laboratory"))
-        words = (
-            self.tr("Name"),
-            self.tr("E-mail address"),
-            self.tr("City"),
-            self.tr("Country code, two capital letters such as DE"),
-            self.tr("Street (optional)"),
-            self.tr("Post code (optional)"),
-            self.tr("Procedure (optional)"),
-            self.tr("Place of calibration"),
-        )
-        fields = (*self._edits, self._place)
-        for label, edit, text in zip(self._labels, fields, words, strict=True):
-            label.setText(text)
-            edit.setAccessibleName(text)
-        places = (
-            self.tr("Laboratory"),
-            self.tr("Customer"),
-            self.tr("Branch of the laboratory"),
-            self.tr("Branch of the customer"),
-            self.tr("Elsewhere"),
-        )
-        for i, text in enumerate(places):
-            self._place.setItemText(i, text)
-        standard = QDialogButtonBox.StandardButton
-        self._buttons.button(standard.Ok).setText(self.tr("Save..."))
-        self._buttons.button(standard.Cancel).setText(self.tr("Cancel"))

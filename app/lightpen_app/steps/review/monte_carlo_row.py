@@ -14,12 +14,10 @@ from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.focus import give_focus
 from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import LatestJob, Report
@@ -38,14 +36,26 @@ class MonteCarloRow(Translated, QWidget):
         self._job = LatestJob(self)
 
         # Widgets
-        self._start = PushButton()
-        self._label = text_label(TextSize.BODY)
-        self._trials = NumberField("", (MIN_TRIALS, MOST_TRIALS), 0)
+        self._start = self.make_button(
+            self.tr("Monte Carlo check"),
+            self._on_start_clicked,
+            tip=self.tr(
+                "Propagates the distributions of files, seating and noise by the "
+                "Monte Carlo method (JCGM 101). Uses all processor cores but one "
+                "for seconds to minutes."
+            ),
+        )
+        self._label = self.say(text_label(TextSize.BODY), self.tr("Trials"))
+        self._trials = self.say(
+            NumberField("", (MIN_TRIALS, MOST_TRIALS), 0), self.tr("Trials")
+        )
         self._trials.set_value(USUAL_TRIALS)
         self._label.setBuddy(self._trials)
         self._progress = JobProgress()
         self._outcome = SignLabel()
-        self._table = NumberTable()
+        self._table = self.say(
+            NumberTable(), self.tr("U by Monte Carlo and by uncertainty budget")
+        )
 
         # Layout
         layout = vertical_layout(self, spacing=GRID // 2)
@@ -60,7 +70,6 @@ class MonteCarloRow(Translated, QWidget):
         layout.addWidget(self._table)
 
         # Connections
-        self._start.clicked.connect(self._on_start_clicked)
         self._progress.cancelled.connect(self._on_cancel_clicked)
 
         self._retranslate()
@@ -114,20 +123,6 @@ class MonteCarloRow(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._start.setText(self.tr("Monte Carlo check"))
-        set_tooltip(
-            self._start,
-            self.tr(
-                "Propagates the distributions of files, seating and noise by the "
-                "Monte Carlo method (JCGM 101). Uses all processor cores but one "
-                "for seconds to minutes."
-            ),
-        )
-        self._label.setText(self.tr("Trials"))
-        self._trials.setAccessibleName(self.tr("Trials"))
-        self._table.setAccessibleName(
-            self.tr("U by Monte Carlo and by uncertainty budget")
-        )
         self._refresh()
 
     def _refresh(self) -> None:

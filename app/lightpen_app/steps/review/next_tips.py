@@ -38,7 +38,9 @@ class NextTipsRow(Translated, QWidget):
         self._statuses = StationStatus()
 
         # Widgets
-        self._label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._label = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Next tip")
+        )
 
         # Layout
         self._layout = horizontal_layout(self, self._label)
@@ -71,7 +73,6 @@ class NextTipsRow(Translated, QWidget):
         self._retranslate()
 
     def _retranslate(self) -> None:
-        self._label.setText(self.tr("Next tip"))
         for button, each in zip(self._buttons, self._value, strict=True):
             tip, mark = each.tip, self._mark_of(each)
             button.setText(shortened(tip, LONGEST))

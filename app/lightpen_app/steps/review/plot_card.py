@@ -12,7 +12,6 @@ from typing_extensions import override
 from lightpen.formats.files import write_whole
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.figure import Figure
 from lightpen_app.widgets.save_dialog import ask_file
 from lightpen_app.widgets.translated import Translated
@@ -51,11 +50,11 @@ class PlotCard(Translated, QFrame):
 
         # Widgets
         self._menu = QMenu(self)
-        self._enlarge = QAction(self, checkable=True)
-        self._save_png = QAction(self)
-        self._save_csv = QAction(self)
+        self._enlarge = self.say(QAction(self, checkable=True), self.tr("Enlarge"))
+        self._save_png = self.say(QAction(self), self.tr("Save picture (PNG)"))
+        self._save_csv = self.say(QAction(self), self.tr("Save numbers (CSV)"))
         self._menu.addActions([self._enlarge, self._save_png, self._save_csv])
-        self._button = QToolButton()
+        self._button = self.say(QToolButton(), tip=self.tr("Enlarge or save this plot"))
         self._button.setText("\N{HORIZONTAL ELLIPSIS}")
         self._button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self._button.setProperty("role", "more")
@@ -125,10 +124,6 @@ class PlotCard(Translated, QFrame):
         self.save(path)
 
     def _retranslate(self) -> None:
-        self._enlarge.setText(self.tr("Enlarge"))
-        self._save_png.setText(self.tr("Save picture (PNG)"))
-        self._save_csv.setText(self.tr("Save numbers (CSV)"))
-        set_tooltip(self._button, self.tr("Enlarge or save this plot"))
         words = f"{self.plot.accessibleName()}: {self._button.toolTip()}"
         self._button.setAccessibleName(words)
 

@@ -82,22 +82,25 @@ class PlotsPanel(Translated, QWidget):
     def _show(self, solution: Solution) -> None:
         raise NotImplementedError
 
-    def _retranslate(self) -> None:
-        raise NotImplementedError
-
 
 class ResidualsPanel(PlotsPanel):
     """Residuals over the image, by axis, by LED, and how they are distributed."""
 
     def __init__(self) -> None:
         # Widgets
-        self._arrows = ArrowPlot(Axes(""))
-        self._lens = ArrowPlot(Axes(""))
-        self._dots = DotPlot(Axes(""), ("residual_x_px", "residual_y_px"))
-        self._leds = BarPlot(
-            Axes(""), [Curve("rms_px"), Curve("mean_x_px"), Curve("mean_y_px")], "led"
+        x, y = self.tr("x / px"), self.tr("y / px")
+        self._arrows, self._lens = ArrowPlot(Axes("")), ArrowPlot(Axes(""))
+        axes = Axes(self.tr("Residuals by axis / px"), x, y)
+        self._dots = DotPlot(axes, ("residual_x_px", "residual_y_px"))
+        series = Curve("rms_px"), Curve("mean_x_px"), Curve("mean_y_px")
+        axes = Axes(self.tr("Residuals by LED / px"), self.tr("LED"))
+        self._leds = BarPlot(axes, series, "led")
+        axes = Axes(
+            self.tr("Histogram with normal fit"),
+            self.tr("residual / px"),
+            self.tr("count"),
         )
-        self._histogram = Histogram(Axes(""), "residual_px")
+        self._histogram = Histogram(axes, "residual_px")
         super().__init__(
             [
                 PlotCard(self._arrows, "residuals-over-image"),
@@ -109,7 +112,13 @@ class ResidualsPanel(PlotsPanel):
         )
         self._lens_card = self.cards()[-1]
         self._lens_card.set_needed(False)
-        self._advice = text_label(TextSize.SMALL, Tone.QUIET)
+        self._advice = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET),
+            self.tr(
+                "The arrows should look random. A pattern indicates an error of the "
+                "intrinsics file; a single outlying LED, of the LED file."
+            ),
+        )
         self._switch = CameraSwitch()
         self._failed: tuple[FailedSwing, Rig] | None = None
 
@@ -185,28 +194,13 @@ class ResidualsPanel(PlotsPanel):
 
     @override
     def _retranslate(self) -> None:
-        enlarged = self.tr("Residuals \xd7 {0}")
         x, y = self.tr("x / px"), self.tr("y / px")
-        scale = f"{self._arrows.scale():g}"
-        self._arrows.set_axes(Axes(enlarged.format(scale), x, y))
-        lens = self.tr("Lens field \xd7 {0}").format(f"{self._lens.scale():g}")
-        self._lens.set_axes(Axes(lens, x, y))
-        self._dots.set_axes(Axes(self.tr("Residuals by axis / px"), x, y))
-        self._leds.set_axes(Axes(self.tr("Residuals by LED / px"), self.tr("LED")))
+        for plot, title in (
+            (self._arrows, self.tr("Residuals \xd7 {0}")),
+            (self._lens, self.tr("Lens field \xd7 {0}")),
+        ):
+            plot.set_axes(Axes(title.format(f"{plot.scale():g}"), x, y))
         self._leds.set_names([self.tr("RMS"), self.tr("mean x"), self.tr("mean y")])
-        self._histogram.set_axes(
-            Axes(
-                self.tr("Histogram with normal fit"),
-                self.tr("residual / px"),
-                self.tr("count"),
-            )
-        )
-        self._advice.setText(
-            self.tr(
-                "The arrows should look random. A pattern indicates an error of the "
-                "intrinsics file; a single outlying LED, of the LED file."
-            )
-        )
 
 
 class UncertaintyPanel(PlotsPanel):
@@ -214,8 +208,14 @@ class UncertaintyPanel(PlotsPanel):
 
     def __init__(self) -> None:
         # Widgets
-        self._budget = BudgetPlot()
-        self._postures = PosturePlot(Axes(""))
+        title = self.tr("U (k = 2) by source, weakest direction / mm")
+        self._budget = BudgetPlot(Axes(title))
+        axes = Axes(
+            self.tr("Postures: tilt / \xb0"),
+            self.tr("to the right"),
+            self.tr("away from the camera"),
+        )
+        self._postures = PosturePlot(axes)
         super().__init__(
             [
                 PlotCard(self._budget, "uncertainty-budget"),
@@ -228,8 +228,6 @@ class UncertaintyPanel(PlotsPanel):
         # Layout
         self._layout.addWidget(self._remark)
         self._layout.addWidget(self._monte_carlo)
-
-        self._retranslate()
 
     @override
     def shut_down(self) -> None:
@@ -244,16 +242,6 @@ class UncertaintyPanel(PlotsPanel):
 
     @override
     def _retranslate(self) -> None:
-        self._budget.set_axes(
-            Axes(self.tr("U (k = 2) by source, weakest direction / mm"))
-        )
-        self._postures.set_axes(
-            Axes(
-                self.tr("Postures: tilt / \xb0"),
-                self.tr("to the right"),
-                self.tr("away from the camera"),
-            )
-        )
         if self._solution is not None:
             self._show_budget(self._solution)
 
@@ -279,24 +267,25 @@ class MethodsPanel(PlotsPanel):
 
     def __init__(self) -> None:
         # Widgets
-        self._objective = LinePlot(Axes(""), [Curve("objective_mm2")])
-        self._change = LinePlot(Axes(""), [Curve(f"{axis}_mm", axis) for axis in AXES])
+        axes = Axes(self.tr("Objective / mm\xb2"), self.tr("iteration"))
+        self._objective = LinePlot(axes, [Curve("objective_mm2")])
+        title = self.tr("Difference from final value / mm")
+        axes = Axes(title, self.tr("iteration"))
+        self._change = LinePlot(axes, [Curve(f"{axis}_mm", axis) for axis in AXES])
         super().__init__(
             [
                 PlotCard(self._objective, "convergence-objective"),
                 PlotCard(self._change, "convergence-tip"),
             ]
         )
-        self._table = NumberTable()
-        self._reports = QCheckBox()
+        self._table = self.say(NumberTable(), self.tr("Two-stage method and joint fit"))
+        self._reports = self.say(QCheckBox(), self.tr("Report this method"))
 
         # Layout
         fill(self._layout, self._table, self._reports)
 
         # Connections
         self._reports.clicked.connect(self._on_reports_clicked)
-
-        self._retranslate()
 
     def set_locked(self, why: str) -> None:
         """Set why the method cannot be changed; empty if it can."""
@@ -319,14 +308,6 @@ class MethodsPanel(PlotsPanel):
 
     @override
     def _retranslate(self) -> None:
-        self._objective.set_axes(
-            Axes(self.tr("Objective / mm\xb2"), self.tr("iteration"))
-        )
-        self._change.set_axes(
-            Axes(self.tr("Difference from final value / mm"), self.tr("iteration"))
-        )
-        self._table.setAccessibleName(self.tr("Two-stage method and joint fit"))
-        self._reports.setText(self.tr("Report this method"))
         if self._solution is not None:
             self._table.set_value(self._figures(self._solution))
 

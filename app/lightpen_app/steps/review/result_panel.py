@@ -75,7 +75,10 @@ class TipSummary(Translated, QFrame):
         self.setProperty("area", "panel")
 
         # Widgets
-        self._of_u = text_label(TextSize.SMALL, Tone.QUIET)
+        self._of_u = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET),
+            self.tr("U (k = 2) of the tip in its weakest direction"),
+        )
         self._u = text_label(TextSize.DISPLAY)
         self._limit = text_label(TextSize.LEAD, Tone.QUIET)
         for label in (self._u, self._limit):
@@ -100,7 +103,6 @@ class TipSummary(Translated, QFrame):
         self._retranslate()
 
     def _retranslate(self) -> None:
-        self._of_u.setText(self.tr("U (k = 2) of the tip in its weakest direction"))
         outcome = self._value
         if outcome is None:
             self._heading.setText(self.tr("Tip in the pen frame / mm, U (k = 2)"))

@@ -10,7 +10,6 @@ from lightpen.record.exports.formats import TABLE_FORMATS, ExportFormat
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.sentences import listed, worded
 from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 
@@ -40,37 +39,39 @@ class ResultTools(Translated, QWidget):
         single = [Export((each,)) for each in (*TABLE_FORMATS, *formats)]
 
         # Widgets
-        self._copy = PushButton()
-        self._save = PushButton()
+        self._copy = self.make_button(self.tr("Copy tip"), self.copy_requested)
+        self._save = self.make_button(self.tr("Save..."))
         self._save.setProperty("menu", True)
         menu = QMenu(self._save)
         menu.setToolTipsVisible(True)
-        self._report = menu.addAction("")
+        self._report = self.say(menu.addAction(""), self.tr("Calibration report..."))
         usual = [each for each in single if each.formats[0].name == "csv"]
         others = [each for each in single if each not in usual]
         self._actions = [(export, menu.addAction("")) for export in (*usual, ALL)]
-        self._others = menu.addMenu("")
+        self._others = self.say(menu.addMenu(""), self.tr("Other formats"))
         self._others.setToolTipsVisible(True)
         self._actions += [
             (export, self._others.addAction("")) for export in (*others, PLOTS)
         ]
         menu.addSeparator()
-        self._folder = menu.addAction("")
+        self._folder = self.say(
+            menu.addAction(""),
+            self.tr("Open folder"),
+            tip=self.tr("Open the folder of the swing"),
+        )
         self._save.setMenu(menu)
-        self._press = PushButton()
+        self._press = self.make_button(self.tr("Press test"), self.press_requested)
 
         # Layout
         horizontal_layout(self, (self._copy, 1), (self._save, 1), (self._press, 1))
 
         # Connections
-        self._copy.clicked.connect(self.copy_requested)
         for export, action in self._actions:
             action.triggered.connect(
                 lambda _=False, export=export: self.save_requested.emit(export)
             )
         self._report.triggered.connect(self.report_requested)
         self._folder.triggered.connect(self.folder_requested)
-        self._press.clicked.connect(self.press_requested)
 
         self._retranslate()
 
@@ -95,13 +96,6 @@ class ResultTools(Translated, QWidget):
         self._press.set_why_not(why_not, tooltip)
 
     def _retranslate(self) -> None:
-        self._press.setText(self.tr("Press test"))
-        self._report.setText(self.tr("Calibration report..."))
-        self._others.setTitle(self.tr("Other formats"))
-        self._folder.setText(self.tr("Open folder"))
-        set_tooltip(self._folder, self.tr("Open the folder of the swing"))
-        self._copy.setText(self.tr("Copy tip"))
-        self._save.setText(self.tr("Save..."))
         for export, action in self._actions:
             action.setText(self._name(export) + "...")
             described = (worded(each.description) for each in export.formats)

@@ -11,7 +11,6 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.review.detail_tabs import DetailTabs
 from lightpen_app.steps.review.message_list import StatusMessageList
 from lightpen_app.steps.review.next_tips import NextTipsRow
@@ -20,7 +19,6 @@ from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.view_state import ReviewPageState
 from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
 from lightpen_app.widgets.responsive_layout import ResponsiveLayout
@@ -53,13 +51,26 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
         self.solving = JobProgress(PATIENCE_MS)
         self._messages = StatusMessageList()
         self.result = ResultPanel()
-        self._scroll = PageScroll()
-        self.repeat, self.capture_more = PushButton(), PushButton()
-        self.accept, self.verify = PushButton(), PushButton()
-        self.take_back = PushButton()
+        self._scroll = self.say(PageScroll(), self.tr("Result"))
+        self.repeat = self.make_button(self.tr("Repeat swing"))
+        self.capture_more = self.make_button(self.tr("Capture more"))
+        self.accept = self.make_button(self.tr("Accept..."))
+        self.verify = self.make_button(
+            self.tr("Verify tip"),
+            tip=self.tr(
+                "Half a minute: leave the tip in the cone and lean the pen to six "
+                "sides."
+            ),
+        )
+        self.take_back = self.make_button(
+            self.tr("Revoke acceptance..."),
+            tip=self.tr(
+                "Reinstate the previous result. Both results stay in the archive."
+            ),
+        )
         self.tools = ResultTools(export_formats(services))
         self.next_tips = NextTipsRow()
-        self.tabs = DetailTabs(run, place)
+        self.tabs = self.say(DetailTabs(run, place), self.tr("Details"))
         self.summary, self._first, self._buttons = TipSummary(), QWidget(), QWidget()
 
         # Layout
@@ -123,25 +134,7 @@ class ReviewView(ResponsiveLayout, Translated, QWidget):
             self.tr("Uncertainty"),
             self.tr("Two-stage"),
         )
-        self._scroll.setAccessibleName(self.tr("Result"))
-        self.tabs.setAccessibleName(self.tr("Details"))
         self.solving.set_cancel_tooltip(self.tr("Keep last solution"))
-        self.capture_more.setText(self.tr("Capture more"))
-        self.repeat.setText(self.tr("Repeat swing"))
-        self.accept.setText(self.tr("Accept..."))
-        self.verify.setText(self.tr("Verify tip"))
-        set_tooltip(
-            self.verify,
-            self.tr(
-                "Half a minute: leave the tip in the cone and lean the pen to six "
-                "sides."
-            ),
-        )
-        self.take_back.setText(self.tr("Revoke acceptance..."))
-        set_tooltip(
-            self.take_back,
-            self.tr("Reinstate the previous result. Both results stay in the archive."),
-        )
         self.reason.set_words(
             self.tr("This result needs checking. Enter the reason for accepting it."),
             self.tr("Reason"),

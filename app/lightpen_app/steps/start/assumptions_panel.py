@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGroupBox, QLabel, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGroupBox, QWidget
 
 from lightpen.model.assumptions import (
     COLDEST,
@@ -20,7 +20,6 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.fitted_window import FittedWindow
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.page_scroll import DialogScroll
@@ -60,19 +59,33 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.say(self, self.tr("Default uncertainties of the station"))
         self._value = USUAL
 
         # Widgets
-        self._lead = text_label(TextSize.BODY)
+        self._lead = self.say(
+            text_label(TextSize.BODY),
+            self.tr(
+                "Standard uncertainties (k = 1) used where the intrinsics file and "
+                "the LED file state none. They apply from the next swing; its "
+                "result marks the assumed values."
+            ),
+        )
         self._fields = {
             kind.name: NumberField(kind.unit, kind.limits, kind.n_decimals)
             for kind in KINDS
         }
-        self._labels: dict[str, QLabel] = {}
-        for name, field in self._fields.items():
-            label = text_label(TextSize.SMALL, Tone.QUIET)
-            label.setBuddy(field)
-            self._labels[name] = label
+        texts = (
+            self.tr("Focal length (other intrinsics scaled with it)"),
+            self.tr("Scale of the LED coordinates"),
+            self.tr("Form error of ball and cone"),
+            self.tr("Systematic error of LED centres"),
+            self.tr("Pen temperature during the swing"),
+            self.tr("Uncertainty of this temperature"),
+            self.tr("Relative humidity (for the report)"),
+            self.tr("Temperature difference from LED measurement (if not measured)"),
+            self.tr("Thermal expansion of the pen"),
+        )
         self._buttons = QDialogButtonBox(
             QDialogButtonBox.StandardButton.RestoreDefaults
             | QDialogButtonBox.StandardButton.Close
@@ -83,8 +96,15 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
         fields, scroll = QWidget(), DialogScroll()
         grid = grid_layout(fields, spacing=(2 * GRID, GRID))
         grid.setColumnStretch(0, 1)
-        for row, (name, field) in enumerate(self._fields.items()):
-            grid.addWidget(self._labels[name], row, 0)
+        for row, (kind, text) in enumerate(zip(KINDS, texts, strict=True)):
+            field, usual = self._fields[kind.name], getattr(USUAL, kind.name)
+            default = "" if usual is None else f"{kind.times * usual:g} {kind.unit}"
+            tip = self.tr("Default: {0}.").format(default) if default else ""
+            label = self.make_label(field, text, tip=tip)
+            label.setWordWrap(True)
+            if kind.name in UNMEASURED:
+                self.say(field, hint=self.tr("not measured"), name=text)
+            grid.addWidget(label, row, 0)
             grid.addWidget(field, row, 1)
         scroll.setWidget(fields)
         fill(layout, (scroll, 1), self._buttons)
@@ -98,7 +118,6 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
         self._buttons.button(restore).clicked.connect(self._on_restore_clicked)
 
         self.set_value(self._value)
-        self._retranslate()
 
     def value(self) -> Assumptions:
         """Return the assumptions."""
@@ -145,39 +164,6 @@ class AssumptionsDialog(FittedWindow, Translated, QDialog):
         self._fields["temperature"].setEnabled(is_measured)
         self._fields["warmth"].setEnabled(not is_measured)
 
-    def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Default uncertainties of the station"))
-        self._lead.setText(
-            self.tr(
-                "Standard uncertainties (k = 1) used where the intrinsics file and "
-                "the LED file state none. They apply from the next swing; its "
-                "result marks the assumed values."
-            )
-        )
-        for name in UNMEASURED:
-            self._fields[name].set_empty_text(self.tr("not measured"))
-        texts = {
-            "focal_length": self.tr("Focal length (other intrinsics scaled with it)"),
-            "scale": self.tr("Scale of the LED coordinates"),
-            "form_error": self.tr("Form error of ball and cone"),
-            "center_bias": self.tr("Systematic error of LED centres"),
-            "temperature_c": self.tr("Pen temperature during the swing"),
-            "temperature": self.tr("Uncertainty of this temperature"),
-            "humidity_percent": self.tr("Relative humidity (for the report)"),
-            "warmth": self.tr(
-                "Temperature difference from LED measurement (if not measured)"
-            ),
-            "expansion": self.tr("Thermal expansion of the pen"),
-        }
-        for kind in KINDS:
-            text, field = texts[kind.name], self._fields[kind.name]
-            self._labels[kind.name].setText(text)
-            field.setAccessibleName(text)
-            usual = getattr(USUAL, kind.name)
-            if usual is not None:
-                default = f"{kind.times * usual:g} {kind.unit}"
-                set_tooltip(field, self.tr("Default: {0}.").format(default))
-
 
 class AssumptionsPanel(Translated, QGroupBox):
     """Opens the default uncertainties of a station."""
@@ -186,10 +172,19 @@ class AssumptionsPanel(Translated, QGroupBox):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Default uncertainties"))
 
         # Widgets
         self._words = text_label(TextSize.SMALL, Tone.QUIET)
-        self._change = PushButton()
+        self._change = self.say(
+            PushButton(),
+            self.tr("Change"),
+            name=self.tr("Change the default uncertainties"),
+            tip=self.tr(
+                "Focal length, scale, temperature, form of ball and cone: "
+                "uncertainty where no file states it."
+            ),
+        )
         self.dialog = AssumptionsDialog(self)
 
         # Layout
@@ -215,20 +210,10 @@ class AssumptionsPanel(Translated, QGroupBox):
         self.value_changed.emit()
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Default uncertainties"))
         self._words.setText(
             self.tr("Default values are used where a file states no uncertainty.")
             if self.value() == USUAL
             else self.tr(
                 "Values of this station are used where a file states no uncertainty."
             )
-        )
-        self._change.setText(self.tr("Change"))
-        self._change.setAccessibleName(self.tr("Change the default uncertainties"))
-        set_tooltip(
-            self._change,
-            self.tr(
-                "Focal length, scale, temperature, form of ball and cone: "
-                "uncertainty where no file states it."
-            ),
         )

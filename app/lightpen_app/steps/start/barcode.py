@@ -4,8 +4,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent, QWindow
 from typing_extensions import override
 
-from lightpen_app.widgets.keys import ENTER_KEYS
-from lightpen_app.widgets.translated import WidgetMixin
+from lightpen_app.widgets.keys import ENTER_KEYS, WidgetMixin
 
 PACE_MS = 50  # from one key of a scanner to the next at most; a hand takes longer
 PATIENCE_MS = 60  # without a key that end a scan

@@ -7,7 +7,6 @@ from PySide6.QtWidgets import QGroupBox
 
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import breakable
 from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.widgets.push_button import PushButton
@@ -23,6 +22,7 @@ class DataFolderPanel(Translated, QGroupBox):
 
     def __init__(self, folder: Path, notifications: Notifications) -> None:
         super().__init__()
+        self.say(self, self.tr("Data folder"))
         self._folder = folder
         self._notices = notifications
         self._n_others = 0
@@ -31,8 +31,20 @@ class DataFolderPanel(Translated, QGroupBox):
         # Widgets
         self._path = text_label(TextSize.SMALL, Tone.QUIET)
         self._path.setText(breakable(str(folder)))
-        self._open = PushButton()
-        self._change = PushButton()
+        self._open = self.say(
+            PushButton(),
+            self.tr("Open folder"),
+            name=self.tr("Open the data folder"),
+            tip=self.tr("Location of swings and results"),
+        )
+        self._change = self.say(
+            PushButton(),
+            self.tr("Change..."),
+            name=self.tr("Choose another data folder"),
+            tip=self.tr(
+                "Save swings and results in another folder from the next start."
+            ),
+        )
         self._others = SignLabel()
         self._doubt = SignLabel()
 
@@ -62,16 +74,6 @@ class DataFolderPanel(Translated, QGroupBox):
         self._notices.show_status(open_folder(self._folder))
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Data folder"))
-        self._open.setText(self.tr("Open folder"))
-        self._open.setAccessibleName(self.tr("Open the data folder"))
-        set_tooltip(self._open, self.tr("Location of swings and results"))
-        self._change.setText(self.tr("Change..."))
-        self._change.setAccessibleName(self.tr("Choose another data folder"))
-        set_tooltip(
-            self._change,
-            self.tr("Save swings and results in another folder from the next start."),
-        )
         self._change.setProperty("inviting", bool(self._fault))
         self._change.style().polish(self._change)
         doubt = StatusMessage.fault(breakable(self._fault))

@@ -22,7 +22,6 @@ from lightpen_app.steps.start.readiness_line import ReadinessLine
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import RIGHT, RowTable
 from lightpen_app.widgets.translated import Translated
 
@@ -87,16 +86,33 @@ class DayView(Translated, QWidget):
 
         # Widgets
         self._ready = ReadinessLine(N_ITEMS)
-        self._question = text_label(TextSize.BODY)
-        self._temperature, self._answer = TemperatureField(), PushButton()
+        self._question = self.say(
+            text_label(TextSize.BODY), self.tr("Pen temperature today")
+        )
+        self._temperature = self.say(
+            TemperatureField(),
+            self.tr("Pen temperature today"),
+            hint=self.tr("not measured"),
+        )
+        self._answer = self.make_button(self.tr("Confirm"), self._on_answered)
         self._asking = QWidget()
         self._question.setBuddy(self._temperature)
-        self._search = SearchEdit()
-        self._which = ChoiceField()
-        for _ in range(2):
-            self._which.addItem("")
-        self._model = QStandardItemModel(0, N_COLUMNS, self)
-        self._table = RowTable(self._model)
+        self._search = self.say(
+            SearchEdit(), self.tr("Search tips"), hint=self.tr("Scan or type a tip")
+        )
+        self._which = self.say(ChoiceField(), self.tr("Tips shown"))
+        self.say_items(self._which, (self.tr("All tips"), self.tr("Due tips")))
+        columns = (
+            self.tr("Tip"),
+            self.tr("Pen"),
+            self.tr("Due"),
+            self.tr("U (k = 2)"),
+            self.tr("Calibrated"),
+            self.tr("Verdict"),
+        )
+        self._model = QStandardItemModel(0, len(columns), self)
+        self.say_items(self._model, columns)
+        self._table = self.say(RowTable(self._model), self.tr("Tips of this station"))
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self._table.setMinimumHeight(LEAST_HEIGHT)
@@ -104,7 +120,10 @@ class DayView(Translated, QWidget):
         across.setStretchLastSection(False)
         across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self._details = text_label(TextSize.BODY, Tone.QUIET)
-        self._swing, self._setup = PushButton(), PushButton()
+        self._swing = self.make_button(self.tr("Swing anyway"), self.swing_requested)
+        self._setup = self.make_button(
+            self.tr("Set up station..."), self.setup_requested
+        )
 
         # Layout
         layout = vertical_layout(self, spacing=2 * GRID)
@@ -122,13 +141,10 @@ class DayView(Translated, QWidget):
         # Connections
         self._ready.step_requested.connect(self._on_step_requested)
         self._temperature.entered.connect(self._on_answered)
-        self._answer.clicked.connect(self._on_answered)
         self._search.textChanged.connect(self._on_narrowed)
         self._search.entered.connect(self.tip_entered)
         self._which.activated.connect(self._on_narrowed)
         self._table.selectionModel().currentRowChanged.connect(self._on_row_changed)
-        self._swing.clicked.connect(self.swing_requested)
-        self._setup.clicked.connect(self.setup_requested)
 
         self._retranslate()
 
@@ -239,26 +255,4 @@ class DayView(Translated, QWidget):
 
     @override
     def _retranslate(self) -> None:
-        self._question.setText(self.tr("Pen temperature today"))
-        self._temperature.set_empty_text(self.tr("not measured"))
-        self._temperature.setAccessibleName(self._question.text())
-        self._answer.setText(self.tr("Confirm"))
-        self._search.setPlaceholderText(self.tr("Scan or type a tip"))
-        self._search.setAccessibleName(self.tr("Search tips"))
-        self._which.setItemText(0, self.tr("All tips"))
-        self._which.setItemText(1, self.tr("Due tips"))
-        self._which.setAccessibleName(self.tr("Tips shown"))
-        self._table.setAccessibleName(self.tr("Tips of this station"))
-        self._model.setHorizontalHeaderLabels(
-            [
-                self.tr("Tip"),
-                self.tr("Pen"),
-                self.tr("Due"),
-                self.tr("U (k = 2)"),
-                self.tr("Calibrated"),
-                self.tr("Verdict"),
-            ]
-        )
-        self._swing.setText(self.tr("Swing anyway"))
-        self._setup.setText(self.tr("Set up station..."))
         self._fill()

@@ -40,6 +40,7 @@ class ItemButton(Translated, PushButton):
 
     def __init__(self) -> None:
         super().__init__(0)
+        self.say(self, self.tr("Choose..."))
         self._choices: tuple[ItemChoice, ...] = ()
         self._menu = QMenu(self)
         self.setMenu(self._menu)
@@ -77,7 +78,6 @@ class ItemButton(Translated, PushButton):
         )
 
     def _retranslate(self) -> None:
-        self.setText(self.tr("Choose..."))
         self._fill()
 
 

@@ -6,14 +6,7 @@ from functools import partial
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import (
-    QGridLayout,
-    QGroupBox,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QGridLayout, QGroupBox, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -21,14 +14,8 @@ from lightpen.model.limits import LEAST_IMAGES, MOST_IMAGES, SwingLimits
 from lightpen.record.library.tip_library import SWUNG, ItemKind
 from lightpen.record.swings.names import Names
 from lightpen.swing.preparation import MissingInput
-from lightpen_app.look.layouts import (
-    GridPlace,
-    grid_layout,
-    horizontal_layout,
-    vertical_layout,
-)
+from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.fields import (
     LONGEST_NAME,
     ItemButton,
@@ -36,9 +23,8 @@ from lightpen_app.steps.start.fields import (
     PointField,
     StationField,
 )
-from lightpen_app.widgets.labelled import add_labelled, field_label
+from lightpen_app.widgets.labelled import add_labelled
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LARGEST_BALL = 100.0  # mm
@@ -61,10 +47,15 @@ class NamesForm(Translated, QWidget):
         super().__init__()
 
         # Widgets: the order of making them is the order of the Tab key
-        self._place = QGroupBox()
-        self._station = StationField()
+        self._place = self.say(QGroupBox(), self.tr("Station and operator"))
+        self._station = self.say(
+            StationField(),
+            tip=self.tr(
+                "Choose a station to restore its settings, or enter a new name."
+            ),
+        )
         self._operator = QLineEdit(maxLength=LONGEST_NAME)
-        self._probe = QGroupBox()
+        self._probe = self.say(QGroupBox(), self.tr("Item under calibration"))
         self._pen = _ListedEdit()
         self._tip = _ListedEdit()
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
@@ -72,34 +63,41 @@ class NamesForm(Translated, QWidget):
         self._nominal_tip = PointField()
         self._lists = {kind: ItemButton() for kind in SWUNG}
         self._edits = (self._operator, self._pen, self._tip, self._cone)
-        self._labels: dict[QWidget, QLabel] = {
-            field: field_label(field)
-            for field in (self._station, *self._edits, self._ball, self._nominal_tip)
-        }
+        self._cone_label = self.make_label(self._cone, self.tr("Cone"))
+        self._nominal_label = self.make_label(
+            self._nominal_tip, self.tr("Nominal tip centre")
+        )
+        choose = self.tr("Choose from the tip library, or open it (arrow down)")
+        self.say(self._lists[ItemKind.PEN], name=self.tr("List of pens"), tip=choose)
+        self.say(self._lists[ItemKind.TIP], name=self.tr("List of tips"), tip=choose)
+        self.say(self._lists[ItemKind.CONE], name=self.tr("List of cones"), tip=choose)
 
         # Layout
         vertical_layout(self, self._place, self._probe, spacing=2 * GRID)
         place = _panel(self._place)
-        self._add(place, self._station, at=(0, 0))
-        self._add(place, self._operator, at=(0, 1))
+        self.make_field(place, self._station, self.tr("Station"))
+        self.make_field(place, self._operator, self.tr("Operator"), at=(0, 1))
         probe = _panel(self._probe)
-        for kind, listed_edit, cell in (
-            (ItemKind.PEN, self._pen, (0, 0)),
-            (ItemKind.CONE, self._cone, (0, 1)),
-            (ItemKind.TIP, self._tip, (1, 0)),
+        tip_label = self.make_label(self._tip, self.tr("Probe tip"))
+        pen_label = self.make_label(self._pen, self.tr("Pen serial number"))
+        for kind, label, edit, cell in (
+            (ItemKind.PEN, pen_label, self._pen, (0, 0)),
+            (ItemKind.CONE, self._cone_label, self._cone, (0, 1)),
+            (ItemKind.TIP, tip_label, self._tip, (1, 0)),
         ):
-            row = self._add_row(probe, listed_edit, at=cell)
-            row.addWidget(self._lists[kind])
-        self._add(probe, self._ball, at=(1, 1))
-        self._add(probe, self._nominal_tip, at=(2, 0, 1, 2))
+            column = vertical_layout(probe, label, spacing=GRID // 2, at=cell)
+            horizontal_layout(column, (edit, 1), self._lists[kind], spacing=GRID // 2)
+        ball, unknown = self.tr("Ball diameter"), self.tr("Not specified")
+        self.make_field(probe, self._ball, ball, hint=unknown, at=(1, 1))
+        add_labelled(probe, self._nominal_label, self._nominal_tip, at=(2, 0, 1, 2))
 
         # Connections
         self._station.value_edited.connect(self.value_edited)
         self._station.value_changed.connect(self.station_changed)
         self._station.entered.connect(self.station_entered)
-        for edit in self._edits:
-            edit.textEdited.connect(self.value_edited)
-            edit.editingFinished.connect(self.value_changed)
+        for each in self._edits:
+            each.textEdited.connect(self.value_edited)
+            each.editingFinished.connect(self.value_changed)
         listed = {
             ItemKind.PEN: self._pen,
             ItemKind.TIP: self._tip,
@@ -111,8 +109,6 @@ class NamesForm(Translated, QWidget):
             button.library_requested.connect(partial(self.library_requested.emit, kind))
         self._ball.value_changed.connect(self.value_changed)
         self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
-
-        self._retranslate()
 
     def value(self) -> Names:
         """Return the names as they are typed."""
@@ -146,8 +142,8 @@ class NamesForm(Translated, QWidget):
         """Show also what has a default: station, operator, cone, nominal centre."""
         self._place.setVisible(more)
         self._nominal_tip.setVisible(more)
-        cone = self._cone, self._lists[ItemKind.CONE], self._labels[self._cone]
-        for each in (*cone, self._labels[self._nominal_tip]):
+        cone = self._cone, self._lists[ItemKind.CONE], self._cone_label
+        for each in (*cone, self._nominal_label):
             each.setVisible(more)
 
     def set_choices(self, kind: ItemKind, choices: Sequence[ItemChoice]) -> None:
@@ -186,45 +182,6 @@ class NamesForm(Translated, QWidget):
         self._ball.settle()
         self._nominal_tip.settle()
 
-    def _add(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> None:
-        add_labelled(grid, self._labels[field], field, at=at)
-
-    def _add_row(self, grid: QGridLayout, field: QWidget, at: GridPlace) -> QHBoxLayout:
-        """Add a name with its label above, and return its row, with room for a list."""
-        column = vertical_layout(grid, self._labels[field], spacing=GRID // 2, at=at)
-        return horizontal_layout(column, (field, 1), spacing=GRID // 2)
-
-    def _retranslate(self) -> None:
-        lists = {
-            ItemKind.PEN: self.tr("List of pens"),
-            ItemKind.TIP: self.tr("List of tips"),
-            ItemKind.CONE: self.tr("List of cones"),
-        }
-        for kind, name in lists.items():
-            self._lists[kind].setAccessibleName(name)
-            set_tooltip(
-                self._lists[kind],
-                self.tr("Choose from the tip library, or open it (arrow down)"),
-            )
-        self._place.setTitle(self.tr("Station and operator"))
-        self._probe.setTitle(self.tr("Item under calibration"))
-        for field, text in (
-            (self._station, self.tr("Station")),
-            (self._operator, self.tr("Operator")),
-            (self._pen, self.tr("Pen serial number")),
-            (self._cone, self.tr("Cone")),
-            (self._tip, self.tr("Probe tip")),
-            (self._ball, self.tr("Ball diameter")),
-            (self._nominal_tip, self.tr("Nominal tip centre")),
-        ):
-            self._labels[field].setText(text)
-            field.setAccessibleName(text)
-        set_tooltip(
-            self._station,
-            self.tr("Choose a station to restore its settings, or enter a new name."),
-        )
-        self._ball.set_empty_text(self.tr("Not specified"))
-
 
 class LimitsForm(Translated, QGroupBox):
     """Limits that end a swing."""
@@ -234,31 +191,62 @@ class LimitsForm(Translated, QGroupBox):
 
     def __init__(self) -> None:
         super().__init__()
+        self.say(self, self.tr("Acceptance limits"))
         self._value = SwingLimits()
 
         # Widgets
         self._uncertainty = NumberField("mm", (0.0001, 1.0), 4)
         self._least = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
         self._most = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
-        self._all = PushButton()
+        self._all = self.make_button(
+            self.tr("All limits..."),
+            self.all_requested,
+            tip=self.tr(
+                "Acceptance limits of swings and verifications; set by a supervisor."
+            ),
+        )
         self._fields = (self._uncertainty, self._least, self._most)
-        self._labels = tuple(map(field_label, self._fields))
 
         # Layout
         layout = _panel(self)
         layout.setColumnStretch(2, 1)
-        for column, field in enumerate(self._fields):
-            add_labelled(layout, self._labels[column], field, at=(0, column))
+        self.make_field(
+            layout,
+            self._uncertainty,
+            self.tr("Max. expanded uncertainty U (k = 2)"),
+            tip=self.tr(
+                "The swing ends when U of the tip along its weakest direction is "
+                "within this limit. Default: {0} mm."
+            ).format(f"{SwingLimits.max_uncertainty:g}"),
+        )
+        self.make_field(
+            layout,
+            self._least,
+            self.tr("Min. images"),
+            tip=self.tr(
+                "The swing does not end with fewer images. Not above the maximum. "
+                "Default: {0}."
+            ).format(SwingLimits.min_images),
+            at=(0, 1),
+        )
+        self.make_field(
+            layout,
+            self._most,
+            self.tr("Max. images"),
+            tip=self.tr(
+                "The swing ends at this number of images. Not below the minimum. "
+                "Default: {0}."
+            ).format(SwingLimits.max_images),
+            at=(0, 2),
+        )
         layout.addWidget(self._all, 0, 3, Qt.AlignmentFlag.AlignBottom)
 
         # Connections
         self._uncertainty.value_changed.connect(self.value_changed)
         self._least.value_changed.connect(self._on_least_changed)
         self._most.value_changed.connect(self._on_most_changed)
-        self._all.clicked.connect(self.all_requested)
 
         self.set_value(self._value)
-        self._retranslate()
 
     def value(self) -> SwingLimits:
         """Return the limits."""
@@ -297,41 +285,6 @@ class LimitsForm(Translated, QGroupBox):
     def _on_most_changed(self, most: float) -> None:
         self._least.set_limits(LEAST_IMAGES, most)
         self.value_changed.emit()
-
-    def _retranslate(self) -> None:
-        self.setTitle(self.tr("Acceptance limits"))
-        self._all.setText(self.tr("All limits..."))
-        set_tooltip(
-            self._all,
-            self.tr(
-                "Acceptance limits of swings and verifications; set by a supervisor."
-            ),
-        )
-        texts = (
-            self.tr("Max. expanded uncertainty U (k = 2)"),
-            self.tr("Min. images"),
-            self.tr("Max. images"),
-        )
-        tips = (
-            self.tr(
-                "The swing ends when U of the tip along its weakest direction is "
-                "within this limit. Default: {0} mm."
-            ).format(f"{SwingLimits.max_uncertainty:g}"),
-            self.tr(
-                "The swing does not end with fewer images. Not above the maximum. "
-                "Default: {0}."
-            ).format(SwingLimits.min_images),
-            self.tr(
-                "The swing ends at this number of images. Not below the minimum. "
-                "Default: {0}."
-            ).format(SwingLimits.max_images),
-        )
-        for field, label, text, tip in zip(
-            self._fields, self._labels, texts, tips, strict=True
-        ):
-            label.setText(text)
-            field.setAccessibleName(text)
-            set_tooltip(field, tip)
 
 
 class _ListedEdit(QLineEdit):

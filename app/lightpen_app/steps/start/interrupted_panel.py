@@ -18,7 +18,6 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
 from lightpen_app.steps.start.interrupted_item import InterruptedItem, RowKind
 from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LONGEST = 16  # characters of a name
@@ -97,17 +96,17 @@ class InterruptedPanel(Translated, QGroupBox):
         self._why_waiting = ""
 
         # Widgets
-        self._hint = text_label(TextSize.SMALL, Tone.QUIET)
+        self._hint = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET),
+            self.tr("A resumed swing keeps its images and its files."),
+        )
         self._scroll = PageScroll()
         self._scroll.setHorizontalScrollBarPolicy(NEVER)
-        self._again = PushButton()
+        self._again = self.make_button(self.tr("Search again"), self.search_requested)
 
         # Layout
         left = Qt.AlignmentFlag.AlignLeft
         vertical_layout(self, self._hint, self._scroll, (self._again, 0, left))
-
-        # Connections
-        self._again.clicked.connect(self.search_requested)
 
         self.hide()
         self._retranslate()
@@ -177,8 +176,6 @@ class InterruptedPanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self._title())
-        self._hint.setText(self.tr("A resumed swing keeps its images and its files."))
-        self._again.setText(self.tr("Search again"))
 
     def _title(self) -> str:
         n_rows = len(self._rows)

@@ -24,15 +24,13 @@ from lightpen.record.library.tip_library import (
 from lightpen_app.look.layouts import GridPlace, grid_layout
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.start.fields import PointField
 from lightpen_app.steps.start.tip_picture import ReadPicture, TipPicture
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.date_field import DateField
-from lightpen_app.widgets.labelled import add_labelled, field_label
+from lightpen_app.widgets.labelled import add_labelled
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.path_field import PathField
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LONGEST_NOTE = 500  # characters
@@ -65,24 +63,50 @@ class ItemForm(Translated, QWidget):
             self._side.addItem("", side)
         self._uncertainty = NumberField("mm", (0.0, 1.0), 4)
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
-        self._change = NumberField("mm", (0.0, LARGEST_CHANGE), 4)
+        self._change = self.say(
+            NumberField("mm", (0.0, LARGEST_CHANGE), 4),
+            tip=self.tr(
+                "Max. distance of the tip from its previous calibration. Beyond it, "
+                "the result needs checking."
+            ),
+        )
         self._days = NumberField("", (0, MOST_DAYS), 0)
         self._swings = NumberField("", (0, MOST_SWINGS), 0)
         self._nominal = PointField()
         self._picture = PathField()
-        self._browse = PushButton()
+        self._browse = self.make_button(self.tr("Browse..."), self._on_browse_clicked)
         self._picture.add_button(self._browse)
         self._preview = TipPicture(PICTURE_SIZE)
         self._note = QLineEdit(maxLength=LONGEST_NOTE)
         own = (self._ball, self._change, self._days, self._swings)
-        of_all = (self._id, self._due, self._certificate, self._certified)
         of_reference = self._value, self._shape, self._uncertainty, self._side
-        fields = (*of_all, *of_reference, *own, self._picture, self._note)
+        nothing, no_limit = self.tr("Not specified"), self.tr("No limit")
+        usual = self.tr("As for the station")
+        texts = (
+            (self._id, self.tr("ID (as on label)"), ""),
+            (self._due, self.tr("Expiry date"), ""),
+            (self._certificate, self.tr("Certificate number"), ""),
+            (self._certified, self.tr("Date of the certificate"), ""),
+            (self._value, self.tr("Certified value"), nothing),
+            (self._shape, self.tr("Shape"), ""),
+            (self._uncertainty, self.tr("U (k = 2) of the value"), nothing),
+            (self._side, self.tr("Contact"), ""),
+            (self._ball, self.tr("Ball diameter"), nothing),
+            (self._change, self.tr("Max. change since last calibration"), no_limit),
+            (self._days, self.tr("Calibration interval (days)"), usual),
+            (self._swings, self.tr("Max. swings of the pen"), usual),
+            (self._nominal, self.tr("Nominal tip centre"), ""),
+            (self._picture, self.tr("Picture"), ""),
+            (self._note, self.tr("Comment"), ""),
+        )
         self._labels: dict[QWidget, QLabel] = {
-            field: field_label(field) for field in (*fields, self._nominal)
+            field: self.make_label(field, text, hint=hint)
+            for field, text, hint in texts
         }
         for field in own:
             self._labels[field].setWordWrap(True)
+        last_day = self.tr("Last day of use, for example {0}; empty for none")
+        self.say(self._due, tip=last_day.format(to_come))
 
         # Layout
         grid = grid_layout(self, spacing=(2 * GRID, GRID // 2))
@@ -112,7 +136,6 @@ class ItemForm(Translated, QWidget):
         self._id.textChanged.connect(self.value_edited)
         for day in (self._due, self._certified):
             day.textChanged.connect(self.value_edited)
-        self._browse.clicked.connect(self._on_browse_clicked)
         self._picture.value_changed.connect(self._show_picture)
 
         self._retranslate()
@@ -216,53 +239,11 @@ class ItemForm(Translated, QWidget):
         add_labelled(grid, self._labels[field], field, at=at)
 
     def _retranslate(self) -> None:
-        nothing = self.tr("Not specified")
-        usual = self.tr("As for the station")
-        texts: dict[QWidget, str] = {
-            self._id: self.tr("ID (as on label)"),
-            self._due: self.tr("Expiry date"),
-            self._certificate: self.tr("Certificate number"),
-            self._certified: self.tr("Date of the certificate"),
-            self._value: self.tr("Certified value"),
-            self._shape: self.tr("Shape"),
-            self._uncertainty: self.tr("U (k = 2) of the value"),
-            self._side: self.tr("Contact"),
-            self._ball: self.tr("Ball diameter"),
-            self._change: self.tr("Max. change since last calibration"),
-            self._days: self.tr("Calibration interval (days)"),
-            self._swings: self.tr("Max. swings of the pen"),
-            self._nominal: self.tr("Nominal tip centre"),
-            self._picture: self.tr("Picture"),
-            self._note: self.tr("Comment"),
-        }
-        for field, text in texts.items():
-            self._labels[field].setText(text)
-            named = self._picture.edit if field is self._picture else field
-            named.setAccessibleName(text)
-        set_tooltip(
-            self._due,
-            self.tr("Last day of use, for example {0}; empty for none").format(
-                date(local_now().year + 1, 8, 14)
-            ),
-        )
-        for field in (self._ball, self._value, self._uncertainty):
-            field.set_empty_text(nothing)
-        self._shape.setItemText(0, nothing)
+        self._shape.setItemText(0, self.tr("Not specified"))
         for index, shape in enumerate(ArtefactKind, start=1):
             self._shape.setItemText(index, worded(KIND_WORDS[shape]))
         for index, side in enumerate(SIDES):
             self._side.setItemText(index, worded(SIDES[side]))
-        self._change.set_empty_text(self.tr("No limit"))
-        set_tooltip(
-            self._change,
-            self.tr(
-                "Max. distance of the tip from its previous calibration. Beyond it, "
-                "the result needs checking."
-            ),
-        )
-        for field in (self._days, self._swings):
-            field.set_empty_text(usual)
-        self._browse.setText(self.tr("Browse..."))
         kept = self._item.picture if isinstance(self._item, ListedTip) else None
         self._picture.edit.setPlaceholderText("" if kept is None else kept.place)
 

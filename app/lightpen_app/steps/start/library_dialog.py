@@ -73,6 +73,7 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.say(self, self.tr("Tip library"))
         self._folder = folder
         self._pictured: ListedTip | None = None
         self._statuses = StationStatus()
@@ -84,28 +85,56 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._asked: RequestedChange | None = None  # pending: not known to be stored
 
         # Widgets
-        self._lead = text_label(TextSize.BODY)
-        self._tabs = QTabBar()
-        for _ in KINDS:
-            self._tabs.addTab("")
-        self._model = QStandardItemModel(self)
+        self._lead = self.say(
+            text_label(TextSize.BODY),
+            self.tr(
+                "Pens, tips, cones, cameras and references with their limits. Each "
+                "change is recorded in the archive with name and time."
+            ),
+        )
+        self._names = (
+            self.tr("Tips"),
+            self.tr("Pens"),
+            self.tr("Cones"),
+            self.tr("Cameras"),
+            self.tr("References"),
+        )
+        self._tabs = self.say_items(QTabBar(), self._names)
+        columns = (
+            self.tr("ID"),
+            self.tr("State"),
+            self.tr("Expiry date"),
+            self.tr("Ball / mm"),
+            self.tr("Change / mm"),
+            self.tr("Calibrated on pens"),
+            self.tr("Comment"),
+        )
+        self._model = QStandardItemModel(0, len(columns), self)
+        self.say_items(self._model, columns)
+        for column in NUMBERS:
+            role = Qt.ItemDataRole.TextAlignmentRole
+            self._model.setHeaderData(column, Qt.Orientation.Horizontal, RIGHT, role)
         self._table = RowTable(self._model)
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self._table.setMinimumHeight((LEAST_ROWS + 1) * ROW_HEIGHT)
         self._picture = TipPicture(PICTURE_SIZE)
-        self._retired = QCheckBox()
-        self._use, self._add, self._edit, self._retire, self._close = (
-            PushButton() for _ in range(5)
-        )
+        self._retired = self.say(QCheckBox(), self.tr("Show retired items"))
+        self._use = self.make_button(self.tr("Choose"), self._on_use_clicked)
+        self._add = self.make_button(self.tr("Add..."))
+        self._edit = self.make_button(self.tr("Change..."), self._on_edit_clicked)
+        self._retire = PushButton()
+        self._close = self.make_button(self.tr("Close"))
         self._panel = QFrame()
         self._panel.setProperty("area", "panel")
         self._what = text_label(TextSize.LEAD)
         self.form = ItemForm(folder)
-        self._reason = EnterEdit(maxLength=LONGEST_REASON)
+        reason = self.tr("Reason for change")
+        self._reason = self.say(EnterEdit(maxLength=LONGEST_REASON), hint=reason)
         self._supervisor = SupervisorFields()
         self._fault = SignLabel()
-        self._save, self._leave = PushButton(), PushButton()
+        self._save = self.make_button(self.tr("Save"), self._on_save_clicked)
+        self._leave = self.make_button(self.tr("Cancel"), self._stop_editing)
         self._save.setDefault(True)
 
         # Layout
@@ -137,13 +166,9 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
         self._retired.toggled.connect(self._fill)
         self._table.selectionModel().currentRowChanged.connect(self._refresh)
         self._table.doubleClicked.connect(self._on_double_clicked)
-        self._use.clicked.connect(self._on_use_clicked)
         self._add.clicked.connect(lambda: self.add(""))
-        self._edit.clicked.connect(self._on_edit_clicked)
         self._retire.clicked.connect(self._on_retire_clicked)
         self._close.clicked.connect(self.accept)
-        self._leave.clicked.connect(self._stop_editing)
-        self._save.clicked.connect(self._on_save_clicked)
         self.form.value_edited.connect(self._refresh)
         self._supervisor.value_edited.connect(self._refresh)
 
@@ -359,48 +384,9 @@ class LibraryDialog(FittedWindow, Translated, QDialog):
 
     @override
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Tip library"))
-        self._lead.setText(
-            self.tr(
-                "Pens, tips, cones, cameras and references with their limits. Each "
-                "change is recorded in the archive with name and time."
-            )
-        )
-        names = {
-            ItemKind.TIP: self.tr("Tips"),
-            ItemKind.PEN: self.tr("Pens"),
-            ItemKind.CONE: self.tr("Cones"),
-            ItemKind.CAMERA: self.tr("Cameras"),
-            ItemKind.REFERENCE: self.tr("References"),
-        }
-        for index, kind in enumerate(KINDS):
-            self._tabs.setTabText(index, names[kind])
-        self._model.setHorizontalHeaderLabels(
-            [
-                self.tr("ID"),
-                self.tr("State"),
-                self.tr("Expiry date"),
-                self.tr("Ball / mm"),
-                self.tr("Change / mm"),
-                self.tr("Calibrated on pens"),
-                self.tr("Comment"),
-            ]
-        )
-        for column in NUMBERS:
-            self._model.horizontalHeaderItem(column).setTextAlignment(RIGHT)
         is_tips = self.kind() is ItemKind.TIP
         for column, width in enumerate(WIDTHS):
             self._table.setColumnWidth(column, width * GRID)
             self._table.setColumnHidden(column, 3 <= column <= 5 and not is_tips)
-        self._table.setAccessibleName(names[self.kind()])
-        self._retired.setText(self.tr("Show retired items"))
-        self._use.setText(self.tr("Choose"))
-        self._add.setText(self.tr("Add..."))
-        self._edit.setText(self.tr("Change..."))
-        self._close.setText(self.tr("Close"))
-        self._save.setText(self.tr("Save"))
-        self._leave.setText(self.tr("Cancel"))
-        reason = self.tr("Reason for change")
-        self._reason.setPlaceholderText(reason)
-        self._reason.setAccessibleName(reason)
+        self.say(self._table, self._names[self._tabs.currentIndex()])
         self._fill()

@@ -1,16 +1,14 @@
 """Dialog for the limits of a station, set by a supervisor."""
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLineEdit, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QLineEdit, QWidget
 from typing_extensions import override
 
 from lightpen.model.limits import LIMITS, Limit, StationLimits
 from lightpen.record.library.supervision import Signature, Supervision, read_supervision
 from lightpen.record.library.supervision_changes import save_limits
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import phrases_whole
 from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_window import FittedWindow
@@ -18,7 +16,7 @@ from lightpen_app.widgets.number_field import NumberField, is_refusing
 from lightpen_app.widgets.page_scroll import DialogScroll
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.translated import Translated, core_text
 from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
 
@@ -31,27 +29,35 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.say(self, self.tr("Acceptance limits of the station"))
         self._value = StationLimits()
         self._is_guarded = False
         self._is_signed = False  # and waits for the outcome
 
         # Widgets
-        self._lead = text_label(TextSize.BODY)
+        self._lead = self.say(
+            text_label(TextSize.BODY),
+            self.tr(
+                "Results outside these limits need a supervisor's approval and a "
+                "reason. Each change is recorded with name and time."
+            ),
+        )
         self._fields = {
-            limit.key: _RuleField(limit) if limit.choices else _number_field(limit)
+            limit.key: _RuleField() if limit.choices else _number_field(limit)
             for limit in LIMITS
         }
-        self._labels = [text_label(TextSize.SMALL, Tone.QUIET) for _ in LIMITS]
-        for label, field in zip(self._labels, self._fields.values(), strict=True):
-            label.setBuddy(field)
         self._signing = text_label(TextSize.SMALL, Tone.QUIET)
         self._supervisor = SupervisorFields()
-        self._new_password = QLineEdit()
+        new = self.tr("New password; empty to keep the current one")
+        self._new_password = self.say(QLineEdit(), hint=new)
         self._new_password.setEchoMode(QLineEdit.EchoMode.Password)
         self._fault = SignLabel()
         standard = QDialogButtonBox.StandardButton
         self._buttons = QDialogButtonBox(standard.Save | standard.Close)
-        self._save = self._buttons.button(standard.Save)
+        self.say(self._buttons.button(standard.Close), self.tr("Close"))
+        self._save = self.say(
+            self._buttons.button(standard.Save), self.tr("Save limits")
+        )
 
         # Layout
         layout = vertical_layout(self, self._lead, margins=3 * GRID)
@@ -62,7 +68,7 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
         n_rows = (len(self._fields) + 1) // 2
         for index, field in enumerate(self._fields.values()):
             column, row = divmod(index, n_rows)
-            grid.addWidget(self._labels[index], row, 2 * column)
+            grid.addWidget(self._label(LIMITS[index], field), row, 2 * column)
             grid.addWidget(field, row, 2 * column + 1)
         scroll.setWidget(fields)
         fill(layout, (scroll, 1))
@@ -127,13 +133,6 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
 
     @override
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Acceptance limits of the station"))
-        self._lead.setText(
-            self.tr(
-                "Results outside these limits need a supervisor's approval and a "
-                "reason. Each change is recorded with name and time."
-            )
-        )
         self._signing.setText(
             self.tr("Sign with the supervisor password.")
             if self._is_guarded
@@ -141,34 +140,24 @@ class LimitsDialog(FittedWindow, Translated, QDialog):
                 "No password is set. The one you enter becomes the supervisor password."
             )
         )
-        self._save.setText(self.tr("Save limits"))
-        close = QDialogButtonBox.StandardButton.Close
-        self._buttons.button(close).setText(self.tr("Close"))
-        new = self.tr("New password; empty to keep the current one")
-        self._new_password.setPlaceholderText(new)
-        self._new_password.setAccessibleName(new)
-        no_limit = self.tr("No limit")
-        for limit, label in zip(LIMITS, self._labels, strict=True):
-            field, text = self._fields[limit.key], worded(limit.label)
-            label.setText(phrases_whole(text))
-            field.setAccessibleName(text)
-            if isinstance(field, _RuleField):
-                usually = field.retranslate()
-            else:
-                is_absent = not limit.range[0] and not limit.unit
-                if is_absent:
-                    field.set_empty_text(no_limit)
-                usually = no_limit if is_absent else f"{limit.default:g}"
-            set_tooltip(field, self.tr("Default: {0}.").format(usually))
+
+    def _label(self, limit: Limit, field: QWidget) -> QLabel:
+        """Return the label of a field, which tells the default."""
+        is_absent = not limit.range[0] and not limit.unit
+        no_limit = self.tr("No limit") if is_absent else ""
+        usual = no_limit or f"{limit.default:g}"
+        if isinstance(field, _RuleField):
+            choices = [core_text(each) for each in limit.choices]
+            self.say_items(field, choices)
+            usual = choices[round(limit.default)]
+        tip = self.tr("Default: {0}.").format(usual)
+        label = self.make_label(field, core_text(limit.label), tip=tip, hint=no_limit)
+        label.setWordWrap(True)
+        return self.say(label, core_text(limit.label, phrases_whole))
 
 
 class _RuleField(ChoiceField):
     """A choice of a limit by its index, as `Limit` has it."""
-
-    def __init__(self, limit: Limit) -> None:
-        super().__init__()
-        self._limit = limit
-        self.addItems([str(each) for each in limit.choices])
 
     def value(self) -> float:
         """Return the index of the choice."""
@@ -177,12 +166,6 @@ class _RuleField(ChoiceField):
     def set_value(self, value: float) -> None:
         """Show the choice of an index."""
         self.setCurrentIndex(round(value))
-
-    def retranslate(self) -> str:
-        """Word all choices, and return the usual one."""
-        for i, each in enumerate(self._limit.choices):
-            self.setItemText(i, worded(each))
-        return self.itemText(round(self._limit.default))
 
 
 def _number_field(limit: Limit) -> NumberField:

@@ -22,10 +22,8 @@ from lightpen_app.look.layouts import (
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, mm_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.origin_mark import origin_message
-from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import Question, QuestionBar
 from lightpen_app.widgets.responsive_layout import SizeClass
 from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
@@ -79,10 +77,18 @@ class LastResultPanel(Translated, QGroupBox):
         self._origin = SignLabel()
         self._reason = SignLabel()
         self._warning = SignLabel()
-        self._verify = PushButton()
+        self._verify = self.make_button(
+            self.tr("Verify tip"), self.verification_requested
+        )
         if not can_verify:
             self._verify.hide()
-        self._take_back = PushButton()
+        self._take_back = self.make_button(
+            self.tr("Revoke acceptance..."),
+            self._ask_to_take_back,
+            tip=self.tr(
+                "Reinstate the previous result. Both results stay in the archive."
+            ),
+        )
         self._question = QuestionBar()
         self._question.set_words(self._taking_back)
         self._withdrawal = WithdrawalBar()
@@ -109,8 +115,6 @@ class LastResultPanel(Translated, QGroupBox):
         fill(layout, self._question, self._withdrawal)
 
         # Connections
-        self._verify.clicked.connect(self.verification_requested)
-        self._take_back.clicked.connect(self._ask_to_take_back)
         self._withdrawal.given.connect(self._on_signed)
         self._withdrawal.declined.connect(self._take_back.setFocus)
         self._question.agreed.connect(self._on_agreed)
@@ -174,12 +178,6 @@ class LastResultPanel(Translated, QGroupBox):
             else self.tr("Last calibration of this pen and tip")
         )
         self._status.set_value(status_message(self._marked))
-        self._verify.setText(self.tr("Verify tip"))
-        self._take_back.setText(self.tr("Revoke acceptance..."))
-        set_tooltip(
-            self._take_back,
-            self.tr("Reinstate the previous result. Both results stay in the archive."),
-        )
         for button in (self._verify, self._take_back):
             button.setVisible(value.result is not None)
         if value.result is not None:

@@ -26,9 +26,13 @@ class SetupView(Translated, QWidget):
         self.names, self.limits = NamesForm(), LimitsForm()
         self.assumed = AssumptionsPanel()
         self.folder = DataFolderPanel(workbench.folder, workbench.notifications)
-        self._more = PushButton(checkable=True)
-        self._done = PushButton()
-        self._welcome = PushButton()
+        self._more = self.say(PushButton(checkable=True), self.tr("More"))
+        self._done = self.make_button(
+            self.tr("Show the tips of this station"), self.done
+        )
+        self._welcome = self.make_button(
+            self.tr("Other ways to begin"), self.welcome_requested
+        )
 
         # Layout
         rows = vertical_layout(self, spacing=3 * GRID)
@@ -49,11 +53,8 @@ class SetupView(Translated, QWidget):
 
         # Connections
         self._more.toggled.connect(self.set_more)
-        self._done.clicked.connect(self.done)
-        self._welcome.clicked.connect(self.welcome_requested)
 
         self.set_more(is_known)
-        self._retranslate()
 
     def lead(self) -> str:
         """Return what to enter."""
@@ -75,8 +76,3 @@ class SetupView(Translated, QWidget):
     def set_why_not_done(self, why_not: str) -> None:
         """Show the missing inputs of the day page."""
         self._done.set_why_not(why_not)
-
-    def _retranslate(self) -> None:
-        self._more.setText(self.tr("More"))
-        self._done.setText(self.tr("Show the tips of this station"))
-        self._welcome.setText(self.tr("Other ways to begin"))

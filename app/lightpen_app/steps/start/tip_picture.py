@@ -20,6 +20,7 @@ class TipPicture(Translated, QLabel):
 
     def __init__(self, place: QSize) -> None:
         super().__init__()
+        self.say(self, self.tr("Picture of the tip"))
         self._job = LatestJob(self)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setWordWrap(True)
@@ -44,7 +45,6 @@ class TipPicture(Translated, QLabel):
         self.setPixmap(QPixmap.fromImage(image))
 
     def _retranslate(self) -> None:
-        self.setAccessibleName(self.tr("Picture of the tip"))
         if not self._job.is_running and self.pixmap().isNull():
             self.setText(self.tr("No picture"))
 

@@ -14,7 +14,6 @@ from lightpen.swing.capture.state import SwingState
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.quantities import AXES, MICROMETRES
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.figure import Axes
 from lightpen_app.widgets.plots import Curve, TracePlot
 from lightpen_app.widgets.translated import Translated
@@ -44,15 +43,43 @@ class SwingPlots(Translated, QWidget):
         # Widgets
         self._choice = QTabBar(documentMode=True, drawBase=False)
         self._choice.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # Space is the swing's
-        self._choice.addTab("")
-        self._choice.addTab("")
-        misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
-        uncertainty = TracePlot(
-            Axes(""), [Curve("expanded_uncertainty_um"), Curve("floor_um")], y_log=True
+        self.say_items(self._choice, (self.tr("Residuals and U"), self.tr("Tip")))
+        image = self.tr("image")
+        axes = Axes(self.tr("Residual of each image"), image, "RMS / px")
+        misfit = self.say(
+            TracePlot(axes, [Curve("misfit_px")], y_zero=True),
+            tip=self.tr(
+                "How far the LEDs of an image are from where the fit expects them. "
+                "This fit takes the LEDs as in their file; that of the review may "
+                "correct them, and leave smaller residuals."
+            ),
         )
-        scatter, estimate = (
-            TracePlot(Axes(""), [Curve(f"{a}_um", a) for a in axes], is_robust=True)
-            for axes in (CAMERA_AXES, AXES)
+        axes = Axes(self.tr("Uncertainty of the tip"), image, self.tr("U (k = 2) / µm"))
+        curves = [Curve("expanded_uncertainty_um"), Curve("floor_um")]
+        uncertainty = self.say(
+            TracePlot(axes, curves, y_log=True),
+            tip=self.tr(
+                "U of the tip in its weakest direction. The swing ends below the limit "
+                "(horizontal line). Dashed: what more images cannot improve."
+            ),
+        )
+        axes = Axes(self.tr("Tip of each image"), image, "µm")
+        curves = [Curve(f"{a}_um", a) for a in CAMERA_AXES]
+        scatter = self.say(
+            TracePlot(axes, curves, is_robust=True),
+            tip=self.tr(
+                "The tip by each image alone, from the cone: u to the right, v down, w "
+                "away from the camera. A step means that the tip has slipped."
+            ),
+        )
+        axes = Axes(self.tr("Estimate of the tip"), image, "µm")
+        curves = [Curve(f"{a}_um", a) for a in AXES]
+        estimate = self.say(
+            TracePlot(axes, curves, is_robust=True),
+            tip=self.tr(
+                "The tip by all images so far, from its newest value. First estimates "
+                "that are far off are cut off."
+            ),
         )
         self._traces = (
             _Trace(misfit, self._show_misfit),
@@ -85,7 +112,7 @@ class SwingPlots(Translated, QWidget):
         """
         if self._limit != MICROMETRES * max_uncertainty:
             self._limit = MICROMETRES * max_uncertainty
-            self._show_limit()
+            self._retranslate()
         self._turn = (self._turn + 1) % N_SHOWN
         trace = self._traces[N_SHOWN * self._choice.currentIndex() + self._turn]
         if trace.shown is not state:
@@ -119,52 +146,12 @@ class SwingPlots(Translated, QWidget):
         changes = MICROMETRES * (trace.tips - trace.tips[-1:])
         self._traces[3].plot.set_data(trace.n_images.astype(np.float64), *changes.T)
 
-    def _show_limit(self) -> None:
+    def _retranslate(self) -> None:
         words = "" if self._limit is None else f"{self._limit:g}"
         limit = self.tr("limit {0}").format(words)
-        self._traces[1].plot.set_limit(self._limit, limit)
-
-    def _retranslate(self) -> None:
-        image = self.tr("image")
-        misfit, uncertainty, scatter, estimate = self.plots()
-        self._choice.setTabText(0, self.tr("Residuals and U"))
-        self._choice.setTabText(1, self.tr("Tip"))
-        misfit.set_axes(Axes(self.tr("Residual of each image"), image, "RMS / px"))
-        set_tooltip(
-            misfit,
-            self.tr(
-                "How far the LEDs of an image are from where the fit expects them. "
-                "This fit takes the LEDs as in their file; that of the review may "
-                "correct them, and leave smaller residuals."
-            ),
-        )
-        words = self.tr("Uncertainty of the tip"), image, self.tr("U (k = 2) / µm")
-        uncertainty.set_axes(Axes(*words))
-        uncertainty.set_names("U", self.tr("achievable"))
-        set_tooltip(
-            uncertainty,
-            self.tr(
-                "U of the tip in its weakest direction. The swing ends below the limit "
-                "(horizontal line). Dashed: what more images cannot improve."
-            ),
-        )
-        scatter.set_axes(Axes(self.tr("Tip of each image"), image, "µm"))
-        set_tooltip(
-            scatter,
-            self.tr(
-                "The tip by each image alone, from the cone: u to the right, v down, w "
-                "away from the camera. A step means that the tip has slipped."
-            ),
-        )
-        estimate.set_axes(Axes(self.tr("Estimate of the tip"), image, "µm"))
-        set_tooltip(
-            estimate,
-            self.tr(
-                "The tip by all images so far, from its newest value. First estimates "
-                "that are far off are cut off."
-            ),
-        )
-        self._show_limit()
+        plot = self._traces[1].plot
+        plot.set_limit(self._limit, limit)
+        plot.set_names("U", self.tr("achievable"))
 
 
 def _numbers(kept: AcceptedImages) -> FloatArray:

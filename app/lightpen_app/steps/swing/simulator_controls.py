@@ -8,7 +8,6 @@ from lightpen.live.sources import Operator
 from lightpen.model.posture import Posture
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
@@ -33,22 +32,41 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
         # Widgets
         self._follow = PushButton(checkable=True)
         self._follow.setProperty("inviting", True)
-        self._more = PushButton()
+        others = self.tr("What else the simulated operator can do with the pen")
+        self._more = self.make_button(self.tr("Other movements"), tip=others)
+        self._more.setAccessibleDescription(others)
         self._more.setProperty("menu", True)
         menu = QMenu(self._more)
         menu.setToolTipsVisible(True)
-        self._actions = tuple(
-            menu.addAction("", slot)
-            for slot in (
-                lambda: self._command(lambda hand: hand.seat()),
-                self._on_swing_clicked,
-                self._on_hold_clicked,
-                lambda: self._command(lambda hand: hand.lift()),
-                lambda: self._command(lambda hand: hand.leave()),
-                lambda: self._command(lambda hand: hand.slip(SLIP_MM, SLIP_S)),
-                lambda: self._command(lambda hand: hand.cover(COVER_S)),
-            )
+        acts = (
+            lambda: self._command(lambda hand: hand.seat()),
+            self._on_swing_clicked,
+            self._on_hold_clicked,
+            lambda: self._command(lambda hand: hand.lift()),
+            lambda: self._command(lambda hand: hand.leave()),
+            lambda: self._command(lambda hand: hand.slip(SLIP_MM, SLIP_S)),
+            lambda: self._command(lambda hand: hand.cover(COVER_S)),
         )
+        words = (
+            self.tr("Seat"),
+            self.tr("Swing"),
+            self.tr("Hold"),
+            self.tr("Lift"),
+            self.tr("Leave"),
+            self.tr("Slip"),
+            self.tr("Cover"),
+        )
+        tips = (
+            self.tr("Seats the tip in the cone; then drag the dot of the dial"),
+            self.tr("Swings the pen about the cone regardless of the arrow"),
+            self.tr("Holds the pen still"),
+            self.tr("Lifts the tip out of the cone"),
+            self.tr("Moves the pen out of the image"),
+            self.tr("Lets the tip slip by {0} mm for a moment").format(SLIP_MM),
+            self.tr("Covers the LEDs for a moment"),
+        )
+        for act, text, tip in zip(acts, words, tips, strict=True):
+            self.say(menu.addAction("", act), text, tip=tip)
         self._more.setMenu(menu)
 
         # Layout
@@ -61,13 +79,13 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
             # A click leaves Space and Enter to the swing.
             each.setFocusPolicy(Qt.FocusPolicy.TabFocus)
 
+        self.say(self, self.tr("Simulated pen"))
         self._use_room()
-        self._retranslate()
         self._follow_connection()
 
     @override
     def _use_room(self) -> None:
-        self._name_swing()
+        self._retranslate()
 
     def lean(self, posture: Posture) -> None:
         """Hold the pen as the user requests, instead of following the swing."""
@@ -86,34 +104,6 @@ class SwingSimulatorControls(ResponsiveLayout, SimulatorControls):
 
     @override
     def _retranslate(self) -> None:
-        self.setAccessibleName(self.tr("Simulated pen"))
-        self._name_swing()
-        slip = self.tr("Lets the tip slip by {0} mm for a moment").format(SLIP_MM)
-        words = (
-            (
-                self.tr("Seat"),
-                self.tr("Seats the tip in the cone; then drag the dot of the dial"),
-            ),
-            (
-                self.tr("Swing"),
-                self.tr("Swings the pen about the cone regardless of the arrow"),
-            ),
-            (self.tr("Hold"), self.tr("Holds the pen still")),
-            (self.tr("Lift"), self.tr("Lifts the tip out of the cone")),
-            (self.tr("Leave"), self.tr("Moves the pen out of the image")),
-            (self.tr("Slip"), slip),
-            (self.tr("Cover"), self.tr("Covers the LEDs for a moment")),
-        )
-        for action, (text, tooltip) in zip(self._actions, words, strict=True):
-            action.setText(text)
-            set_tooltip(action, tooltip)
-        set_words(
-            self._more,
-            self.tr("Other movements"),
-            self.tr("What else the simulated operator can do with the pen"),
-        )
-
-    def _name_swing(self) -> None:
         set_words(
             self._follow,
             self.tr("Simulated swing")

@@ -9,7 +9,6 @@ from typing_extensions import override
 
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
 from lightpen_app.steps.swing.page_state import SwingPageState, side_text
 from lightpen_app.widgets.fitted_text import FittedText
@@ -56,9 +55,18 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         self._room = NO_ROOM  # so that its least size at first widens no window
 
         # Widgets
-        self.side, self.start_over = PushButton(), PushButton()  # at the upper right
+        self.side = PushButton()
+        self.start_over = self.make_button(
+            self.tr("Start over"),
+            tip=self.tr(
+                "Abandon this swing and start again. Its images remain on the disk."
+            ),
+        )
         # For an operator who stands elsewhere than the arrow assumes.
-        self.swapped = PushButton()
+        self.swapped = self.make_button(
+            self.tr("Left and right are swapped"),
+            tip=self.tr("Learn again on which side you stand."),
+        )
         self._instruction = FittedText(TextSize.HUGE)
         self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
         self._warning = SignLabel()
@@ -71,7 +79,9 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
         )
         self._count = FittedText(TextSize.DISPLAY, wraps=False)
         self._note = text_label(TextSize.SMALL, Tone.QUIET)
-        self._progress = QProgressBar(maximum=PROGRESS_STEPS, textVisible=False)
+        self._progress = self.say(
+            QProgressBar(maximum=PROGRESS_STEPS, textVisible=False), self.tr("Progress")
+        )
         self._banner = StateBanner(TextSize.TITLE)
         self._pen = PenInSpace()
         self._image = ImageView()
@@ -147,16 +157,6 @@ class SwingView(ResponsiveLayout, Translated, QWidget):
 
     def _retranslate(self) -> None:
         self._image.set_message(self.tr("No image yet"))
-        self._progress.setAccessibleName(self.tr("Progress"))
-        self.swapped.setText(self.tr("Left and right are swapped"))
-        set_tooltip(self.swapped, self.tr("Learn again on which side you stand."))
-        self.start_over.setText(self.tr("Start over"))
-        set_tooltip(
-            self.start_over,
-            self.tr(
-                "Abandon this swing and start again. Its images remain on the disk."
-            ),
-        )
 
     @property
     def _is_small(self) -> bool:

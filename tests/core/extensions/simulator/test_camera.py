@@ -13,6 +13,7 @@ from lightpen.model.camera import Camera
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.sightings import find_points
 from lightpen_extensions.boards.simulated_boards import HELD_IMAGES, HELD_S, HeldBoard
+from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
@@ -50,7 +51,7 @@ def streaming_camera(
     return camera
 
 
-def read(camera: FaultyCamera, n_frames: int) -> list[Frame]:
+def read(camera: SimulatedCamera, n_frames: int) -> list[Frame]:
     return [camera.read(1.0) for _ in range(n_frames)]
 
 
@@ -225,6 +226,20 @@ def test_a_live_camera_loses_images_when_more_wait_than_it_buffers(
 
     assert after.seq == before.seq + 1 + n_lost
     assert camera.stats().missed == n_lost
+
+
+def test_a_simulated_camera_loses_no_images_on_a_busy_computer() -> None:
+    clock = LateClock()
+    camera = SimulatedCamera(SCENE, clock)
+    camera.open()
+    camera.start()
+    (before,) = read(camera, 1)
+    clock.wait(100.0)
+    (after,) = read(camera, 1)
+
+    assert after.seq == before.seq + 1
+    assert after.host_ts_ns - before.host_ts_ns > 99e9
+    assert camera.stats().missed == 0
 
 
 def test_a_board_is_held_still_for_a_slow_reader_too() -> None:
