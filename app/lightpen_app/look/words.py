@@ -19,9 +19,12 @@ def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:
 
 
 def with_short_words(text: str) -> str:
-    """Return a text that fits a narrow place: words that cannot wrap lose their end."""
+    """Return a text that fits a narrow place: names that cannot wrap lose their end.
+
+    Paths stay whole.
+    """
     # Qt may begin a new line beside any Chinese character.
-    word = rf"[^\s{BREAK}{JOINER}\u2e80-\uffef]{{{LONGEST_WORD + 1},}}"
+    word = rf"(?<!\S)[^\s/\\{BREAK}{JOINER}\u2e80-\uffef]{{{LONGEST_WORD + 1},}}(?!\S)"
     return re.sub(word, lambda found: shortened(found.group(), LEAST_SHOWN), text)
 
 
