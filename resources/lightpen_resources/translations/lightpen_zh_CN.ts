@@ -7620,10 +7620,6 @@ needed</source>
         <translation>摆动过程中锥孔与相机相对移动 {distance:.3f} mm。结果已尽可能修正，但测点同样会受影响。请固定两者，并让相机充分预热。</translation>
     </message>
     <message>
-        <source>Dask is not installed; computing on a cluster needs it. Install the extra &quot;cluster&quot;, or compute on this machine.</source>
-        <translation>未安装集群计算所需的 Dask。请安装附加组件 cluster，或在本机计算。</translation>
-    </message>
-    <message>
         <source>Decision rule of verifications</source>
         <translation>验证的判定规则</translation>
     </message>
@@ -7922,10 +7918,6 @@ needed</source>
     <message>
         <source>Next: verify the tip in a fixed point, or probe again with the pen tilted and turned another way at each point.</source>
         <translation>下一步：用固定点验证测头，或重新触测，每点以不同方式倾斜和转动光笔。</translation>
-    </message>
-    <message>
-        <source>No Dask scheduler responds at {address}. Check the address, such as tcp://10.0.0.5:8786, and that the scheduler is running.</source>
-        <translation>{address} 处没有 Dask 调度器应答。请检查地址（例如 tcp://10.0.0.5:8786）以及调度器是否在运行。</translation>
     </message>
     <message>
         <source>No LED moved relative to the others in {n_swings} swings.</source>
