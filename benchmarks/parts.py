@@ -32,9 +32,11 @@ from lightpen_extensions.measure.measuring.starts import frame_about
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.probed_point import measure_touches
-from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.measure.verification.tasks.task import (
+    Conditions,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 CAMERAS = 1, 2
@@ -150,7 +152,7 @@ def _probed() -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     names, places, approaches = [], [], []
     for run, planned in enumerate(_plan().features):
         for step in range(planned.n_touches):
-            goal = PART.hand(PartOptions(_plan()), run, step)
+            goal = PART.hand(VerificationChoices(plan=_plan()), run, step)
             assert goal.point is not None
             assert goal.outwards is not None
             names.append(planned.name)
@@ -174,8 +176,9 @@ def _covered_part(n_cameras: int, rng: np.random.Generator) -> CoveredPart:
         )
     ]
     runs = [(name, [point]) for name, point in zip(names, points, strict=True)]
-    conditions = Conditions(station.instrument, ball_diameter=BALL)
-    part = PART.measure(runs, conditions, PartOptions(_plan(), 0.0)).part
+    conditions = Conditions(station.instrument, ball_diameter=BALL, ball_uncertainty=0)
+    choices = VerificationChoices(PART.kind, _plan())
+    part = PART.measure(runs, conditions, choices).part
     exact = measure_part(_plan(), replace(part.touches, points_cam=places))
     features, holds = {}, {}
     for name, one in part.features.items():

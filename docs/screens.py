@@ -68,19 +68,17 @@ from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
-from lightpen_extensions.measure.verification.session.session import advance_session
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
+    advance_session,
 )
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
-)
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
-from lightpen_extensions.measure.verification.tasks.task import HandGoal
+from lightpen_extensions.measure.verification.tasks.task import (
+    HandGoal,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.follower import GuidedOperator
 from lightpen_extensions.simulator.hand import Operator
@@ -107,9 +105,9 @@ N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 N_RECEIVED = 1240  # images, by the camera
-CHOICES = VerificationChoices(FIXED_POINT.kind, (FixedPointOptions(n_frames=10),))
+CHOICES = VerificationChoices(n_cone_frames=10)
 PART_CHOICES = VerificationChoices(
-    options=(PartOptions(plate_plan().limited_to({"top", "hole 1", "dome"})),)
+    plan=plate_plan().limited_to({"top", "hole 1", "dome"})
 )
 N_TOUCHED = 4  # points of a verification that is under way
 N_HELD = 16  # images through which the pen is held still
@@ -527,14 +525,13 @@ def _touched(
     setup: SessionSetup, scene: Scene, n_touches: int = N_TOUCHED
 ) -> SessionState:
     """Return a verification after some points in the cone."""
-    options = setup.choices.options_of(FIXED_POINT)
-    goals = [FIXED_POINT.hand(options, 0, i) for i in range(n_touches)]
+    goals = [FIXED_POINT.hand(setup.choices, 0, i) for i in range(n_touches)]
     return _probed(setup, scene, [replace(goal, point=np.zeros(3)) for goal in goals])
 
 
 def _verified(setup: SessionSetup, scene: Scene) -> SessionState:
     """Return a verification with its result."""
-    return _touched(setup, scene, setup.choices.options_of(FIXED_POINT).n_touches)
+    return _touched(setup, scene, setup.choices.n_cone)
 
 
 def _measuring(setup: SessionSetup, scene: Scene) -> SessionState:
@@ -546,14 +543,12 @@ def _measured(
     setup: SessionSetup, scene: Scene, n_points: int | None = None
 ) -> SessionState:
     """Return a part with all its features, or after the first points."""
-    options = setup.choices.options_of(PART)
-    assert options.plan is not None
     return _probed(
         setup,
         scene,
         [
-            PART.hand(options, run, i)
-            for run, feature in enumerate(options.plan.features)
+            PART.hand(setup.choices, run, i)
+            for run, feature in enumerate(setup.choices.features)
             for i in range(feature.n_touches)
         ][:n_points],
     )

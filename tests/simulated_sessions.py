@@ -31,9 +31,6 @@ from lightpen_extensions.measure.verification.tasks.artefact import measure_arte
 from lightpen_extensions.measure.verification.tasks.drift import measure_drift
 from lightpen_extensions.measure.verification.tasks.fixed_point import (
     FIXED_POINT,
-    USUAL_FRAMES,
-    USUAL_TOUCHES,
-    FixedPointOptions,
     measure_fixed_point,
 )
 from lightpen_extensions.measure.verification.tasks.probed_point import (
@@ -42,7 +39,11 @@ from lightpen_extensions.measure.verification.tasks.probed_point import (
     StillFrames,
     measure_touches,
 )
-from lightpen_extensions.measure.verification.tasks.task import Conditions, Found
+from lightpen_extensions.measure.verification.tasks.task import (
+    Conditions,
+    Found,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
@@ -207,11 +208,12 @@ def any_direction(rng: np.random.Generator) -> FloatArray:
 def fixed_point_session(
     station: SimulatedStation,
     rng: np.random.Generator,
-    n: int = USUAL_TOUCHES,
-    n_frames: int = USUAL_FRAMES,
+    n: int = VerificationChoices.n_cone,
+    n_frames: int = VerificationChoices.n_cone_frames,
 ) -> Found:
     """Verify by a cone, as the program asks for it."""
-    goals = [FIXED_POINT.hand(FixedPointOptions(n), 0, step) for step in range(n)]
+    choices = VerificationChoices(n_cone=n)
+    goals = [FIXED_POINT.hand(choices, 0, step) for step in range(n)]
     postures = held([g.tilt for g in goals], [g.direction for g in goals], rng)
     points = station.probe(
         np.tile(PAPER_CONE, (n, 1)), postures, rng, n_frames=n_frames

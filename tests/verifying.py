@@ -25,22 +25,17 @@ from lightpen_extensions.measure.measuring.artefacts import artefact_plan
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
 from lightpen_extensions.measure.verification.runner import VerificationRunner
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
-from lightpen_extensions.measure.verification.session.session_state import SessionState
+from lightpen_extensions.measure.verification.session.session import SessionState
 from lightpen_extensions.measure.verification.session.status import (
     ReadingState,
     SessionEventKind,
     VerificationStatus,
 )
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
-)
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.task import (
     FoundT,
-    OptionsT,
+    VerificationChoices,
     VerificationTask,
 )
 
@@ -50,9 +45,7 @@ RING = Artefact(ArtefactKind.RING, 31.751, 0.001)
 LENGTH = Artefact(ArtefactKind.LENGTH, 150.0, 0.001)
 ARTEFACTS = artefact_plan("Ring and bar", [RING, LENGTH], {FeatureKind.CIRCLE: 10})
 CHOICES = VerificationChoices(
-    FIXED_POINT.kind,
-    (FixedPointOptions(4, n_frames=3), PartOptions(ARTEFACTS)),
-    n_frames=3,
+    FIXED_POINT.kind, ARTEFACTS, n_cone=4, n_cone_frames=3, n_frames=3
 )
 PART_CHOICES = replace(CHOICES, kind=PART.kind)
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
@@ -60,9 +53,7 @@ TABLE = Hold((0.0, 80.0, 0.0))
 BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
 
 
-def found_by(
-    state: SessionState | None, task: VerificationTask[OptionsT, FoundT]
-) -> FoundT:
+def found_by(state: SessionState | None, task: VerificationTask[FoundT]) -> FoundT:
     """Return what a task has found."""
     found = None if state is None else state.found_by(task)
     assert found is not None

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,38 +10,32 @@ from msgspec import structs
 from PySide6.QtWidgets import QListWidget
 from tests.accepted_tip import accept_tip
 
-from lightpen.record.folder.verifications import CONCLUSION, VERIFICATIONS
-from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.results.result_folder import RESULTS, SIMULATED
 from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.print_report.preview import PrintReportWindow
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_extensions.measure.measuring.plan_checks import write_plan
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
+from lightpen_program import main
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 STATION = "Hall 2"
 DOME = structs.replace(plate_plan().features[7], touches=5)
+HOLE = structs.replace(plate_plan().feature("hole 1"), touches=4)
 SMALL = structs.replace(
-    plate_plan().limited_to({DOME.name}),
-    features=(DOME,),
-    characteristics=tuple(
-        each for each in plate_plan().characteristics if each.of == (DOME.name,)
-    ),
+    plate_plan().limited_to({DOME.name, HOLE.name}), features=(DOME, HOLE)
 )
 PROBING = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     camera=StoredCamera(SourceChoice()),
-    extensions={
-        "measure": stored_group(
-            VerificationChoices(options=(PartOptions(SMALL),), n_frames=2)
-        )
-    },
+    extensions={"measure": stored_group(VerificationChoices(plan=SMALL, n_frames=2))},
 )
 
 
@@ -61,10 +56,11 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     walker = known
     walker.click_step("Measure")
     walker.until_tells("Probe the sphere dome: 0 of 5 points.")
-    assert walker.says("Feature 1 of 1")
+    assert walker.says("Feature 1 of 2")
     assert walker.tells(SMALL.name)
     walker.click("Let the simulated operator probe")
     n_inputs = walker.n_inputs
+    walker.until_says("Feature 2 of 2")
     walker.until_says("Part measured")
 
     assert walker.n_inputs == n_inputs
@@ -72,13 +68,28 @@ def test_a_part_is_measured_without_a_key_between_first_and_last_point(
     folder = walker.workbench.folder / SIMULATED / VERIFICATIONS
     records = [json.loads(each.read_bytes()) for each in sorted(folder.glob("*.json"))]
     assert [each["verification"] for each in records] == [PART.kind, CONCLUSION]
-    (diameter,) = records[0]["characteristics"]
-    assert diameter["actual"] == pytest.approx(20, abs=0.1)
-    assert diameter["decision"] == "accepted"
-    assert len(records[0]["inputs"]["touches"]) == 1
+    of_hole, of_dome = records[0]["characteristics"]
+    assert of_dome["actual"] == pytest.approx(20, abs=0.1)
+    assert {of_hole["decision"], of_dome["decision"]} == {"accepted"}
+    (session,) = records[0]["inputs"]["touches"]
+    assert measured_again(folder / TOUCHES / session["folder"], walker) == [
+        pytest.approx(each["actual"], abs=1e-6) for each in (of_hole, of_dome)
+    ]
 
     walker.click("Report...")
     walker.until(lambda: walker.window.findChild(PrintReportWindow) is not None)
+
+
+def measured_again(session: Path, walker: "Walker") -> list[float]:
+    """Return what `lightpen measure` finds in the record of a session."""
+    folder = walker.workbench.folder
+    plan, found = folder / "plan.yaml", folder / "again.json"
+    write_plan(SMALL, plan)
+    (tip,) = (folder / SIMULATED / RESULTS).glob("*.json")
+    words = "measure", plan, session, "--tip", tip, "--json", found, "--no-entry"
+    assert main([*map(str, words), "--frames", "2"]) == 0
+    characteristics = json.loads(found.read_bytes())["characteristics"]
+    return [each["actual"] for each in characteristics]
 
 
 @pytest.mark.slow

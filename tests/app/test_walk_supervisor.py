@@ -11,8 +11,7 @@ from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
-from lightpen_extensions.measure.verification.tasks.fixed_point import FixedPointOptions
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -24,7 +23,7 @@ CHOSEN = Station(
     camera=StoredCamera(SourceChoice()),
     extensions={
         "measure": stored_group(
-            VerificationChoices(options=(FixedPointOptions(5, n_frames=3),), n_frames=2)
+            VerificationChoices(n_cone=5, n_cone_frames=3, n_frames=2)
         )
     },
 )

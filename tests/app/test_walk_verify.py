@@ -21,12 +21,9 @@ from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
-)
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.registry import TASKS
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -34,11 +31,11 @@ if TYPE_CHECKING:
 STATION = "Hall 2"
 RULE = "Decision rule: simple acceptance (JCGM 106, 8.2)."
 TASKS_BEFORE_PEN = len(TASKS)
-FIVE = (FixedPointOptions(5, n_frames=3),)  # fewer do not verify a tip
+FIVE = VerificationChoices(n_cone=5, n_cone_frames=3, n_frames=2)  # fewer do not
 TOUCHES = Station(
     Names("", "Ann", "LP-04", "T-10", "C-1", 10.0),
     camera=StoredCamera(SourceChoice()),
-    extensions={"measure": stored_group(VerificationChoices(options=FIVE, n_frames=2))},
+    extensions={"measure": stored_group(FIVE)},
 )
 
 
@@ -181,7 +178,7 @@ def interrupted(known: "Walker", tmp_path: Path) -> "Walker":
     )
     kept = folder / SIMULATED / VERIFICATIONS
     verifier = Verifier(folder, known.workbench.selection.preparation)
-    verifier.come(VerificationChoices(FIXED_POINT.kind, FIVE, n_frames=2))
+    verifier.come(FIVE)
     verifier.touch(*leant(5)[:2])
     shutil.copytree(kept, copy)
     verifier.runner.shut_down()

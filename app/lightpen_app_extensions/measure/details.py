@@ -10,7 +10,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.translated import Translated
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
 )
@@ -77,8 +77,7 @@ class DetailsView(PageScroll):
         if setup is not None and state is not None:
             tables = (points_table(state.touches),)
             if state.found is not None:
-                task = setup.choices.task
-                tables = task.tables(state.found, setup.conditions)
+                tables = setup.task.tables(state.found, setup.conditions)
         for index, view in enumerate(self._tables):
             view.set_value(tables[index] if index < len(tables) else None)
 

@@ -15,7 +15,7 @@ from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app_extensions.measure.band_chart import BandChart
 from lightpen_app_extensions.measure.part_view import PartValue, PartView
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
 )
@@ -80,7 +80,6 @@ class FigurePanel(QWidget):
 
 def posture_value(setup: SessionSetup, state: SessionState) -> DialValue:
     """Return the postures of the pen at the points of a check, and the present one."""
-    task = setup.choices.task
     points = [*chain.from_iterable(state.runs), *state.touches]
     if state.found is not None:
         points = list(state.found.probed)
@@ -91,8 +90,7 @@ def posture_value(setup: SessionSetup, state: SessionState) -> DialValue:
     )
     if state.done is not None:
         return dial
-    options = setup.choices.options_of(task)
-    goal = task.hand(options, len(state.runs), len(state.touches))
+    goal = setup.task.hand(setup.choices, len(state.runs), len(state.touches))
     return replace(dial, target=Posture(goal.tilt, goal.direction, 0.0))
 
 

@@ -29,7 +29,7 @@ from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.view_state import VerifyView
 from lightpen_extensions.measure.measuring.report import DECISIONS
 from lightpen_extensions.measure.measuring.surfaces import NAMES
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
     bands_so_far,
@@ -37,7 +37,6 @@ from lightpen_extensions.measure.verification.session.session_state import (
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.part_course import (
     FeatureSoFar,
-    course,
     feature_so_far,
     planned_at,
 )
@@ -76,7 +75,7 @@ class MeasurePresenter(VerifyPresenter):
         setup, state = self._status.setup, self._status.state
         if setup is None or state is None:
             return (), 0
-        features = course(setup.choices.options_of(PART))
+        features = setup.choices.features
         n_done, found = len(state.runs), state.found_by(PART)
         if found is not None:
             features = tuple(e for e in features if e.name not in found.missing)
@@ -102,7 +101,7 @@ class MeasurePresenter(VerifyPresenter):
         self, setup: SessionSetup, state: SessionState
     ) -> dict[str, list[Band]]:
         """Return the values so far by the last probed of their features."""
-        features = course(setup.choices.options_of(PART))
+        features = setup.choices.features
         order = {each.name: i for i, each in enumerate(features)}
         found: dict[str, list[Band]] = {}
         for band in bands_so_far(setup, state):
@@ -115,20 +114,20 @@ class MeasurePresenter(VerifyPresenter):
         setup, state = self._status.setup, self._status.state
         if setup is None or state is None:
             return FigureValue()
-        options, bands = setup.choices.options_of(PART), bands_so_far(setup, state)
+        choices, bands = setup.choices, bands_so_far(setup, state)
         picture = part_value(setup, state)
         if state.done is not None:
-            name = "" if options.plan is None else worded(options.plan.words)
+            name = "" if choices.plan is None else worded(choices.plan.words)
             shown = picture if len(bands) < FEW else None
             return FigureValue(name, picture=shown, bands=bands)
         progress = state.progress(setup, PART)
-        now = feature_so_far(options, progress, setup.conditions)
+        now = feature_so_far(choices, progress, setup.conditions)
         if now is None:
             return FigureValue()
         kind = "" if now.kind is None else worded(NAMES[now.kind])
         name = now.planned.name
         title = name if not kind or kind in name else f"{name} ({kind})"
-        before = planned_at(options, len(state.runs) - 1) if state.runs else None
+        before = planned_at(choices, len(state.runs) - 1) if state.runs else None
         last = None if before is None else before.name
         ended = self._values_by_last(setup, state).get(last or "", [])
         live = self._live_deviation(now, state)
@@ -172,14 +171,14 @@ class MeasurePresenter(VerifyPresenter):
             return value
         if status.task is PART:  # the hint counts the points
             progress = status.state.progress(status.setup, PART)
-            options = status.setup.choices.options_of(PART)
-            now = feature_so_far(options, progress, status.setup.conditions)
+            choices = status.setup.choices
+            now = feature_so_far(choices, progress, status.setup.conditions)
             live = "" if now is None else self._live_deviation(now, status.state)
             banner = replace(value.state, detail=live or value.state.detail)
             value = replace(value, state=banner)
             count = self.tr("Feature {0} of {1}").format(progress.run, progress.n_runs)
             value = replace(value, count=count)
-            if options.plan is None:
+            if choices.plan is None:
                 value = replace(value, count="", fraction=None)
             ended = bands_so_far(status.setup, status.state)[-1:]
             words = (f"{band_name(e)}  {value_text(e)}" for e in ended)
@@ -188,7 +187,7 @@ class MeasurePresenter(VerifyPresenter):
 
     @override
     def _lead(self) -> str:
-        plan = self._service.choices.options_of(PART).plan
+        plan = self._service.choices.plan
         lead = super()._lead()
         return lead if plan is None else PARTED.join((lead, worded(plan.words)))
 

@@ -14,13 +14,12 @@ from lightpen_app.look.theme import GRID, colors_of
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 from lightpen_extensions.measure.measuring.drawing import of_centres, outline_of
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
 )
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.part_course import (
-    course,
     feature_so_far,
     fit_of,
 )
@@ -62,16 +61,15 @@ def part_value(setup: SessionSetup, state: SessionState) -> PartValue:
             off[i] = 0.0 if offset is None else offset
         outlines = [line for one in part.features.values() for line in outline_of(one)]
         return PartValue(points, off, tuple(outlines), tip=tip)
-    options = setup.choices.options_of(PART)
     runs = *progress.runs, progress.points
     shown = [EMPTY]
     offsets, lines = [EMPTY], list[FloatArray]()
-    for planned, run in zip(course(options), runs, strict=False):
+    for planned, run in zip(setup.choices.features, runs, strict=False):
         _, fit = fit_of(planned, run, setup.instrument)
         shown.append(np.array([point.point_cam for point in run]).reshape(-1, 3))
         offsets.append(np.zeros_like(shown[-1]) if fit is None else fit.offsets)
         lines += [] if fit is None else outline_of(of_centres(fit, shown[-1]))
-    feature = feature_so_far(options, progress, setup.conditions)
+    feature = feature_so_far(setup.choices, progress, setup.conditions)
     next_touch = None if feature is None else feature.next_touch
     goal = None if next_touch is None else next_touch.point
     focus = [*shown[-1], *([] if goal is None else [goal])]

@@ -1,6 +1,7 @@
 """The measuring plan: opened or taught; the kind of the current feature; exports."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -32,10 +33,7 @@ from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.session.status import VerificationStatus
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import (
-    PartOptions,
-    planned_at,
-)
+from lightpen_extensions.measure.verification.tasks.part_course import planned_at
 
 SUFFIXES = "*.yaml *.yml"
 BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least
@@ -53,11 +51,10 @@ def listed_artefacts(library: Library) -> dict[str, Artefact]:
 def choose_plan(service: MeasureService, plan: Plan | None) -> None:
     """Measure by a plan from its first feature, or leave the plan."""
     run, choices = service.measuring, service.choices
-    options = structs.replace(choices.options_of(PART), plan=plan)
     state = run.status.state
     if state is not None and state.is_begun:
         run.runner.ask(lambda workflow: workflow.start_over())
-    service.set_choices(choices.with_options(options))
+    service.set_choices(replace(choices, plan=plan))
 
 
 class PlanPanel(Translated, QWidget):
@@ -136,20 +133,13 @@ class PlanPanel(Translated, QWidget):
         """Measure by a plan, from its first feature."""
         choose_plan(self._service, plan)
 
-    def _plan(self) -> Plan | None:
-        return self._service.choices.options_of(PART).plan
-
     def _planned(self) -> PlannedFeature | None:
         state = self._status.state
         if state is None or state.done is not None:
             return None
-        return planned_at(self._options(), len(state.runs))
-
-    def _options(self) -> PartOptions:
-        """Return the options of the session, or those chosen for the next one."""
         setup = self._status.setup
         choices = self._service.choices if setup is None else setup.choices
-        return choices.options_of(PART)
+        return planned_at(choices, len(state.runs))
 
     def _part(self) -> MeasuredPart | None:
         state = self._status.state
@@ -247,18 +237,16 @@ class PlanPanel(Translated, QWidget):
     def _on_kind_chosen(self) -> None:
         word = self._kind.currentData()
         kind = None if word is None else FeatureKind(word)
-        plan, planned = self._plan(), self._planned()
+        choices, planned = self._service.choices, self._planned()
+        plan = choices.plan
         if plan is None or planned is None:
             return
         changed = structs.replace(planned, kind=kind)
         features = tuple(
             changed if e.name == planned.name else e for e in plan.features
         )
-        choices = self._service.choices
-        options = structs.replace(
-            choices.options_of(PART), plan=structs.replace(plan, features=features)
-        )
-        self._service.set_choices(choices.with_options(options))
+        changed_plan = structs.replace(plan, features=features)
+        self._service.set_choices(replace(choices, plan=changed_plan))
 
     def _on_save_plan_clicked(self) -> None:
         part = self._part()

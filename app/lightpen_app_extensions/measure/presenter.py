@@ -34,9 +34,6 @@ from lightpen_app_extensions.measure.view_state import (
 from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
 from lightpen_extensions.measure.verification.session.session import (
     BROKEN_OFF,
-    rules_of,
-)
-from lightpen_extensions.measure.verification.session.session_state import (
     SessionSetup,
     SessionState,
     bands_so_far,
@@ -49,7 +46,7 @@ from lightpen_extensions.measure.verification.session.status import (
     VerificationStatus,
 )
 from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
-from lightpen_extensions.measure.verification.tasks.task import Band
+from lightpen_extensions.measure.verification.tasks.task import Band, rule_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,14 +123,14 @@ class VerifyPresenter(QObject):
     def current_row(self) -> int:
         """Return the row of what is probed now, or was last."""
         setup = self._status.setup
-        chosen = None if setup is None else setup.choices.task
+        chosen = None if setup is None else setup.task
         return self.tasks.index(chosen) if chosen in self.tasks else 0
 
     def figure(self, row: int) -> FigureValue:
         """Return the figure of a row."""
         setup, state, task = self._status.setup, self._status.state, self.tasks[row]
         title, purpose = worded(task.title), worded(task.purpose)
-        if setup is None or state is None or task is not setup.choices.task:
+        if setup is None or state is None or task is not setup.task:
             result = self._results.get(task.kind)
             bands = () if result is None else result.bands
             return FigureValue(title, purpose, bands=bands, action=self.tr("Do now"))
@@ -148,13 +145,12 @@ class VerifyPresenter(QObject):
         setup, state, task = status.setup, status.state, status.task
         if setup is None or state is None or task is None:
             return OperatorValue(instruction.short, instruction.hint, banner)
-        options = setup.choices.options_of(task)
         shown = task.shows_postures
         return OperatorValue(
             instruction=instruction.short,
             hint=instruction.hint,
             state=banner,
-            count=worded(task.counted(options, state.progress(setup, task))),
+            count=worded(task.counted(setup.choices, state.progress(setup, task))),
             fraction=fraction_done(setup, state),
             keys=(
                 self.tr("Space: continue")
@@ -289,8 +285,7 @@ class VerifyPresenter(QObject):
     def _concluded(
         self, setup: SessionSetup, found: VerificationAssessment
     ) -> tuple[Instruction, State]:
-        task, limits = setup.choices.task, setup.choices.limits
-        rule = worded(task.rule_of(setup.choices.options_of(task), limits))
+        rule = worded(rule_of(setup.choices, setup.choices.limits))
         why, mark = f"{worded(found.reason)} {rule}", GRADE_MARKS[found.grade]
         shown = State(self._grade_text(found.grade), why, *mark)
         return Instruction(self._verdict(found), worded(found.next_step)), shown
@@ -314,10 +309,10 @@ class VerifyPresenter(QObject):
 
     def _probing(self, setup: SessionSetup, state: SessionState) -> tuple[str, State]:
         """Return a few words on what to do, and what is seen of the pen."""
-        task, touching = setup.choices.task, state.touching
+        task, touching = setup.task, state.touching
         doubt = Sign.WARNING, Tone.WARN
         if is_held(state):
-            fraction = touching.progress(rules_of(setup, state, task))
+            fraction = touching.progress(setup.rules)
             active = Sign.RECORD, Tone.ACTIVE, fraction
             return self.tr("Hold still"), State(self.tr("STEADY"), "", *active)
         if touching.phase is ProbingPhase.KNOWN:

@@ -25,17 +25,16 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
-from lightpen_extensions.measure.verification.storage.checkpoint import (
+from lightpen_extensions.measure.verification.storage.session_files import (
+    abandon_interrupted,
+)
+from lightpen_extensions.measure.verification.storage.session_record import (
     InterruptedVerification,
     find_interrupted,
 )
-from lightpen_extensions.measure.verification.storage.resuming import (
-    abandon_interrupted,
-)
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
-from lightpen_extensions.measure.verification.tasks.registry import ALL_TASKS
+from lightpen_extensions.measure.verification.tasks.registry import ALL_TASKS, task_of
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 from lightpen_extensions.simulator.hand import Operator
 
 KEY = "measure"
@@ -127,7 +126,7 @@ class MeasureService(Service):
         """Go on with a verification, with its choices."""
         under_way = found.under_way
         assert under_way is not None
-        chosen, is_part = self.choices, under_way.choices.task is PART
+        chosen, is_part = self.choices, under_way.choices.kind == PART.kind
         kind = chosen.kind if is_part else under_way.choices.kind
         again = replace(under_way.choices, kind=kind, limits=chosen.limits)
         self.set_choices(again)  # as in the session
@@ -161,7 +160,7 @@ class MeasureService(Service):
         self.refused.emit()
 
     def _begin_demo(self) -> None:
-        self.set_choices(self.choices.with_options(PartOptions(plate_plan())))
+        self.set_choices(replace(self.choices, plan=plate_plan()))
 
     def _is_demo_done(self) -> bool:
         if self.measuring.probing_operator is None:  # once it is here
@@ -234,7 +233,7 @@ class _Interrupted(InterruptedWork):
         under_way = self._found.under_way
         if under_way is None:
             words = translate("VerificationRow", "Damaged: {0}")
-            return words.format(shortened(self._found.path.stem))
+            return words.format(shortened(self._found.path.parent.name))
         return moment_text(under_way.began)
 
     def _description(self) -> str:
@@ -243,5 +242,5 @@ class _Interrupted(InterruptedWork):
             return "" if fault is None else breakable(worded(fault))
         names = under_way.names
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-        task = worded(under_way.choices.task.title)
+        task = worded(task_of(under_way.choices.kind).title)
         return PARTED.join(filter(None, (*called, task)))

@@ -13,7 +13,7 @@ from lightpen_extensions.measure.verification.probing.probing import (
     SETTLING,
     ProbingPhase,
 )
-from lightpen_extensions.measure.verification.session.session_state import SessionState
+from lightpen_extensions.measure.verification.session.session import SessionState
 from lightpen_extensions.measure.verification.session.status import VerificationStatus
 from lightpen_extensions.measure.verification.tasks.registry import AnyTask
 

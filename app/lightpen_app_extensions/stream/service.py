@@ -107,7 +107,7 @@ class StreamService(Service):
         status, stream = run.status, self.streaming.stream
         if not stream.is_heard or status.setup is None or status.state is None:
             return
-        if status.setup.choices.task is PART:
+        if status.setup.task is PART:
             stream.set_points(points_of(status.setup, status.state))
 
     def _show(self) -> None:

@@ -36,7 +36,6 @@ MESSAGES = {
     "session.elsewhere": "A point {distance:.1f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.",
     "session.broken-off": "The pen was lifted or moved before the point was recorded, so it does not count. Hold it still until it is recorded.",
     "under-way.damaged": "{file} is damaged: its verification cannot be continued. The images of its points stay where they are.",
-    "under-way.held": "The verification of {file} is open in another window. Continue it there, or close that window and try again.",
     "under-way.other-tip": "The verification belongs to {result}, which is no longer current for tip {tip} of pen {pen}. Close the verification and start another one.",
     "under-way.other-files": "The verification was started with another intrinsics file or LED file than the selected one. Select that file, then continue.",
 }

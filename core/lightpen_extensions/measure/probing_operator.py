@@ -6,13 +6,16 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
     is_at_rest,
 )
 from lightpen_extensions.measure.verification.tasks.registry import AnyTask
-from lightpen_extensions.measure.verification.tasks.task import HandGoal, TaskOptions
+from lightpen_extensions.measure.verification.tasks.task import (
+    HandGoal,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.hand import HandActivity, Operator
 
 
@@ -21,7 +24,7 @@ class _TouchGoal:
     """A point that the operator was sent to."""
 
     task: AnyTask | None
-    options: TaskOptions | None
+    choices: VerificationChoices
     run: int
     step: int
 
@@ -37,24 +40,23 @@ class ProbingOperator:
         """React to a state of the verification; reseat a lifted tip."""
         task, operator = state.task(setup), self._operator
         n_runs = len(state.runs)
-        options = None if task is None else setup.choices.options_of(task)
-        wanted = _TouchGoal(task, options, n_runs, len(state.touches))
+        wanted = _TouchGoal(task, setup.choices, n_runs, len(state.touches))
         is_lifted = operator.doing in (HandActivity.LIFTED, HandActivity.ABSENT)
         if wanted == self._wanted and not (is_lifted and task is not None):
             return
-        if task is None or options is None:
+        if task is None:
             self._wanted = wanted
             operator.leave()
             return
         if is_at_rest(state) and not is_lifted:
             operator.lift()
             return
-        is_same_again = not any(task.newness(options))
+        is_same_again = not any(task.newness)
         must_move_on = is_same_again and state.touching.phase is ProbingPhase.RECORDED
         if must_move_on and is_lifted:
             return
         before, self._wanted = self._wanted, wanted
-        goal = task.hand(options, len(state.runs), wanted.step)
+        goal = task.hand(setup.choices, len(state.runs), wanted.step)
         if must_move_on:
             operator.lift()
         elif goal.point is not None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
 )
@@ -28,9 +28,9 @@ def points_of(setup: SessionSetup, state: SessionState) -> tuple[NamedPoint, ...
     if found is not None:
         named = list(found.points)
     else:
-        options, named = setup.choices.options_of(PART), []
+        named = []
         for i, points in enumerate((*state.runs, state.touches)):
-            planned = planned_at(options, i)
+            planned = planned_at(setup.choices, i)
             named += [("" if planned is None else planned.name, p) for p in points]
     counts: dict[str, int] = {}
     result = []

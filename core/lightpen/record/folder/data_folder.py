@@ -11,8 +11,7 @@ from lightpen.errors import FileError
 from lightpen.formats.file_locks import locked
 from lightpen.formats.files import why_unwritten
 from lightpen.formats.part_files import sweep_parts
-from lightpen.record.folder.verifications import UNDER_WAY, VERIFICATIONS
-from lightpen.record.results.result_folder import RECORDS, RESULTS, SIMULATED
+from lightpen.record.results.result_folder import RECORDS, RESULTS
 from lightpen.record.swings.header import HEADER
 from lightpen.record.swings.journal import JOURNAL, last_verdict
 from lightpen.record.swings.lock import is_locked
@@ -101,8 +100,6 @@ def sweep_leftovers(data: Path) -> None:
     Files that a running program is writing are left alone, and so are all other files.
     """
     sweep_parts(data / RESULTS)
-    for root in (data, data / SIMULATED):
-        sweep_parts(root / VERIFICATIONS / UNDER_WAY)
     with suppress(OSError):  # the search for interrupted swings shows it
         for folder in list((data / RECORDS).iterdir()):
             with suppress(OSError, FileError):

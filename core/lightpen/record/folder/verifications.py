@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from msgspec import Struct, field
 
@@ -25,11 +25,10 @@ from lightpen.record.results.result_folder import SIMULATED
 from lightpen.record.swings.names import Names
 
 VERIFICATIONS = "verifications"
-TOUCHES = "touches"  # in that folder: the images of live touches, run by run
-UNDER_WAY = "under way"  # likewise: what is not concluded yet
+TOUCHES = "touches"  # in that folder: the images of live points, session by session
 CONCLUSION = "conclusion"
 VERIFIED = "verified"  # key of the task in the settings of an entry
-MEASURED_PART = "part"  # kind of the task that measures a part
+MEASURED_PART: Final = "part"  # kind of the task that measures a part
 BALL_CENTRE = "ball centre"  # of a measured feature: no surface was touched
 
 
@@ -38,15 +37,15 @@ class _Verdict(StoredMessage, frozen=True, kw_only=True):
     limits_mm: dict[str, float] = field(default_factory=dict)
 
 
-class StoredProbingRun(Struct, frozen=True):
-    """Folder of the images of a probing run."""
+class StoredImages(Struct, frozen=True):
+    """Folder of the images of a session."""
 
     folder: str
     journal_sha256: str
 
 
 class _Inputs(Struct, frozen=True):
-    touches: tuple[StoredProbingRun, ...] = ()
+    touches: tuple[StoredImages, ...] = ()
 
 
 class StoredVerification(Struct, frozen=True):

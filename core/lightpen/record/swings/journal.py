@@ -56,6 +56,7 @@ class ImageLine(Struct, tag_field="kind", tag="image", omit_defaults=True):
     camera: Stats | None = None  # since the swing began
     others: tuple[SecondaryImage, ...] = ()
     touch: Count = 0  # of a verification, from 1
+    run: Count = 0  # likewise: of a feature or visit, from 1
     approach: tuple[Entry, Entry, Entry] | None = None
 
 

@@ -16,7 +16,7 @@ A record is a folder:
 ==================== ===================================================================
 
 Images of the touches of a verification are stored in the same form, each with its
-touch.
+touch and run.
 
 `lightpen.record.swings.writing` puts an image on the disk before its line, and its line
 before it acknowledges the image; `lightpen.record.swings.lock` keeps a second program
@@ -82,6 +82,7 @@ class RecordedImage:
     stats: Stats = field(default_factory=Stats)  # since the swing began
     others: tuple[SecondaryImage, ...] = ()  # simultaneous images of a rig
     touch: int = 0  # number of the touch in a verification, from 1; 0 in a swing
+    run: int = 0  # likewise of its feature or visit
     approach_cam: FloatArray | None = None  # (3,), way of the tip to the point
 
     @property
@@ -243,6 +244,7 @@ def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
         stats=line.camera or Stats(),
         others=line.others,
         touch=line.touch,
+        run=line.run,
         approach_cam=None if line.approach is None else np.array(line.approach),
     )
 

@@ -146,6 +146,7 @@ class RecordWriter:
         stats: Stats | None = None,
         others: Sequence[SecondaryView] = (),
         touch: int = 0,
+        run: int = 0,
         approach: FloatArray | None = None,
     ) -> int:
         """Record an image (H, W), or simultaneous ones, and return its number.
@@ -177,6 +178,7 @@ class RecordWriter:
                 camera=stats,
                 others=other_images,
                 touch=touch,
+                run=run,
                 approach=None if approach is None else tuple(approach.tolist()),
             )
         )

@@ -1,7 +1,7 @@
 """``lightpen measure``: measure a part by a plan, or points alone."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +19,12 @@ from lightpen.errors import FileError, UsageError
 from lightpen.formats.file_format import FileFormat
 from lightpen.formats.files import write_whole
 from lightpen.model.limits import rule_in_words
-from lightpen_extensions.measure.commands.touched import add_touch_inputs, measure_runs
+from lightpen.record.swings.reading import is_record
+from lightpen_extensions.measure.commands.touched import (
+    MeasuredRuns,
+    add_touch_inputs,
+    measure_runs,
+)
 from lightpen_extensions.measure.measuring.exports import EXPORTS
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan
@@ -29,8 +34,12 @@ from lightpen_extensions.measure.verification.reports.summaries import (
     touches_text,
 )
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.probed_point import point_entries
+from lightpen_extensions.measure.verification.tasks.task import (
+    Runs,
+    VerificationChoices,
+    rule_of,
+)
 
 POINTS = "points"
 
@@ -50,7 +59,7 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
         metavar="TOUCHES",
         help="FEATURE=IMAGES for each feature of the plan (image folder, pattern, "
         "video, record, or LED centres as CSV), or a folder with a folder or CSV file "
-        "for each feature; "
+        "for each feature, or the record of a session of the window; "
         f"of {POINTS}: IMAGES",
     )
     add_touch_inputs(parser, "calibration to measure with")
@@ -101,6 +110,9 @@ def _by_plan(given: argparse.Namespace) -> int:
     require_other_file(given.json, given.plan)
     exports = {path: _export_of(path) for path in given.export}
     plan = read_plan(given.plan)
+    if len(given.touches) == 1 and is_record(Path(given.touches[0])):
+        measured = measure_runs(given, [tuple(given.touches)])
+        return _measured(given, plan, measured, measured.touches, exports)
     places = _places(plan, given.touches)
     centers = {name: Path(at) for name, at in places.items() if _is_csv(at)}
     images = {name: at for name, at in places.items() if name not in centers}
@@ -109,15 +121,26 @@ def _by_plan(given: argparse.Namespace) -> int:
     )
     names = [*centers, *images]
     runs = [(name, run.touches) for name, run in zip(names, measured.runs, strict=True)]
+    return _measured(given, plan, measured, runs, exports)
+
+
+def _measured(
+    given: argparse.Namespace,
+    plan: Plan,
+    measured: MeasuredRuns,
+    runs: Runs,
+    exports: Mapping[Path, FileFormat],
+) -> int:
+    """Print, keep and return what was measured, by runs in the order of the plan."""
     conditions = measured.conditions
     if given.ball_diameter is None:
         ball = measured.calibration.names.ball_diameter
         conditions = replace(conditions, ball_diameter=ball)
-    options = PartOptions(plan, given.ball_uncertainty)
-    found = PART.measure(runs, conditions, options)
+    choices = VerificationChoices(PART.kind, plan)
+    found = PART.measure(runs, conditions, choices)
     judged = judged_with(found.assessment, measured.lamp_drift)
     tables = PART.tables(found, conditions)
-    rule = PART.rule_of(options, conditions.limits)
+    rule = rule_of(choices, conditions.limits)
     remarks = conditions.instrument.remarks
     print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
     entries = PART.entries(found, measured.instrument)

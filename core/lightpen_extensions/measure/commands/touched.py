@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.json_records import file_entry
 from lightpen.formats.pen_files import read_pen
 from lightpen.messages import Message
+from lightpen.model.assumptions import BALL_UNCERTAINTY
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
@@ -36,6 +37,7 @@ from lightpen.record.folder.verifications import conditions_entries
 from lightpen_extensions.measure.verification.probing.current_tip import cone_before
 from lightpen_extensions.measure.verification.probing.drift_reference import (
     LampDrift,
+    LampObservations,
     lamp_drift_entries,
 )
 from lightpen_extensions.measure.verification.probing.image_locations import (
@@ -60,7 +62,7 @@ from lightpen_extensions.measure.verification.probing.sources import (
     observe_place,
     touches_of,
 )
-from lightpen_extensions.measure.verification.storage.verification_files import (
+from lightpen_extensions.measure.verification.storage.session_files import (
     camera_serials,
     viewer_entries,
 )
@@ -262,6 +264,7 @@ def measure_runs(
             instrument=instrument,
             limits=limits,
             ball_diameter=options.ball_diameter,
+            ball_uncertainty=getattr(options, "ball_uncertainty", BALL_UNCERTAINTY),
             nominal_tip=None if nominal is None else np.array(nominal, dtype=float),
             cone_cam=cone_before(calibration, viewers),
             drift=moved if lamp_drift is None else np.maximum(moved, lamp_drift.share),
@@ -322,10 +325,7 @@ def _runs_of(
     """
 
     def by(rules: ProbingRules) -> list[ProbingRun]:
-        return [
-            touches_of(run.name, run.views, instrument, rules, run.touches)
-            for run in seen
-        ]
+        return [run for each in seen for run in _parted(each, instrument, rules)]
 
     if n_frames is not None:
         return by(ProbingRules(n_frames, SETTLING) if n_frames > 1 else ONE_IMAGE)
@@ -335,6 +335,24 @@ def _runs_of(
         if error.message.code != "verification.never-still":
             raise
     return by(ONE_IMAGE)
+
+
+def _parted(
+    seen: _SeenRun, instrument: Instrument, rules: ProbingRules
+) -> list[ProbingRun]:
+    """Return the touches of images, of the record of a session run by run."""
+    numbers = {each.run for each in seen.touches or () if each.number}
+    if len(numbers) < 2:
+        return [touches_of(seen.name, seen.views, instrument, rules, seen.touches)]
+    runs = list[ProbingRun]()
+    for number in sorted(numbers):
+        own = [
+            each if each.run == number else replace(each, number=0)
+            for each in seen.touches or ()
+        ]
+        found = touches_of(seen.name, seen.views, instrument, rules, own)
+        runs.append(replace(found, lamps=LampObservations()) if runs else found)
+    return runs
 
 
 def _pen(

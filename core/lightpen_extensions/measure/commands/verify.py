@@ -35,7 +35,11 @@ from lightpen_extensions.measure.verification.tasks.artefact import (
 )
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
-from lightpen_extensions.measure.verification.tasks.task import Found, ResultTable
+from lightpen_extensions.measure.verification.tasks.task import (
+    Found,
+    ResultTable,
+    VerificationChoices,
+)
 
 RING_SIDES = {"bore": Side.INSIDE, "boss": Side.OUTSIDE}
 FACE_SIDES = {"outer": Side.OUTSIDE, "inner": Side.INSIDE}
@@ -165,7 +169,7 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
 def _verify_task(given: argparse.Namespace) -> int:
     task: AnyTask = given.task
     measured = given_runs(given, is_pooled=task.is_pooled)
-    found = task.measure(measured.touches, measured.conditions, task.options())
+    found = task.measure(measured.touches, measured.conditions, VerificationChoices())
     tables = task.tables(found, measured.conditions)
     return _concluded(given, measured, task, found, tables)
 
@@ -194,11 +198,7 @@ def _verify_artefact(given: argparse.Namespace) -> int:
         for size in (given.sizes * n_runs)[:n_runs]
     ]
     found = measure_artefacts(
-        str(given.kind),
-        artefacts,
-        measured.touches,
-        measured.conditions,
-        given.ball_uncertainty,
+        str(given.kind), artefacts, measured.touches, measured.conditions
     )
     return _concluded(given, measured, PART, found, [size_table(found)])
 

@@ -17,10 +17,11 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 
 N_DIRECTIONS = 200  # over the half sphere: some 10 degrees apart
+N_FEW_DIRECTIONS = 400  # with few points
 N_NEAR = 15  # directions about a principal axis
 RIDGE = 1e-12
 FEW = 16  # points, which hardly tell false minima apart
-N_STARTS = 4  # fits that begin at the best of them
+N_STARTS, N_FEW_STARTS = 4, 6  # fits that begin at the best of them
 N_STEPS, DAMPING = 6, 1e-3  # of all directions, before the best of few points are taken
 N_TRIED = 24  # points, drawn from more, that directions are tried with
 APART = 0.995  # cosine between two starts
@@ -59,7 +60,8 @@ def starts(kind: FeatureKind, points: FloatArray) -> Iterator[Start]:
         case FeatureKind.CYLINDER | FeatureKind.CONE:
             few = np.random.default_rng(0).permutation(len(points))[:N_TRIED]
             found = _by_direction(kind, points[few] - middle, middle, axes)
-            yield from islice(found, N_STARTS)
+            is_few = len(points) <= FEW
+            yield from islice(found, N_FEW_STARTS if is_few else N_STARTS)
 
 
 def _algebraic(points: FloatArray) -> tuple[FloatArray, float]:
@@ -69,13 +71,13 @@ def _algebraic(points: FloatArray) -> tuple[FloatArray, float]:
     return np.array(center), float(np.sqrt(max(rest + np.dot(center, center), 0)))
 
 
-def _directions(axes: FloatArray) -> FloatArray:
-    """Return directions evenly over a half sphere, and closer about principal axes.
+def _directions(n: int, axes: FloatArray) -> FloatArray:
+    """Return n directions evenly over a half sphere, and closer about principal axes.
 
     The former lie on Fibonacci's spiral; the latter are for flat cones and short arcs.
     """
-    k = np.arange(N_DIRECTIONS) + 0.5
-    z = k / N_DIRECTIONS
+    k = np.arange(n) + 0.5
+    z = k / n
     turn = np.pi * (1 + np.sqrt(5)) * k
     across = np.sqrt(1 - z**2)
     evenly = np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
@@ -91,7 +93,8 @@ def _directions(axes: FloatArray) -> FloatArray:
 def _by_direction(
     kind: FeatureKind, points: FloatArray, middle: FloatArray, axes: FloatArray
 ) -> Iterator[Start]:
-    directions = _directions(axes)
+    is_few = len(points) <= FEW
+    directions = _directions(N_FEW_DIRECTIONS if is_few else N_DIRECTIONS, axes)
     frames = frame_about(directions)
     x, y, z = np.moveaxis(points @ frames, -1, 0)  # (D, N) each
     columns = [x, y, np.ones_like(x)]
@@ -111,7 +114,7 @@ def _by_direction(
         slope = np.sum(own * rho, axis=1) / (np.sum(own**2, axis=1) + TINY)
         radius = radius - slope * z.mean(axis=1)
     unknowns = np.column_stack([a, b, radius, slope])
-    if len(points) <= FEW:
+    if is_few:
         frames, unknowns = _some_steps(kind, points, frames, unknowns)
         directions = frames[..., 2]
     a, b, radius, slope = unknowns.T

@@ -6,6 +6,7 @@ computations elsewhere.
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from enum import Enum, auto
@@ -21,12 +22,16 @@ from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import FileError, LightpenError
 from lightpen.messages import Message, message
 from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.folder.verifications import TOUCHES
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.header import Header
+from lightpen.record.swings.writing import make_record_folder
 from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
+from lightpen_extensions.measure.verification.live_points import LivePoints
 from lightpen_extensions.measure.verification.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
@@ -34,16 +39,13 @@ from lightpen_extensions.measure.verification.probing.current_tip import (
 from lightpen_extensions.measure.verification.probing.drift_reference import (
     LampObservations,
 )
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.session import (
+    SessionState,
     SessionTransition,
     end_task,
     setup_of,
-    without_last_touch,
-)
-from lightpen_extensions.measure.verification.session.session_state import (
-    SessionState,
     with_pen_at_rest,
+    without_last_touch,
 )
 from lightpen_extensions.measure.verification.session.status import (
     ReadingState,
@@ -53,25 +55,20 @@ from lightpen_extensions.measure.verification.session.status import (
     ending,
     event_kinds,
 )
-from lightpen_extensions.measure.verification.storage.checkpoint import (
-    InterruptedVerification,
-)
-from lightpen_extensions.measure.verification.storage.conclusion import (
-    Conclusion,
-    accepting_supervisor,
-)
-from lightpen_extensions.measure.verification.storage.point_images import (
-    LivePoints,
-    NewRecord,
-    new_record,
-)
 from lightpen_extensions.measure.verification.storage.resuming import (
     ResumedVerification,
     resume_verification,
 )
 from lightpen_extensions.measure.verification.storage.session_files import (
+    Conclusion,
     SessionKeeping,
+    accepting_supervisor,
 )
+from lightpen_extensions.measure.verification.storage.session_record import (
+    InterruptedVerification,
+)
+from lightpen_extensions.measure.verification.tasks.registry import task_of
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 
 ANOTHER = message("verification.another-under-way")
 NOT_READY = message("verification.not-ready")
@@ -101,14 +98,13 @@ class VerificationWorkflow:
         start: StartThread,
     ) -> None:
         self._archive = archive
-        self._data = data
         self._listener = listener
         self._now = now
         self._status = VerificationStatus()
         self._preparation: Preparation | None = None
         self._choices = VerificationChoices()
-        self._keeping = SessionKeeping(data, self._new_record, now)
-        self._live = LivePoints(self._keeping.images)
+        self._keeping = SessionKeeping(data, self._begin_record, now)
+        self._live = LivePoints()
         self._faults = FaultReporter(listener)
         self._task = BackgroundTask(start, self.recover, listener.on_progress)
 
@@ -228,13 +224,11 @@ class VerificationWorkflow:
             return
         chosen = replace(under_way.choices, limits=self._choices.limits)
         again = with_entries(under_way, choices=chosen)
-        work = partial(
-            resume_verification, self._archive, self._data, preparation, again
-        )
+        archive, path = self._archive, interrupted.path
         self._start(
             ReadingState.IMAGES,
-            work,
-            partial(self._on_gone_on, interrupted.path),
+            lambda _: resume_verification(archive, preparation, path, again),
+            partial(self._on_gone_on, path),
             self._on_not_resumed,
         )
 
@@ -262,9 +256,6 @@ class VerificationWorkflow:
                 refusal=self._why_not(before.tip),
             )
         )
-        if self._status.is_done:
-            self._conclude(is_written=bool(before.files))
-        self._publish(self._status)
 
     def cancel(self) -> None:
         """Stop reading."""
@@ -293,15 +284,17 @@ class VerificationWorkflow:
             self._status = replace(status, began=self._now())
             self._live.begin(LampObservations())
         try:
-            transition = self._live.take(setup, state, frame, detection, region)
+            transition = self._live.take(
+                self._keeping.images, setup, state, frame, detection, region
+            )
         except FileError as error:  # an image that is not kept does not count
             self._faults.report(error.message, Cause.IMAGES)
             return
         self._faults.end_of(Cause.IMAGES)
         self._become(transition)
 
-    def _new_record(self) -> NewRecord:
-        """Create a record for the images of the current run."""
+    def _begin_record(self) -> tuple[Path, Header]:
+        """Make the folder for the images of the session, and return its header."""
         status, preparation = self._status, self._preparation
         assert preparation is not None
         assert status.tip is not None
@@ -314,7 +307,8 @@ class VerificationWorkflow:
                 "tip_sha256": tip.tip_file.sha256,
             },
         )
-        return new_record(self._keeping.root(tip), tip.names, header)
+        touches = self._keeping.root(tip) / TOUCHES
+        return make_record_folder(touches, tip.names, header.created), header
 
     def _become(self, transition: SessionTransition) -> None:
         before, setup = self._status.state, self._status.setup
@@ -394,7 +388,8 @@ class VerificationWorkflow:
         """Return why the selection cannot be verified."""
         if tip is None:
             return self._status.refusal
-        return self._choices.missing(tip.names.ball_diameter)
+        task = task_of(self._choices.kind)
+        return task.missing(self._choices, tip.names.ball_diameter)
 
     def _on_not_resumed(self, why: Message) -> None:
         self._faults.report(why)
@@ -412,19 +407,19 @@ class VerificationWorkflow:
 
     # Records
 
-    def _conclude(self, *, is_written: bool = False) -> None:
-        """Write the result of the task, unless it is, and what becomes of the tip."""
+    def _conclude(self) -> None:
+        """Write the result of the task, and what becomes of the tip."""
         found = self._status.assessment
         is_kept = found is not None and found.is_accepted
-        if not is_written:
-            self._keeping.add_task(self._status)
+        self._keeping.add_task(self._status)
         outcome = TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED
         self._keeping.conclude(self._status, outcome)
         self._write()
 
     def _give_up(self) -> None:
         """Conclude an incomplete verification."""
-        self._keeping.give_up(self._status)
+        with suppress(FileError):  # its images stay interrupted
+            self._keeping.give_up(self._status)
         self._write()
         self._keeping.begin()
 

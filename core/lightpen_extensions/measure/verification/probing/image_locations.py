@@ -49,6 +49,7 @@ class RecordedTouch:
 
     number: int
     approach_cam: FloatArray | None
+    run: int = 1
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def _recorded_touches(record: Record) -> tuple[RecordedTouch, ...] | None:
         return None
     out = record.excluded
     return tuple(
-        RecordedTouch(0 if i.number in out else i.touch, i.approach_cam)
+        RecordedTouch(0 if i.number in out else i.touch, i.approach_cam, i.run)
         for i in record.images
     )
 

@@ -19,10 +19,10 @@ from lightpen_extensions.measure.verification.probing.probing import (
     ProbingEventKind,
     ProbingPhase,
 )
-from lightpen_extensions.measure.verification.session.session import SessionTransition
-from lightpen_extensions.measure.verification.session.session_state import (
+from lightpen_extensions.measure.verification.session.session import (
     SessionSetup,
     SessionState,
+    SessionTransition,
 )
 from lightpen_extensions.measure.verification.tasks.registry import AnyTask
 

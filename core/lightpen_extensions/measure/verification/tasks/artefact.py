@@ -7,7 +7,6 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import Artefact, ArtefactKind
-from lightpen.model.assumptions import BALL_UNCERTAINTY
 from lightpen_extensions.measure.measuring.artefacts import (
     are_of_second_end,
     artefact_plan,
@@ -18,21 +17,17 @@ from lightpen_extensions.measure.verification.tasks.part import (
     measure_by_plan,
     sizes_of,
 )
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.task import (
     Conditions,
     ResultRow,
     ResultTable,
     Runs,
+    VerificationChoices,
 )
 
 
 def measure_artefacts(
-    name: str,
-    artefacts: Sequence[Artefact],
-    runs: Runs,
-    conditions: Conditions,
-    ball_uncertainty: float = BALL_UNCERTAINTY,
+    name: str, artefacts: Sequence[Artefact], runs: Runs, conditions: Conditions
 ) -> Part:
     """Measure an artefact at each of several places.
 
@@ -51,7 +46,7 @@ def measure_artefacts(
         parted += [[points[int(i)] for i in end] for end in ends]
     names = [each.name for each in plan.features]
     named = list(zip(names, parted, strict=True))
-    return measure_by_plan(named, conditions, PartOptions(plan, ball_uncertainty))
+    return measure_by_plan(named, conditions, VerificationChoices(plan=plan))
 
 
 def size_table(found: Part) -> ResultTable:

@@ -49,8 +49,8 @@ from lightpen_extensions.measure.verification.tasks.task import (
     ResultTable,
     Runs,
     Screening,
-    TaskOptions,
     TaskProgress,
+    VerificationChoices,
     VerificationTask,
 )
 
@@ -78,12 +78,8 @@ class Drift(Found):
         return np.asarray(np.abs(self.moves).max(axis=0) / np.sqrt(3))
 
 
-class DriftOptions(TaskOptions, frozen=True, tag="drift"):
-    """No options."""
-
-
 def measure_drift(
-    visits: Runs, conditions: Conditions, options: DriftOptions | None = None
+    visits: Runs, conditions: Conditions, choices: VerificationChoices | None = None
 ) -> Drift:
     """Measure how a drift reference moves over two visits or more, in order."""
     if len(visits) < MIN_VISITS:
@@ -149,9 +145,7 @@ def _assessment(
     return accepted(good, USE_TOUCHES, Grade.STEADY)
 
 
-def _screen(
-    options: DriftOptions, conditions: Conditions, progress: TaskProgress
-) -> Screening:
+def _screen(progress: TaskProgress) -> Screening:
     """Drop a point in another posture than the first, or away from its cone."""
     points, visits = progress.points, progress.runs
     first, last = (*visits, points)[0][0], points[-1]
@@ -208,7 +202,7 @@ def _bands(found: Drift, conditions: Conditions) -> tuple[Band, ...]:
     return tuple(sorted(bands, key=lambda each: -abs(each.value) / each.upper))
 
 
-def _instruction(options: DriftOptions, progress: TaskProgress) -> Message:
+def _instruction(choices: VerificationChoices, progress: TaskProgress) -> Message:
     return message(
         "session.touch-witness",
         needed=VISIT_POINTS,
@@ -228,18 +222,17 @@ DRIFT = VerificationTask(
     another=message("task.lift"),
     known=message("task.lift"),
     limits=("drift",),
-    options=DriftOptions,
     measure=measure_drift,
     entries=_entries,
     tables=_tables,
     bands=_bands,
-    hand=lambda options, run, step: HandGoal(),
-    n_points=lambda options, run: VISIT_POINTS,
-    n_runs=lambda options: MIN_VISITS,
-    check=lambda visits, conditions, options: None,
+    hand=lambda choices, run, step: HandGoal(),
+    n_points=lambda choices, run: VISIT_POINTS,
+    n_runs=lambda choices: MIN_VISITS,
+    check=lambda visits, conditions, choices: None,
     instruction=_instruction,
     screen=_screen,
-    newness=lambda options: (0.0, 0.0),
+    newness=(0.0, 0.0),
     counts_drift=False,
     shows_postures=True,
 )

@@ -8,10 +8,9 @@ determine the tip by which they would not.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import (
@@ -49,8 +48,7 @@ from lightpen_extensions.measure.verification.tasks.task import (
     ResultTable,
     Runs,
     Screening,
-    TaskOptions,
-    TaskProgress,
+    VerificationChoices,
     VerificationTask,
     keep_all,
 )
@@ -62,8 +60,7 @@ from lightpen_extensions.measure.verification.tasks.tip_evidence import (
     tip_entries,
 )
 
-USUAL_TOUCHES, USUAL_FRAMES = 6, 15  # find a tip that is wrong by 0.02 mm
-MIN_TOUCHES, MAX_TOUCHES = 3, 50
+MIN_TOUCHES = 3
 NEW_POSTURE = float(np.radians(8.0))
 ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
 TILT = 0.6  # rad, to lean the pen by, once round the cone
@@ -95,15 +92,8 @@ class FixedPoint(Found):
         return self.touches
 
 
-class FixedPointOptions(TaskOptions, frozen=True, tag="fixed point"):
-    """Number of touches of the cone, and of the images of each."""
-
-    n_touches: Annotated[int, Meta(ge=MIN_TOUCHES, le=MAX_TOUCHES)] = USUAL_TOUCHES
-    n_frames: Annotated[int, Meta(ge=1, le=100)] = USUAL_FRAMES
-
-
 def measure_fixed_point(
-    runs: Runs, conditions: Conditions, options: FixedPointOptions | None = None
+    runs: Runs, conditions: Conditions, choices: VerificationChoices | None = None
 ) -> FixedPoint:
     """Measure a fixed point by all runs, and judge the tip by its scatter.
 
@@ -187,7 +177,7 @@ def _too_few(n_touches: int) -> CalibrationError:
         "fixed-point.too-few",
         n_touches=n_touches,
         needed=MIN_TOUCHES,
-        usual=USUAL_TOUCHES,
+        usual=VerificationChoices.n_cone,
     )
 
 
@@ -261,12 +251,6 @@ def without_others(
 def elsewhere(distance: float) -> Message:
     """Reject a point at this distance from the others, mm."""
     return message("session.elsewhere", distance=distance)
-
-
-def _screen(
-    options: FixedPointOptions, conditions: Conditions, progress: TaskProgress
-) -> Screening:
-    return without_others(progress.points)
 
 
 def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
@@ -383,19 +367,18 @@ FIXED_POINT = VerificationTask(
     another=message("fixed-point.another"),
     known=message("session.same-posture"),
     limits=("across", "along", "tip"),
-    options=FixedPointOptions,
     measure=measure_fixed_point,
     entries=_entries,
     tables=_tables,
     bands=_bands,
-    hand=lambda options, run, step: HandGoal(
-        tilt=TILT, direction=2 * pi * step / options.n_touches
+    hand=lambda choices, run, step: HandGoal(
+        tilt=TILT, direction=2 * pi * step / choices.n_cone
     ),
-    n_points=lambda options, run: options.n_touches,
-    n_frames=lambda options: options.n_frames,
-    instruction=lambda options, progress: message("session.touch-cone"),
-    screen=_screen,
-    newness=lambda options: (NEW_POSTURE, ANY),
+    n_points=lambda choices, run: choices.n_cone,
+    n_frames=lambda choices: choices.n_cone_frames,
+    instruction=lambda choices, progress: message("session.touch-cone"),
+    screen=lambda progress: without_others(progress.points),
+    newness=(NEW_POSTURE, ANY),
     is_pooled=True,
     compares_nominal_tip=True,
     shows_postures=True,

@@ -6,7 +6,7 @@ of the probed features.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from msgspec import structs
@@ -26,7 +26,6 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
 from lightpen.model.artefacts import Side
 from lightpen.model.decision_rules import Decision
-from lightpen.model.limits import VerificationLimits, rule_in_words
 from lightpen.record.folder.verifications import MEASURED_PART
 from lightpen_extensions.measure.measuring.artefacts import QUANTITIES
 from lightpen_extensions.measure.measuring.part import (
@@ -44,8 +43,6 @@ from lightpen_extensions.measure.measuring.report import (
 )
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
 from lightpen_extensions.measure.verification.tasks.part_course import (
-    PartOptions,
-    course,
     hand_goal,
     planned_at,
     touches_of_part,
@@ -64,6 +61,7 @@ from lightpen_extensions.measure.verification.tasks.task import (
     ResultTable,
     Runs,
     TaskProgress,
+    VerificationChoices,
     VerificationTask,
 )
 
@@ -90,49 +88,51 @@ class Part(Found):
         return found
 
 
-def measure_by_plan(runs: Runs, conditions: Conditions, options: PartOptions) -> Part:
+def measure_by_plan(
+    runs: Runs, conditions: Conditions, choices: VerificationChoices
+) -> Part:
     """Measure a part by its plan, up to the features probed so far.
 
     Runs are named after features, or in the order of the plan. Raises
     `CalibrationError` if the touches of a feature are too few, show no side or do not
     determine it.
     """
-    if options.plan is None:
+    if choices.plan is None:
         raise CalibrationError("part.no-plan")
-    found = _owned(runs, options)
+    found = _owned(runs, choices)
     names = {name for name, _ in found}
-    plan = options.plan.limited_to(names)
+    plan = choices.plan.limited_to(names)
     if not plan.features:
         raise CalibrationError("part.nothing-probed")
-    touches = touches_of_part(found, conditions, options)
+    touches = touches_of_part(found, conditions)
     part = measure_part(plan, touches, conditions.limits)
-    missing = tuple(
-        each.name for each in options.plan.features if each.name not in names
-    )
+    missing = tuple(e.name for e in choices.features if e.name not in names)
     assessment = _assessment(part, missing)
     return Part(assessment, part, tuple(found), missing)
 
 
-def check_feature(runs: Runs, conditions: Conditions, options: PartOptions) -> None:
+def check_feature(
+    runs: Runs, conditions: Conditions, choices: VerificationChoices
+) -> None:
     """Refuse the last of some runs if it does not determine its feature.
 
     The normal of a point or line may come from a feature that is probed later.
     """
-    if options.plan is None:
+    if choices.plan is None:
         return
-    found = _owned(runs, options)
+    found = _owned(runs, choices)
     name = found[-1][0]
     own = [(owner, point) for owner, point in found if owner == name]
-    planned = options.plan.feature(name)
+    planned = choices.plan.feature(name)
     if planned.kind in {FeatureKind.POINT, FeatureKind.LINE}:
         planned = structs.replace(planned, side=Side.CENTRE, surface="", normal=None)
-    touches = touches_of_part(own, conditions, options)
-    measure_part(Plan(options.plan.name, (planned,)), touches)
+    touches = touches_of_part(own, conditions)
+    measure_part(Plan(choices.plan.name, (planned,)), touches)
 
 
-def _owned(runs: Runs, options: PartOptions) -> list[tuple[str, ProbedPoint]]:
+def _owned(runs: Runs, choices: VerificationChoices) -> list[tuple[str, ProbedPoint]]:
     """Return the touches with their features."""
-    names = [each.name for each in course(options)]
+    names = [each.name for each in choices.features]
     found = []
     for i, (run, points) in enumerate(runs):
         if run not in names and i >= len(names):
@@ -305,13 +305,13 @@ def _bands(found: Part, conditions: Conditions) -> tuple[Band, ...]:
     )
 
 
-def _n_points(options: PartOptions, run: int) -> int:
-    planned = planned_at(options, run)
+def _n_points(choices: VerificationChoices, run: int) -> int:
+    planned = planned_at(choices, run)
     return 0 if planned is None else planned.n_touches
 
 
-def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
-    planned = planned_at(options, len(progress.runs))
+def _instruction(choices: VerificationChoices, progress: TaskProgress) -> Message:
+    planned = planned_at(choices, len(progress.runs))
     if planned is None:
         return message("part.no-plan")
     what: Message = message("measuring.named", name=planned.name)
@@ -321,16 +321,12 @@ def _instruction(options: PartOptions, progress: TaskProgress) -> Message:
     return message("part.instruction", what=what, n_points=n_points, needed=needed)
 
 
-def _missing(options: PartOptions, ball_diameter: float | None) -> Message | None:
-    if options.plan is None:
+def _missing(
+    choices: VerificationChoices, ball_diameter: float | None
+) -> Message | None:
+    if choices.plan is None:
         return message("part.no-plan")
-    return missing_normal(options.plan) if ball_diameter else None
-
-
-def _rule(options: PartOptions, limits: VerificationLimits) -> Message:
-    if options.plan is None:
-        return rule_in_words(limits)
-    return rule_in_words(replace(limits, rule=options.plan.rule or limits.rule))
+    return missing_normal(choices.plan) if ball_diameter else None
 
 
 PART = VerificationTask(
@@ -344,7 +340,6 @@ PART = VerificationTask(
     other_run=message("part.other-feature"),
     known=message("session.same-place"),
     limits=(),
-    options=PartOptions,
     measure=measure_by_plan,
     check=check_feature,
     entries=_entries,
@@ -353,9 +348,8 @@ PART = VerificationTask(
     judges_points=False,
     hand=hand_goal,
     n_points=_n_points,
-    n_runs=lambda options: max(len(course(options)), 1),
+    n_runs=lambda choices: max(len(choices.features), 1),
     instruction=_instruction,
-    newness=lambda options: (ANY, NEW_PLACE),
+    newness=(ANY, NEW_PLACE),
     missing=_missing,
-    rule_of=_rule,
 )

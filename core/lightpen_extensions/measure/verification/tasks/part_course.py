@@ -3,15 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
 
 from lightpen.errors import CalibrationError
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.artefacts import Side
-from lightpen.model.assumptions import BALL_UNCERTAINTY
 from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen_extensions.measure.measuring.features import Feature, fit_feature
 from lightpen_extensions.measure.measuring.next_touch import (
@@ -21,7 +18,7 @@ from lightpen_extensions.measure.measuring.next_touch import (
     nominal_area,
 )
 from lightpen_extensions.measure.measuring.part import kind_of
-from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
+from lightpen_extensions.measure.measuring.plan import PlannedFeature
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.measuring.touches import PartTouches
 from lightpen_extensions.measure.verification.tasks.probed_point import (
@@ -32,8 +29,8 @@ from lightpen_extensions.measure.verification.tasks.task import (
     Conditions,
     HandGoal,
     Points,
-    TaskOptions,
     TaskProgress,
+    VerificationChoices,
 )
 
 N_KEPT = 64  # fits of runs
@@ -44,22 +41,8 @@ SIMULATED_ORIGIN = np.array([0.0, -30.0, 0.0])
 SIMULATED_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
-class PartOptions(TaskOptions, frozen=True, tag="part"):
-    """A plan, and U (k = 2) of the ball diameter, mm."""
-
-    plan: Plan | None = None
-    ball_uncertainty: Annotated[float, Meta(ge=0)] = BALL_UNCERTAINTY
-
-
-def course(options: PartOptions) -> tuple[PlannedFeature, ...]:
-    """Return the features run by run; none without a plan."""
-    return () if options.plan is None else options.plan.features
-
-
 def touches_of_part(
-    found: Sequence[tuple[str, ProbedPoint]],
-    conditions: Conditions,
-    options: PartOptions,
+    found: Sequence[tuple[str, ProbedPoint]], conditions: Conditions
 ) -> PartTouches:
     """Return probed points as the touches of a part, with the motion of the camera."""
     points = [point for _, point in found]
@@ -77,13 +60,13 @@ def touches_of_part(
         styli_cam=np.array([point.rotation @ UPRIGHT_AXIS for point in points]),
         owners=tuple(name for name, _ in found),
         ball_radius=(conditions.ball_diameter or 0.0) / 2,
-        ball_uncertainty=options.ball_uncertainty / 2,
+        ball_uncertainty=conditions.ball_uncertainty / 2,
     )
 
 
-def planned_at(options: PartOptions, run: int) -> PlannedFeature | None:
+def planned_at(choices: VerificationChoices, run: int) -> PlannedFeature | None:
     """Return the feature of run i (from 0); None after the last or without a plan."""
-    runs = course(options)
+    runs = choices.features
     return runs[run] if run < len(runs) else None
 
 
@@ -98,10 +81,10 @@ class FeatureSoFar:
 
 
 def feature_so_far(
-    options: PartOptions, progress: TaskProgress, conditions: Conditions
+    choices: VerificationChoices, progress: TaskProgress, conditions: Conditions
 ) -> FeatureSoFar | None:
     """Return the feature that is being probed; None if there is none."""
-    planned = planned_at(options, len(progress.runs))
+    planned = planned_at(choices, len(progress.runs))
     if planned is None:
         return None
     points = progress.points
@@ -124,7 +107,7 @@ def fit_of(
     if not points:
         return planned.kind, None
     found = [(planned.name, point) for point in points]
-    touches = touches_of_part(found, Conditions(instrument), PartOptions())
+    touches = touches_of_part(found, Conditions(instrument))
     kind = planned.kind or kind_of(planned.name, touches)
     try:
         return kind, None if kind is None else fit_feature(kind, touches.points_cam)
@@ -156,9 +139,9 @@ def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
     return tuple(places)
 
 
-def hand_goal(options: PartOptions, run: int, step: int) -> HandGoal:
+def hand_goal(choices: VerificationChoices, run: int, step: int) -> HandGoal:
     """Return the goal of a simulated operator for a point of a run, both from 0."""
-    planned = planned_at(options, run)
+    planned = planned_at(choices, run)
     places = () if planned is None else planned_places(planned)
     if not places:
         return HandGoal()

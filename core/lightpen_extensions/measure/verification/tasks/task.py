@@ -1,38 +1,54 @@
 """Verification tasks: the definition for command line, session and window.
 
-A module of this package makes one `VerificationTask`; `registry` lists them. Two tasks
-are treated apart by other modules: the drift check, as the session visits its point
-between the other tasks, and the part, which has a step of the window to itself. Nothing
-else switches on the kind of a task.
+A module of this package makes one `VerificationTask`; `registry` lists them. The part
+has a step of the window to itself. Nothing else switches on the kind of a task.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeAlias, TypeVar
 
-from msgspec import Struct
+from msgspec import Meta
 
 from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, Number, message
+from lightpen.model.assumptions import BALL_UNCERTAINTY
 from lightpen.model.decision_rules import Decision
 from lightpen.model.limits import VerificationLimits, rule_in_words
+from lightpen.record.folder.verifications import MEASURED_PART
+from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
 from lightpen_extensions.measure.verification.tasks.probed_point import (
     NO_DRIFT,
     ProbedPoint,
 )
 
 ANY = 1e6  # mm or rad: no other place, no other posture makes a point a new one
+FAST = 5  # images of a point, usually
+TaskKind: TypeAlias = Literal["fixed point", "drift", "part"]  # in records and settings
 
 
 Points: TypeAlias = tuple[ProbedPoint, ...]
 Runs: TypeAlias = Sequence[tuple[str, Sequence[ProbedPoint]]]
 
 
-class TaskOptions(Struct, frozen=True, tag_field="task"):
-    """Base of the options of a task; the defaults are the usual values."""
+@dataclass(frozen=True)
+class VerificationChoices:
+    """What is chosen for a verification; the defaults are the usual values."""
+
+    kind: TaskKind = "fixed point"
+    plan: Plan | None = None  # of a part
+    n_cone: Annotated[int, Meta(ge=3, le=50)] = 6  # points of a tip check, and
+    n_cone_frames: Annotated[int, Meta(ge=1, le=100)] = 15  # images of each
+    n_frames: int = FAST  # images of another point
+    limits: VerificationLimits = field(default_factory=VerificationLimits)
+
+    @property
+    def features(self) -> tuple[PlannedFeature, ...]:
+        """The features of the plan, a run each; none without a plan."""
+        return () if self.plan is None else self.plan.features
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +58,7 @@ class Conditions:
     instrument: Instrument
     limits: VerificationLimits = field(default_factory=VerificationLimits)
     ball_diameter: float | None = None  # mm; if a surface is touched
+    ball_uncertainty: float = BALL_UNCERTAINTY  # U (k = 2) of the diameter, mm
     nominal_tip: FloatArray | None = None  # (3,), mm, to compare with
     cone_cam: FloatArray | None = None  # (3,), of the calibration, if known, mm
     # (3,), standard uncertainty of a point by a camera that moved, mm
@@ -146,15 +163,18 @@ class HandGoal:
     outwards: FloatArray | None = None  # (3,), normal of the surface there
 
 
-OptionsT = TypeVar("OptionsT", bound=TaskOptions)
 FoundT = TypeVar("FoundT", bound=Found)
 
 
+def _nothing(choices: VerificationChoices, ball_diameter: float | None) -> None:
+    """Nothing must be entered."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class VerificationTask(Generic[OptionsT, FoundT]):
+class VerificationTask(Generic[FoundT]):
     """One task of a verification."""
 
-    kind: str  # name in records and settings
+    kind: TaskKind
     summary: str  # help text of the command
     run_help: str  # help text of one run
     title: Message  # a noun
@@ -164,31 +184,26 @@ class VerificationTask(Generic[OptionsT, FoundT]):
     known: Message  # message on a point that was probed before
     limits: tuple[str, ...]  # in `VerificationLimits`
     # Raises `CalibrationError` where the points do not suffice.
-    measure: Callable[[Runs, Conditions, OptionsT], FoundT]
+    measure: Callable[[Runs, Conditions, VerificationChoices], FoundT]
     entries: Callable[[FoundT, Instrument], dict[str, Any]]  # of the record
     tables: Callable[[FoundT, Conditions], tuple[ResultTable, ...]]
     bands: Callable[[FoundT, Conditions], tuple[Band, ...]]  # the leading one first
-    hand: Callable[[OptionsT, int, int], HandGoal]  # by run and point from 0
-    instruction: Callable[[OptionsT, TaskProgress], Message]
+    # By run and point from 0
+    hand: Callable[[VerificationChoices, int, int], HandGoal]
+    instruction: Callable[[VerificationChoices, TaskProgress], Message]
     # Turn, rad, or distance, mm, that makes a point new; both 0 once lifted
-    newness: Callable[[OptionsT], tuple[float, float]]
-    n_points: Callable[[OptionsT, int], int]  # of a run, from 0
-    # Images of a point; None for as many as are chosen for all tasks
-    n_frames: Callable[[OptionsT], int | None] = lambda _: None
-    options: type[OptionsT]
+    newness: tuple[float, float]
+    n_points: Callable[[VerificationChoices, int], int]  # of a run, from 0
+    n_frames: Callable[[VerificationChoices], int] = lambda choices: choices.n_frames
     other_run: Message | None = None  # what to do for the first point of another
-    n_runs: Callable[[OptionsT], int] = lambda _: 1
-    screen: Callable[[OptionsT, Conditions, TaskProgress], Screening] = (
-        lambda options, conditions, progress: keep_all(len(progress.points))
+    n_runs: Callable[[VerificationChoices], int] = lambda _: 1
+    screen: Callable[[TaskProgress], Screening] = lambda progress: keep_all(
+        len(progress.points)
     )
-    # What must be entered before, by options and ball diameter
-    missing: Callable[[OptionsT, float | None], Message | None] = lambda *_: None
-    # The decision rule, by options and limits
-    rule_of: Callable[[OptionsT, VerificationLimits], Message] = (
-        lambda options, limits: rule_in_words(limits)
-    )
+    # What must be entered before, by choices and ball diameter
+    missing: Callable[[VerificationChoices, float | None], Message | None] = _nothing
     # Refuses the last of some runs in less time than `measure`.
-    check: Callable[[Runs, Conditions, OptionsT], object] | None = None
+    check: Callable[[Runs, Conditions, VerificationChoices], object] | None = None
     judges_points: bool = True  # whether values are shown amid a run
     is_pooled: bool = False  # all images of the command are one run
     counts_drift: bool = True  # whether U counts how far the camera moved
@@ -203,15 +218,15 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         """Its name on the command line."""
         return self.kind.replace(" ", "-")
 
-    def done(self, options: OptionsT, progress: TaskProgress) -> float:
+    def done(self, choices: VerificationChoices, progress: TaskProgress) -> float:
         """Return the completed fraction of the current run, 0 to 1."""
-        needed = self.n_points(options, len(progress.runs))
+        needed = self.n_points(choices, len(progress.runs))
         return min(len(progress.points) / needed, 1.0) if needed else 0.0
 
-    def counted(self, options: OptionsT, progress: TaskProgress) -> Message:
+    def counted(self, choices: VerificationChoices, progress: TaskProgress) -> Message:
         """Return the progress of the current task: probed points and points in all."""
         n_points, run = len(progress.points), len(progress.runs)
-        needed = self.n_points(options, run)
+        needed = self.n_points(choices, run)
         count = message("task.points", n_points=n_points, needed=needed)
         if progress.n_runs == 1:
             return count
@@ -224,6 +239,13 @@ class VerificationTask(Generic[OptionsT, FoundT]):
         if progress.points and (is_next or self.other_run):
             return self.another
         return self.other_run if progress.runs and self.other_run else self.first
+
+
+def rule_of(choices: VerificationChoices, limits: VerificationLimits) -> Message:
+    """Return the decision rule of the plan, else of the limits."""
+    plan = choices.plan if choices.kind == MEASURED_PART else None
+    stated = None if plan is None else plan.rule
+    return rule_in_words(replace(limits, rule=stated or limits.rule))
 
 
 def points_table(points: Sequence[ProbedPoint]) -> ResultTable:

@@ -38,24 +38,23 @@ from lightpen.record.swings.journal import JOURNAL
 from lightpen.record.swings.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.status import (
     SessionEventKind,
     VerificationStatus,
 )
-from lightpen_extensions.measure.verification.storage.checkpoint import find_interrupted
-from lightpen_extensions.measure.verification.storage.point_images import CONCLUDED
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
+from lightpen_extensions.measure.verification.storage.session_record import (
+    CONCLUDED,
+    find_interrupted,
 )
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
 EVE = Signature("Eve", "correct horse")
-SIX_POINTS = CHOICES.with_options(FixedPointOptions(6, n_frames=3))  # as many find it
+SIX_POINTS = replace(CHOICES, n_cone=6)  # as many find it
 
 
 def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) -> None:
@@ -248,7 +247,7 @@ def test_a_verification_can_be_repeated_from_the_images_of_its_touches(
     at_it.come(PART_CHOICES)
     at_it.touch(*round_a_ring(11, 31.751)[:10], *BAR)
     runs = {run.name: run for run in at_it.runs}
-    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED] * 4
+    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED] * 2
     for record in at_it.records:
         own = []
         for touches in record["inputs"]["touches"]:
@@ -321,9 +320,7 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
 # A camera that moves
 
 
-WITH_LAMP = VerificationChoices(
-    FIXED_POINT.kind, (FixedPointOptions(3, n_frames=8),), n_frames=8
-)
+WITH_LAMP = VerificationChoices(n_cone=3, n_cone_frames=8, n_frames=8)
 
 
 def touch_before_lamp(
@@ -463,7 +460,7 @@ def test_what_is_given_up_is_abandoned(at_it: Verifier) -> None:
 
     assert conclusion["outcome"] == "abandoned"
     assert conclusion["records"] == []
-    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED, DISCARDED]
+    assert [open_record(run).verdict for run in at_it.runs] == [DISCARDED]
 
 
 # What was found against a tip

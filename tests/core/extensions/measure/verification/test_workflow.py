@@ -34,20 +34,19 @@ from lightpen_extensions.measure.verification.probing.drift_reference import (
     LampObservations,
 )
 from lightpen_extensions.measure.verification.probing.image_locations import touch_place
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.status import (
     SessionEventKind,
     VerificationStatus,
 )
-from lightpen_extensions.measure.verification.storage.checkpoint import find_interrupted
-from lightpen_extensions.measure.verification.storage.resuming import (
+from lightpen_extensions.measure.verification.storage.session_files import (
     abandon_interrupted,
 )
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
+from lightpen_extensions.measure.verification.storage.session_record import (
+    find_interrupted,
 )
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 from lightpen_extensions.measure.verification.workflow import VerificationWorkflow
 from lightpen_extensions.simulator.swings import PAPER_TIP
 
@@ -200,12 +199,12 @@ def test_a_verification_with_other_choices(trace: Trace) -> None:
     act = trace.workflow
     act.come()  # nothing is chosen
     act.end_task()
-    trace.come(replace(CHOICES, kind=PART.kind, options=()))
+    trace.come(replace(CHOICES, kind=PART.kind, plan=None))
     trace.come()
     trace.come()  # the same
     trace.pick_up()
     trace.touch(*leant(4)[:2])
-    act.choose(trace.prepared, CHOICES.with_options(FixedPointOptions(3, n_frames=3)))
+    act.choose(trace.prepared, replace(CHOICES, n_cone=3))
     trace.touch(leant(4)[2])
     act.choose(trace.prepared, PART_CHOICES)
     trace.pick_up()
@@ -302,11 +301,11 @@ def test_a_verification_that_is_closed(trace: Trace) -> None:
     shutil.copytree(trace.folder / SIMULATED, copy / SIMULATED)
     trace.workflow.shut_down()
     (interrupted,) = find_interrupted(copy)
-    for day in ("20310430", "20310502"):
-        name = interrupted.path.name.replace("20310501", day)
-        shutil.copy(interrupted.path, interrupted.path.with_name(name))
+    record = interrupted.path.parent
+    for day in ("20010430", "20990502"):
+        shutil.copytree(record, record.with_name(day + record.name[8:]))
     newer, same, older = find_interrupted(copy)
-    assert newer.path.name > interrupted.path.name > older.path.name
+    assert newer.path > interrupted.path > older.path
     assert same == interrupted
     for each in (newer, interrupted, older):
         abandon_interrupted(copy, each, NOON)

@@ -15,31 +15,27 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.model.rig import rig_of
 from lightpen_extensions.measure.measuring.artefacts import artefact_plan
+from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
 from lightpen_extensions.measure.verification.probing.probing import (
     ProbingEvent,
     ProbingEventKind,
+    ProbingState,
+    advance_touch,
 )
 from lightpen_extensions.measure.verification.session.session import (
+    SessionSetup,
+    SessionState,
     advance_session,
     end_task,
+    instruction,
     run_again,
     without_last_touch,
 )
-from lightpen_extensions.measure.verification.session.session_state import (
-    SessionSetup,
-    SessionState,
-    instruction,
-)
 from lightpen_extensions.measure.verification.tasks.drift import DRIFT
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
-)
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.part import PART, sizes_of
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
 from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
-from lightpen_extensions.measure.verification.tasks.task import TaskOptions
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
@@ -128,10 +124,10 @@ class Session:
     def says(self) -> str:
         return instruction(self.setup, self.state).code
 
-    def choose(self, task: AnyTask, options: TaskOptions | None = None) -> None:
-        chosen = replace(self.setup.choices, kind=task.kind)
-        if options is not None:
-            chosen = chosen.with_options(options)
+    def choose(self, task: AnyTask, plan: Plan | None = None, n_cone: int = 4) -> None:
+        chosen = replace(self.setup.choices, kind=task.kind, n_cone=n_cone)
+        if plan is not None:
+            chosen = replace(chosen, plan=plan)
         self.setup = replace(self.setup, choices=chosen)
 
 
@@ -161,8 +157,8 @@ def test_the_simulated_hand_completes_each_task(
     for _ in range(60):
         if session.state.task(session.setup) is None:
             break
-        state, options = session.state, session.setup.choices.options_of(task)
-        goal = task.hand(options, len(state.runs), len(state.touches))
+        state = session.state
+        goal = task.hand(session.setup.choices, len(state.runs), len(state.touches))
         if goal.point is None:
             session.touch(Hold((0.0, 0.0, 0.0), goal.tilt, goal.direction))
         else:
@@ -201,9 +197,8 @@ def test_a_pen_that_is_lifted_in_the_middle_of_a_touch_is_reported_so(
 def test_a_touch_is_broken_off_once_half_of_its_images_are_held(
     session: Session, n_images: int, is_reported: bool
 ) -> None:
-    session.setup = replace(
-        session.setup, choices=replace(session.setup.choices, n_frames=4)
-    )
+    choices = replace(session.setup.choices, n_cone_frames=4)
+    session.setup = replace(session.setup, choices=choices)
     session.see(session.holder.still(leant(4)[0], n_images))
     session.see(session.holder.away())
 
@@ -248,7 +243,7 @@ def test_a_task_ended_early_has_what_its_touches_give(session: Session) -> None:
 
 
 def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
-    session.choose(FIXED_POINT, options=FixedPointOptions(6, n_frames=3))
+    session.choose(FIXED_POINT, n_cone=6)
     instrument = session.setup.instrument
     bent = instrument.tip_pen + np.array([0.3, 0.0, 0.0])
     session.holder = Holder(instrument.rig, instrument.pen, bent)
@@ -265,7 +260,7 @@ def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
 
 
 UPRIGHT = (Hold(tilt=0.0),) * 3
-BAR_OPTIONS = PartOptions(artefact_plan("Bar", [LENGTH]))
+BAR_PLAN = artefact_plan("Bar", [LENGTH])
 
 
 @pytest.fixture
@@ -331,18 +326,25 @@ def test_the_last_point_taken_back_is_the_only_one_that_goes(session: Session) -
 
 
 def test_runs_of_earlier_are_added_and_end_their_task(session: Session) -> None:
-    session.choose(PART, options=BAR_OPTIONS)
-    session.touch(BAR[0])
-    (first,) = session.state.runs
-    session.touch(BAR[1])
-    empty, setup = SessionState(), session.setup
-    (_, second) = (point for _, point in found_by(session.state, PART).points)
-    one = run_again(setup, empty, first, is_last=False)
-    two = run_again(setup, one, (second,), is_last=False)
-    early = run_again(setup, empty, first, is_last=True)
+    session.choose(PART, BAR_PLAN)
+    held = []
+    for hold in BAR:
+        session.state = replace(session.state, touching=ProbingState())
+        for detection in session.holder.still(hold):
+            touched = advance_touch(
+                session.setup.instrument,
+                session.setup.rules,
+                session.state.touching,
+                "image",
+                detection,
+            )
+            session.state = replace(session.state, touching=touched.state)
+        held.append(session.state.touching.taken)
+    one = run_again(session.setup, SessionState(), held[0])
+    two = run_again(session.setup, one, held[1])
+    early = end_task(session.setup, one).state
 
-    assert (one.runs, one.done) == ((first,), None)
+    assert (len(one.runs), one.done) == (1, None)
     assert len(sizes_of(found_by(two, PART).part)) == 1
     assert sizes_of(found_by(early, PART).part) == []
     assert found_by(early, PART).missing == ("length 1 end 2",)
-    assert run_again(setup, two, first, is_last=False).found is two.found

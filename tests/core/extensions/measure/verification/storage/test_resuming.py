@@ -21,18 +21,17 @@ from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
-from lightpen_extensions.measure.verification.session.session_state import SessionState
-from lightpen_extensions.measure.verification.storage.checkpoint import (
+from lightpen_extensions.measure.verification.session.session import SessionState
+from lightpen_extensions.measure.verification.storage.session_files import (
+    abandon_interrupted,
+)
+from lightpen_extensions.measure.verification.storage.session_record import (
+    CONCLUDED,
     InterruptedVerification,
     find_interrupted,
 )
-from lightpen_extensions.measure.verification.storage.point_images import CONCLUDED
-from lightpen_extensions.measure.verification.storage.resuming import (
-    abandon_interrupted,
-)
 from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import PartOptions
+from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
 
 # Verifies until it is killed, at most one touch longer than said, and tells how many
 # touches count.
@@ -178,11 +177,11 @@ def test_a_part_goes_on_after_a_kill_and_gives_the_same_figures(
     features = tuple(plate_plan().feature(name) for name in ("dome", "hole 1"))
     features = tuple(replace_entries(each, side=Side.AUTO) for each in features)
     plan = Plan("Two features", features)
-    choices = VerificationChoices(PART.kind, (PartOptions(plan),), n_frames=2)
+    choices = VerificationChoices(PART.kind, plan, n_frames=2)
     holds = []
     for run, planned in enumerate(features):
         for step in range(planned.n_touches):
-            goal = PART.hand(PartOptions(plan), run, step)
+            goal = PART.hand(choices, run, step)
             assert goal.point is not None
             assert goal.outwards is not None
             holds += [
@@ -262,7 +261,7 @@ def test_what_is_closed_is_an_abandoned_verification_in_the_archive(
     assert (conclusion["operator"], conclusion["tip"]) == ("Ann", "T-10")
     assert conclusion["records"] == []
     verdicts = [open_record(run).verdict for run in second.runs]
-    assert verdicts == [CONCLUDED, DISCARDED]
+    assert verdicts == [DISCARDED]
     logbook = Logbook(copy)
     with closing(logbook.database):
         assert logbook.enter_owed() == ()

@@ -6,7 +6,7 @@ from lightpen.formats.hashes import InputFile
 from lightpen.formats.json_records import FileRecord
 from lightpen.model.rig import rig_of
 from lightpen_extensions.measure.verification.probing.image_locations import PenCameras
-from lightpen_extensions.measure.verification.storage.verification_files import (
+from lightpen_extensions.measure.verification.storage.session_files import (
     viewer_entries,
 )
 from lightpen_extensions.simulator.swings import paper_camera

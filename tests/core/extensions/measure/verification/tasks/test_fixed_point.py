@@ -13,13 +13,14 @@ from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.verification.tasks.fixed_point import (
     FIXED_POINT,
     NEW_POSTURE,
-    USUAL_TOUCHES,
-    FixedPointOptions,
     _at_one_place,
     measure_fixed_point,
 )
 from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
-from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.measure.verification.tasks.task import (
+    Conditions,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]
@@ -199,12 +200,12 @@ def test_touches_alike_are_expected_to_scatter_by_their_noise(
     np.testing.assert_allclose(found.expected_deviation, noise, rtol=1e-6)
 
 
-@pytest.mark.parametrize("n_touches", [USUAL_TOUCHES, 6, 8, 20])
+@pytest.mark.parametrize("n_touches", [6, 8, 20])
 def test_the_simulated_operator_probes_in_postures_that_all_count(
     n_touches: int,
 ) -> None:
-    options = FixedPointOptions(n_touches=n_touches)
-    goals = [FIXED_POINT.hand(options, 0, step) for step in range(n_touches)]
+    choices = VerificationChoices(n_cone=n_touches)
+    goals = [FIXED_POINT.hand(choices, 0, step) for step in range(n_touches)]
     axes = np.array(
         [
             [

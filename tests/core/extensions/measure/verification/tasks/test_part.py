@@ -28,26 +28,25 @@ from lightpen_extensions.measure.measuring.plan import (
 from lightpen_extensions.measure.measuring.qif import qif_text
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
 from lightpen_extensions.measure.verification.session.session import (
+    SessionSetup,
+    SessionState,
     advance_session,
+    bands_so_far,
     end_task,
     without_last_touch,
 )
-from lightpen_extensions.measure.verification.session.session_state import (
-    SessionSetup,
-    SessionState,
-    bands_so_far,
-)
 from lightpen_extensions.measure.verification.tasks.part import PART, Part
 from lightpen_extensions.measure.verification.tasks.part_course import (
-    PartOptions,
     feature_so_far,
     planned_places,
     touches_of_part,
 )
 from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
-from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.measure.verification.tasks.task import (
+    Conditions,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 BALL = 10.0  # mm
@@ -69,7 +68,8 @@ class Station:
         self, n: int, plan: Plan | None = None, moved: FloatArray = UNMOVED
     ) -> None:
         """Probe the next points, of a plan with nominals or of the one in use."""
-        by = self.options if plan is None else PartOptions(plan)
+        by = self.setup.choices
+        by = by if plan is None else replace(by, plan=plan)
         for _ in range(n):
             goal = PART.hand(by, len(self.state.runs), len(self.state.touches))
             assert goal.point is not None
@@ -81,10 +81,6 @@ class Station:
                 self.state = transition.state
 
     @property
-    def options(self) -> PartOptions:
-        return self.setup.choices.options_of(PART)
-
-    @property
     def found(self) -> Part:
         found = self.state.found_by(PART)
         assert found is not None
@@ -92,7 +88,7 @@ class Station:
 
 
 def station(instrument: Instrument, plan: Plan) -> Station:
-    choices = VerificationChoices(PART.kind, (PartOptions(plan),), n_frames=2)
+    choices = VerificationChoices(PART.kind, plan, n_frames=2)
     setup = SessionSetup(instrument, choices, BALL)
     return Station(setup, Holder(instrument.rig, instrument.pen))
 
@@ -106,14 +102,14 @@ def probed_plate(
 ) -> list[tuple[str, list[ProbedPoint]]]:
     """Return points of all features, which share the error of the tip."""
     rng = np.random.default_rng(5)
-    options, n_parameters = PartOptions(plan), len(instrument.covariance)
+    choices, n_parameters = VerificationChoices(plan=plan), len(instrument.covariance)
     sensitivity = np.zeros((3, n_parameters))
     sensitivity[:, instrument.parameters.tip] = np.eye(3)
     runs = []
     for run, planned in enumerate(plan.features):
         points = []
         for step in range(planned.n_touches):
-            goal = PART.hand(options, run, step)
+            goal = PART.hand(choices, run, step)
             assert goal.point is not None
             assert goal.outwards is not None
             center = PAPER_CONE + goal.point + BALL / 2 * goal.outwards
@@ -136,7 +132,7 @@ def measured(instrument: Instrument) -> Station:
     """The plate of the simulated station, probed in one go."""
     at_it = station(instrument, plate_plan())
     runs = probed_plate(instrument, plate_plan())
-    found = PART.measure(runs, at_it.setup.conditions, at_it.options)
+    found = PART.measure(runs, at_it.setup.conditions, at_it.setup.choices)
     at_it.state = replace(at_it.state, done=PART, found=found)
     return at_it
 
@@ -254,7 +250,7 @@ def test_the_next_point_lies_where_none_was_probed(instrument: Instrument) -> No
     at_it.probe(5)  # one short of the plane
     progress = at_it.state.progress(at_it.setup, PART)
 
-    now = feature_so_far(at_it.options, progress, at_it.setup.conditions)
+    now = feature_so_far(at_it.setup.choices, progress, at_it.setup.conditions)
 
     assert now is not None
     assert now.kind is FeatureKind.PLANE
@@ -328,16 +324,15 @@ def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
     setup = replace(SessionSetup(instrument), ball_diameter=BALL)
 
     with pytest.raises(CalibrationError, match="No measuring plan"):
-        PART.measure([], setup.conditions, PartOptions())
-    assert PART.missing(PartOptions(), BALL) is not None
+        PART.measure([], setup.conditions, VerificationChoices())
+    assert PART.missing(VerificationChoices(), BALL) is not None
 
 
 def test_the_ball_is_known_by_its_diameter(instrument: Instrument) -> None:
     name, points = probed_plate(instrument, plate_plan())[0]
-    conditions = Conditions(instrument, ball_diameter=10.0)
-    options = PartOptions(ball_uncertainty=0.004)
+    conditions = Conditions(instrument, ball_diameter=10.0, ball_uncertainty=0.004)
 
-    touches = touches_of_part([(name, each) for each in points], conditions, options)
+    touches = touches_of_part([(name, each) for each in points], conditions)
 
     assert (touches.ball_radius, touches.ball_uncertainty) == (5.0, 0.002)
 
@@ -347,7 +342,7 @@ def test_a_camera_that_moved_counts_in_each_point(instrument: Instrument) -> Non
     found, drift = [(name, each) for each in points], np.array([0.005, 0.002, 0.001])
 
     still, moved = (
-        touches_of_part(found, conditions, PartOptions())
+        touches_of_part(found, conditions)
         for conditions in (Conditions(instrument), Conditions(instrument, drift=drift))
     )
 

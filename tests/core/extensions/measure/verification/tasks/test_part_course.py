@@ -12,7 +12,6 @@ from lightpen_extensions.measure.measuring.plan import Nominal, Plan, PlannedFea
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.tasks.part_course import (
-    PartOptions,
     feature_so_far,
     hand_goal,
     planned_places,
@@ -22,7 +21,11 @@ from lightpen_extensions.measure.verification.tasks.probed_point import (
     ProbedPoint,
     joint_covariance,
 )
-from lightpen_extensions.measure.verification.tasks.task import Conditions, TaskProgress
+from lightpen_extensions.measure.verification.tasks.task import (
+    Conditions,
+    TaskProgress,
+    VerificationChoices,
+)
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 Placed = Callable[[Sequence[Sequence[float]]], tuple[ProbedPoint, ...]]
@@ -57,11 +60,11 @@ def test_touches_of_a_part_are_those_of_the_ball_with_what_the_camera_moved(
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     other = replace(other, approach_cam=np.array([0.0, 0, 1]), rotation=turn)
     drift = np.array([0.01, 0.02, 0.0])
-    conditions = Conditions(instrument, ball_diameter=3.0, drift=drift)
-
-    found = touches_of_part(
-        [("a", one), ("b", other)], conditions, PartOptions(ball_uncertainty=0.004)
+    conditions = Conditions(
+        instrument, ball_diameter=3.0, ball_uncertainty=0.004, drift=drift
     )
+
+    found = touches_of_part([("a", one), ("b", other)], conditions)
 
     moved = np.diag(np.tile(drift**2, 2))
     shared = joint_covariance((one, other), instrument)
@@ -71,10 +74,7 @@ def test_touches_of_a_part_are_those_of_the_ball_with_what_the_camera_moved(
     np.testing.assert_array_equal(found.styli_cam, [[0, 1, 0], [-1, 0, 0]])
     assert (found.owners, found.ball_radius) == (("a", "b"), 1.5)
     assert found.ball_uncertainty == 0.002
-    assert (
-        touches_of_part([("a", one)], Conditions(instrument), PartOptions()).ball_radius
-        == 0
-    )
+    assert touches_of_part([("a", one)], Conditions(instrument)).ball_radius == 0
 
 
 @pytest.mark.parametrize(
@@ -100,10 +100,11 @@ def test_deviations_of_the_feature_that_is_probed(
     places: list[list[float]],
     signs: list[int],
 ) -> None:
-    options = PartOptions(Plan("Part", (PlannedFeature("it", kind, touches=6),)))
+    plan = Plan("Part", (PlannedFeature("it", kind, touches=6),))
+    choices = VerificationChoices(plan=plan)
     conditions, points = Conditions(instrument), placed(places)
-    now = feature_so_far(options, TaskProgress(points), conditions)
-    begun = feature_so_far(options, TaskProgress(), conditions)
+    now = feature_so_far(choices, TaskProgress(points), conditions)
+    begun = feature_so_far(choices, TaskProgress(), conditions)
 
     assert now is not None
     assert begun is not None
@@ -114,7 +115,7 @@ def test_deviations_of_the_feature_that_is_probed(
     if kind is FeatureKind.PLANE:
         np.testing.assert_allclose(found, 0.1 * np.array(signs), atol=1e-9)
     assert begun.fit is None
-    assert feature_so_far(options, TaskProgress((), (points,)), conditions) is None
+    assert feature_so_far(choices, TaskProgress((), (points,)), conditions) is None
 
 
 def test_places_are_planned_by_kind_and_nominals_together() -> None:
@@ -133,9 +134,9 @@ def test_places_are_planned_by_kind_and_nominals_together() -> None:
 
 
 def test_the_simulated_operator_goes_round_the_places_of_each_feature() -> None:
-    options = PartOptions(PLATE)
+    choices = VerificationChoices(plan=PLATE)
     n = PLATE.features[0].n_touches
-    first, again = (hand_goal(options, 0, step) for step in (0, n))
+    first, again = (hand_goal(choices, 0, step) for step in (0, n))
     place = planned_places(PLATE.features[0])[0]
 
     assert first.point is not None
@@ -145,5 +146,5 @@ def test_the_simulated_operator_goes_round_the_places_of_each_feature() -> None:
     np.testing.assert_allclose(first.point, [u, -w - 30.0, v])
     u, v, w = place.normal
     np.testing.assert_allclose(first.outwards, [u, -w, v])
-    assert hand_goal(options, len(PLATE.features), 0).point is None
-    assert hand_goal(PartOptions(), 0, 0).point is None
+    assert hand_goal(choices, len(PLATE.features), 0).point is None
+    assert hand_goal(VerificationChoices(), 0, 0).point is None

@@ -1,34 +1,44 @@
 """Tests of what holds for each verification task."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 from msgspec import json
 
 from lightpen.model.limits import VerificationLimits
-from lightpen_extensions.measure.verification.session.choices import VerificationChoices
+from lightpen_extensions.measure.measuring.plan import free_plan
+from lightpen_extensions.measure.verification.tasks.drift import DRIFT
+from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.registry import (
     TASKS,
-    AnyOptions,
     AnyTask,
     task_of,
 )
-from lightpen_extensions.measure.verification.tasks.task import TaskProgress
+from lightpen_extensions.measure.verification.tasks.task import (
+    TaskProgress,
+    VerificationChoices,
+)
 
 tasks = pytest.mark.parametrize("task", TASKS, ids=str)
+PLANNED = VerificationChoices(PART.kind, free_plan("Part"))
 
 
-def test_kinds_and_options_differ() -> None:
+def test_kinds_differ() -> None:
     assert len({task.kind for task in TASKS}) == len(TASKS)
-    assert len({task.options for task in TASKS}) == len(TASKS)
     assert all(task_of(task.kind) is task for task in TASKS)
 
 
-@tasks
-def test_options_are_read_back_as_they_were(task: AnyTask) -> None:
-    kept = json.encode((task.options(),))
+def test_choices_are_read_back_as_they_were() -> None:
+    assert json.decode(json.encode(PLANNED), type=VerificationChoices) == PLANNED
 
-    assert json.decode(kept, type=tuple[AnyOptions, ...]) == (task.options(),)
+
+def test_the_missing_entry_of_the_chosen_task_is_named() -> None:
+    missing = PART.missing(replace(PLANNED, plan=None), None)
+
+    assert missing is not None
+    assert missing.code == "part.no-plan"
+    assert PART.missing(PLANNED, None) is None
+    assert DRIFT.missing(VerificationChoices(), None) is None
 
 
 @tasks
@@ -37,15 +47,10 @@ def test_limits_are_those_of_a_verification(task: AnyTask) -> None:
 
 
 @tasks
-def test_the_usual_options_are_not_kept(task: AnyTask) -> None:
-    assert VerificationChoices().with_options(task.options()).options == ()
-
-
-@tasks
 def test_a_task_at_its_start_says_what_to_do(task: AnyTask) -> None:
-    options, progress = task.options(), TaskProgress()
+    choices, progress = VerificationChoices(), TaskProgress()
 
-    assert str(task.instruction(options, progress))
-    assert str(task.counted(options, progress))
+    assert str(task.instruction(choices, progress))
+    assert str(task.counted(choices, progress))
     assert str(task.headline(progress, is_next=False)) == str(task.first)
-    assert task.done(options, progress) == 0.0
+    assert task.done(choices, progress) == 0.0

@@ -7,17 +7,10 @@ import pytest
 
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.measure.verification.tasks.drift import DRIFT, DriftOptions
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
-    FIXED_POINT,
-    FixedPointOptions,
-)
+from lightpen_extensions.measure.verification.tasks.drift import DRIFT
+from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
-from lightpen_extensions.measure.verification.tasks.task import (
-    Conditions,
-    Screening,
-    TaskProgress,
-)
+from lightpen_extensions.measure.verification.tasks.task import Screening, TaskProgress
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 ORIGIN = [0.0, 0.0, 0.0]
@@ -43,8 +36,8 @@ def screened(
 ) -> Screening:
     progress = TaskProgress(tuple(points), tuple(map(tuple, runs)))
     if task == "drift":
-        return DRIFT.screen(DriftOptions(), Conditions(by), progress)
-    return FIXED_POINT.screen(FixedPointOptions(), Conditions(by), progress)
+        return DRIFT.screen(progress)
+    return FIXED_POINT.screen(progress)
 
 
 @pytest.mark.parametrize("task", ["drift", "fixed point"])
@@ -95,5 +88,5 @@ def test_of_two_points_of_a_reference_the_first_may_be_wrong_and_later_the_last(
 def test_a_posture_is_another_one_from_eight_degrees_on(
     degrees: float, is_new: bool
 ) -> None:
-    turn, _ = FIXED_POINT.newness(FixedPointOptions())
+    turn, _ = FIXED_POINT.newness
     assert (np.radians(degrees) >= turn) == is_new
