@@ -21,7 +21,7 @@ from lightpen_extensions.measure.measuring.plan_checks import write_plan
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.verification.tasks.part import PART
 from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
-from lightpen_program import main
+from lightpen_program.extensions import main
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

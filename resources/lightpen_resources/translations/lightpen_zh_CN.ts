@@ -8728,10 +8728,6 @@ needed</source>
         <translation>{file} 中的验证在写入后被更改或损坏。请从副本恢复该文件。</translation>
     </message>
     <message>
-        <source>The verification of {file} is open in another window. Continue it there, or close that window and try again.</source>
-        <translation>{file} 的验证已在另一窗口中打开。请在那里继续，或关闭该窗口后重试。</translation>
-    </message>
-    <message>
         <source>The video {path} cannot be opened or contains no frames. Check that it plays, or save its frames as images.</source>
         <translation>视频 {path} 无法打开，或没有帧。请检查能否播放，或把各帧保存为图像。</translation>
     </message>

@@ -31,7 +31,6 @@ from lightpen.runners.faults import FaultReporter
 from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.record_header import record_header
-from lightpen_extensions.measure.verification.live_points import LivePoints
 from lightpen_extensions.measure.verification.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
@@ -55,6 +54,7 @@ from lightpen_extensions.measure.verification.session.status import (
     ending,
     event_kinds,
 )
+from lightpen_extensions.measure.verification.storage.live_points import LivePoints
 from lightpen_extensions.measure.verification.storage.resuming import (
     ResumedVerification,
     resume_verification,

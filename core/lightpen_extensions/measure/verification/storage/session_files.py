@@ -244,6 +244,8 @@ class SessionKeeping:
 
     def begin(self) -> None:
         """Begin another session."""
+        if not any(kept.ends is self.images for kept, _ in self._waiting):
+            self.images.release()
         self._files, self.images = [], SessionRecord(self._begin)
 
     def write(self) -> None:

@@ -140,8 +140,9 @@ class SessionRecord:
     ) -> str:
         """Put an image on the disk, and return its name in the record."""
         if self._writer is None:
-            self._folder, header = self._begin()
-            self._writer = RecordWriter.create(self._folder, header, is_swing=False)
+            folder, header = self._begin()
+            self._writer = RecordWriter.create(folder, header, is_swing=False)
+            self._folder = folder
         others = frame.others[: len(seen.others)]
         number = self._writer.append(
             frame.image,
@@ -206,6 +207,10 @@ class SessionRecord:
         """Close the session: its conclusion is written."""
         if self._folder is not None:
             remove_note(self._folder / SESSION)
+        self.release()
+
+    def release(self) -> None:
+        """Let another program take over."""
         if self._writer is not None:
             self._writer.close()
 
