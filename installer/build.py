@@ -144,12 +144,11 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
 
 
 def shipped_pins() -> tuple[Pin, ...]:
-    """Return what is bundled: all that the program needs, and three of its extras.
+    """Return what is bundled: all that the program needs, and four of its extras.
 
     An installed program cannot be added to, and without them it would have no
-    industrial camera, no archive on a server, and
-    nobody could follow the pen. They are tested with the versions of
-    requirements-dev.lock.
+    industrial camera, no archive on a server, no LEDs from a workbook, and nobody could
+    follow the pen. They are tested with the versions of requirements-dev.lock.
     """
     program, development = (
         windows_pins((ROOT / name).read_text("utf-8"), runtime.VERSION)

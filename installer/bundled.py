@@ -6,6 +6,7 @@ EXTRAS = {
     *("genicam", "harvesters"),  # "genicam"
     *("crcmod", "pyigtl"),  # "stream"
     *("psycopg", "psycopg-binary", "tzdata"),  # "postgres"
+    "python-calamine",  # "workbooks"
 }
 
 

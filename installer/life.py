@@ -25,8 +25,13 @@ from lightpen_program.self_test.run import FILE_LIST, damaged_files
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere
 NOTES = "my notes 笔记.txt"
-# For cameras, for archives, and for the keys of stations.
-NEEDED = (*("harvesters.core", "psycopg", "cryptography.hazmat.bindings._rust"),)
+# For cameras, for archives, for workbooks, and for the keys of stations.
+NEEDED = (
+    "harvesters.core",
+    "psycopg",
+    "python_calamine",
+    "cryptography.hazmat.bindings._rust",
+)
 SIZE_LIMIT = 350e6  # bytes installed
 
 

@@ -57,7 +57,7 @@ expect "installs" apt-get -q -y install --no-install-recommends "$package"
 expect "its version is the package's" is_version_of_package
 expect "self-test: files, libraries, fonts, the tip" lightpen --self-test report.json
 expect "extras load" /opt/lightpen/bin/python -c \
-    "import harvesters.core, psycopg, pyigtl"
+    "import harvesters.core, psycopg, pyigtl, python_calamine"
 expect "demo accepts its tip" lightpen --demo
 expect "a file that is missing is named" ends_with 2 lightpen /no/such.lightpen
 expect "menu entry opens a window" menu_entry_opens_a_window
