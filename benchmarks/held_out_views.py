@@ -31,7 +31,8 @@ from lightpen_extensions.boards.adjustment import fit_board_poses
 from lightpen_extensions.boards.board_fit import N_SHAPE, BoardState
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
-from lightpen_extensions.boards.distortion import FEW, rms_together
+from lightpen_extensions.boards.distortion import FEW
+from lightpen_extensions.boards.effects import rms_together
 from lightpen_extensions.boards.observing import observe_board
 from lightpen_extensions.boards.start import start_board_poses, start_camera
 from lightpen_extensions.boards.views import Views
@@ -94,10 +95,10 @@ def by_opencv(views: Views, *, is_free: bool = False) -> Found:
         *(points, seen, views.image_sizes[0], fixed, np.eye(3), np.zeros(5)),
         criteria=SETTLED,
     )
-    places = np.asarray(found[5], dtype=np.float64).reshape(-1, 3)
     K = np.asarray(found[1], dtype=np.float64)
     values = np.concatenate([K[[0, 1, 0, 1], [0, 1, 2, 2]], np.ravel(found[2])])
-    return Found(_camera(views, values), places if is_free else board.points)
+    places = np.reshape(found[5], (-1, 3)) if is_free else board.points
+    return Found(_camera(views, values), np.asarray(places, dtype=np.float64))
 
 
 def by_mrcal(views: Views, n_coefficients: int) -> Found:

@@ -15,9 +15,13 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
-from lightpen_extensions.boards.adjustment import FINEST, adjust_board
+from lightpen_extensions.boards.adjustment import adjust_board
 from lightpen_extensions.boards.board_fit import N_SHAPE, BoardFit, BoardState
-from lightpen_extensions.boards.effects import held_out_errors
+from lightpen_extensions.boards.effects import (
+    held_out_errors,
+    is_significantly_less,
+    rms_together,
+)
 from lightpen_extensions.boards.start import BoardPoses, start_board_poses, start_camera
 from lightpen_extensions.boards.views import Views
 
@@ -25,9 +29,6 @@ FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis
 # Standard deviations of what k3, and k4 k5 k6, do to the distance of a corner.
 OF_K3, OF_RATIONAL = 0.1, 1.0
-WORTH = 0.01  # by which other coefficients must lessen the held-out error
-SIGMAS = 2.0  # of the gain of all views
-MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
 
 @dataclass(frozen=True)
@@ -96,27 +97,6 @@ def choose_distortion(
     return Choice(n_best, held_out), best
 
 
-def is_significantly_less(
-    rms: float, rms_before: float, errors: FloatArray, errors_before: FloatArray
-) -> bool:
-    """Return whether a lens model predicts images better than the one before.
-
-    Parameters
-    ----------
-    rms, rms_before : float
-        Cross-validated error of all points, px.
-    errors, errors_before : (V,) array
-        That of each image, px.
-    """
-    # By how many times, so that no one image decides alone...
-    gains = np.log(np.maximum(errors_before, FINEST) / np.maximum(errors, FINEST))
-    chance = float(gains.std(ddof=1)) * len(gains) ** 0.5
-    # ... unless it gains much more than others lose: few may reach the rim.
-    losses = float(np.sqrt(2 * np.sum(np.minimum(gains, 0.0) ** 2)))
-    least = SIGMAS * min(chance, max(losses, MUCH / SIGMAS))
-    return bool(rms < (1 - WORTH) * rms_before and gains.sum() > least)
-
-
 def is_wide(camera: Camera, pixels: FloatArray) -> bool:
     """Return whether points were seen so far off the axis that a fisheye differs.
 
@@ -149,12 +129,6 @@ def fit_camera(views: Views, near: Camera) -> BoardFit:
     straight = replace(near, distortion=np.zeros_like(near.distortion))
     origin = replace(state, cameras=(straight,))
     return adjust_board(views, state, (usual_distortion(near),), origin)
-
-
-def rms_together(errors: FloatArray, views: Views) -> float:
-    """Return the error of all points, px rms, given the error of each view."""
-    counts = views.seen.sum(axis=(1, 2))
-    return float(np.sqrt(np.average(errors**2, weights=counts)))
 
 
 def rough_poses(near: Camera, views: Views) -> BoardPoses:

@@ -4,7 +4,7 @@ The residuals of a fit are linear in its unknowns, in the places of all points o
 board (as in a calibration that releases the object [1]_), and in a smooth residual
 field of the lens over the image. The variances of noise, points and field follow from
 restricted maximum likelihood, by the fixed point of [2]_, and so does which of five
-lengths the field has.
+lengths the field has; the fit has one if that predicts views better.
 
 What one view has to itself (blur, shadows, a board that gives way) makes its residuals
 depend on each other. The covariance therefore takes whole views as independent, and
@@ -30,6 +30,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.lens_field import LensField
 from lightpen_extensions.boards.adjustment import (
+    FINEST,
     board_residuals,
     fit_board_poses,
     linearise,
@@ -46,7 +47,9 @@ MAX_ROUNDS = 20
 CONVERGED = 0.1  # of twice the logarithm of the likelihood
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
 LARGE = 4.0  # times the noise: a field beside which the fit is far off
-SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
+WORTH = 0.01  # by which a larger model must lessen the held-out error
+SIGMAS = 2.0  # of the gain of all views
+MUCH = 1.0  # gain of all views together, of the logarithm of their errors
 
 
 @dataclass(frozen=True)
@@ -143,22 +146,36 @@ def _from(views: Views, fitted: BoardFit) -> MixedFit:
         near = found[-1].components if found else None
         found.append(_most_likely(design, near))
     best = min(found, key=lambda each: each.deviance)
-    without = _solved(plain, best.components)
+    without = _most_likely(plain, best.components)
     held_out, robust = _robust(best)
+    errors = _of_views(views, held_out)
     prior = best.design.prior(best.components)
     total, n = best.covariance @ prior @ best.covariance + robust, plain.n_fit
-    field = None
-    if without.deviance - best.deviance > SIGNIFICANT:
-        field = _field(best, total, fitted)
-    x = best.x[: plain.n_plain]
+    held_out, alone = _robust(without)
+    errors_alone = _of_views(views, held_out)
+    rms, rms_alone = rms_together(errors, views), rms_together(errors_alone, views)
+    if is_significantly_less(rms, rms_alone, errors, errors_alone):
+        field, x = _field(best, total, fitted), best.x[: plain.n_plain]
+    else:
+        field, x, errors, robust = None, without.x, errors_alone, alone
+        total = _without_field(without, best) + alone
     adjustment = _moved(views, fitted, x, best.components.noise, field)
     return MixedFit(
         replace(adjustment, covariance=total[:n, :n]),
         best.components,
         robust[:n, :n],
         field,
-        _of_views(views, held_out),
+        errors,
     )
+
+
+def _without_field(without: _Solution, best: _Solution) -> FloatArray:
+    """Return the covariance that priors leave, and a field that is not fitted."""
+    C, n = without.covariance, without.design.n_plain
+    pull = without.components.noise**-2 * C @ best.design.normal[:n, n:]
+    of_field = np.linalg.solve(best.design.node_prior, pull.T)
+    left = C @ without.design.prior(without.components) @ C
+    return np.asarray(left + best.components.field**2 * pull @ of_field)
 
 
 def held_out_errors(views: Views, fitted: BoardFit) -> FloatArray:
@@ -168,6 +185,33 @@ def held_out_errors(views: Views, fitted: BoardFit) -> FloatArray:
     """
     design = _design_of(views, fitted)
     return _of_views(views, _robust(_most_likely(design))[0])
+
+
+def rms_together(errors: FloatArray, views: Views) -> float:
+    """Return the error of all points, px rms, given the error of each view."""
+    counts = views.seen.sum(axis=(1, 2))
+    return float(np.sqrt(np.average(errors**2, weights=counts)))
+
+
+def is_significantly_less(
+    rms: float, rms_before: float, errors: FloatArray, errors_before: FloatArray
+) -> bool:
+    """Return whether a larger model predicts images better than the one before.
+
+    Parameters
+    ----------
+    rms, rms_before : float
+        Cross-validated error of all points, px.
+    errors, errors_before : (V,) array
+        That of each image, px.
+    """
+    # By how many times, so that no one image decides alone...
+    gains = np.log(np.maximum(errors_before, FINEST) / np.maximum(errors, FINEST))
+    chance = float(gains.std(ddof=1)) * len(gains) ** 0.5
+    # ... unless it gains much more than others lose: few may reach the rim.
+    losses = float(np.sqrt(2 * np.sum(np.minimum(gains, 0.0) ** 2)))
+    least = SIGMAS * min(chance, max(losses, MUCH / SIGMAS))
+    return bool(rms < (1 - WORTH) * rms_before and gains.sum() > least)
 
 
 def _of_views(views: Views, residuals: FloatArray) -> FloatArray:

@@ -14,15 +14,8 @@ from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.model.camera import Camera
 from lightpen.model.rig import rig_of
-from lightpen_extensions.boards.distortion import (
-    FEW,
-    FISHEYE,
-    MANY,
-    WORTH,
-    Choice,
-    is_significantly_less,
-    is_wide,
-)
+from lightpen_extensions.boards.distortion import FEW, FISHEYE, MANY, Choice, is_wide
+from lightpen_extensions.boards.effects import WORTH, is_significantly_less
 from lightpen_extensions.discover.lens_conversion import convert_lens
 from lightpen_extensions.discover.starts import (
     CameraPrior,
