@@ -31,7 +31,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.lens_field import LensField
-from lightpen_extensions.boards.board_fit import BoardFit, board_points
+from lightpen_extensions.boards.adjustment import BoardFit, board_points
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import (
     CameraCalibration,

@@ -27,8 +27,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.formats.images import find_images
 from lightpen.model.camera import Camera
-from lightpen_extensions.boards.adjustment import fit_board_poses
-from lightpen_extensions.boards.board_fit import N_SHAPE, BoardState
+from lightpen_extensions.boards.adjustment import N_SHAPE, BoardState, fit_board_poses
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.distortion import FEW

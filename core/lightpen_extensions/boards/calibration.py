@@ -18,7 +18,7 @@ from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.quantiles import normal_quantile
 from lightpen.model.uncertainty_map import map_uncertainty
-from lightpen_extensions.boards.board_fit import BoardFit
+from lightpen_extensions.boards.adjustment import BoardFit
 from lightpen_extensions.boards.changes import (
     FEWEST,
     CameraChange,
@@ -35,13 +35,13 @@ from lightpen_extensions.boards.distortion import (
     fit_camera,
     rms_together,
 )
-from lightpen_extensions.boards.duplicates import (
+from lightpen_extensions.boards.effects import MixedFit, fit_effects
+from lightpen_extensions.boards.start import start_any_camera, start_board_poses
+from lightpen_extensions.boards.views import (
+    Views,
     message_on_duplicates,
     without_duplicates,
 )
-from lightpen_extensions.boards.effects import MixedFit, fit_effects
-from lightpen_extensions.boards.start import start_any_camera, start_board_poses
-from lightpen_extensions.boards.views import Views
 
 MIN_VIEWS = 5
 ENOUGH_VIEWS = 15

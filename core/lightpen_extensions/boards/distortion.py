@@ -15,8 +15,12 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera, LensModel
-from lightpen_extensions.boards.adjustment import adjust_board
-from lightpen_extensions.boards.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen_extensions.boards.adjustment import (
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    adjust_board,
+)
 from lightpen_extensions.boards.effects import (
     held_out_errors,
     is_significantly_less,

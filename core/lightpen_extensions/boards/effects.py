@@ -31,12 +31,14 @@ from lightpen.errors import CalibrationError
 from lightpen.model.lens_field import LensField
 from lightpen_extensions.boards.adjustment import (
     FINEST,
+    N_POSE,
+    N_SHAPE,
+    BoardFit,
     board_residuals,
     fit_board_poses,
     linearise,
     moved_state,
 )
-from lightpen_extensions.boards.board_fit import N_POSE, N_SHAPE, BoardFit
 from lightpen_extensions.boards.views import Views
 
 LENGTHS = (0.15, 0.21, 0.3, 0.42, 0.6)  # of the field, in the image's longer side

@@ -17,21 +17,27 @@ from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig, of_camera
 from lightpen.model.rigid import vector_from_rotation
-from lightpen_extensions.boards.adjustment import FINEST, adjust_board, fit_board_poses
-from lightpen_extensions.boards.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen_extensions.boards.adjustment import (
+    FINEST,
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    adjust_board,
+    fit_board_poses,
+)
 from lightpen_extensions.boards.calibration import (
     CameraCalibration,
     calibrate_camera,
     without_outliers,
 )
 from lightpen_extensions.boards.changes import USELESS
-from lightpen_extensions.boards.duplicates import (
+from lightpen_extensions.boards.effects import views_without_field
+from lightpen_extensions.boards.start import BoardPoses, start_board_poses
+from lightpen_extensions.boards.views import (
+    Views,
     message_on_duplicates,
     without_duplicates,
 )
-from lightpen_extensions.boards.effects import views_without_field
-from lightpen_extensions.boards.start import BoardPoses, start_board_poses
-from lightpen_extensions.boards.views import Views
 
 MIN_PAIRS = 3
 ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
+from lightpen.messages import Message, message
 from lightpen_extensions.boards.boards import Board
 
+SAME = 0.002  # of the image's longer side: distance of the points, rms
+COMMON = 0.8  # of the points of the view that shows fewer
 SHOWN = 6  # names in a message
 
 
@@ -55,3 +58,47 @@ class Views:
             (self.image_sizes[camera],),
         )
         return own.chosen(own.found[:, 0])
+
+
+def without_duplicates(views: Views) -> tuple[Views, tuple[str, ...]]:
+    """Return the views in which the board is somewhere else, and the others' names.
+
+    What views of one place share (pixels, hang of the board, blur, shadows) is the same
+    in all of them: more of them add no information on the camera.
+    """
+    kept: list[int] = []
+    scale = SAME * np.array([max(size) for size in views.image_sizes])
+    for v in range(views.n_views):
+        if not any(_is_same(views.pixels[v], views.pixels[k], scale) for k in kept):
+            kept.append(v)
+    which = np.zeros(views.n_views, dtype=np.bool_)
+    which[kept] = True
+    others = tuple(
+        name for name, keep in zip(views.names, which, strict=True) if not keep
+    )
+    return views.chosen(which), others
+
+
+def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
+    """Return the message on the named views that do not count; ``n_views`` do."""
+    return message(
+        "intrinsics.duplicates",
+        n_duplicates=len(names),
+        n_views=n_views,
+        names=listed_names(names),
+    )
+
+
+def _is_same(one: FloatArray, other: FloatArray, scale: FloatArray) -> bool:
+    """Return whether all cameras see the points (C, N, 2) at the same places."""
+    squares = np.square(one - other).sum(axis=-1)
+    common = np.isfinite(squares)
+    n_seen = np.isfinite(one[..., 0]).sum(axis=-1)
+    n_other = np.isfinite(other[..., 0]).sum(axis=-1)
+    if np.any((n_seen > 0) != (n_other > 0)):
+        return False
+    n_common = common.sum(axis=-1)
+    if np.any(n_common < COMMON * np.minimum(n_seen, n_other)):
+        return False
+    sums = np.where(common, squares, 0.0).sum(axis=-1)
+    return bool(np.all(sums <= scale**2 * n_common))

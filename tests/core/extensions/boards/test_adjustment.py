@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from lightpen.model.camera import Camera
-from lightpen_extensions.boards.adjustment import adjust_board, fit_board_poses
-from lightpen_extensions.boards.board_fit import N_SHAPE, BoardFit, BoardState
+from lightpen_extensions.boards.adjustment import (
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    adjust_board,
+    fit_board_poses,
+)
 from lightpen_extensions.boards.start import start_board_poses, start_camera
 from lightpen_extensions.boards.views import Views
 
