@@ -51,6 +51,7 @@ HEAD = 0.4  # of the height of the brightest
 
 BELL_RADIUS = 6.0  # px; blur leaves less no even inside
 ALIKE_RADIUS = 8.0  # px, of a spot that is measured as many others are
+CORE = 3.0  # times the height of a halo: the LED in it
 MANY_MISFITS = 3.0  # times the usual one, of the outline of an LED that is not whole
 LIT = 0.25  # of the spots with foreign light
 RAISED = 0.35  # height of the outline above which the foot of a disc is not its own
@@ -310,7 +311,11 @@ def _with_small(
     # Foreign light at a quarter of the LEDs also affects the others, though less.
     are_lit = raised.sum() > LIT * fits.sum()
     clipped = fits & ((spots.flaws & SpotFlaw.SATURATED) > 0)
-    chosen = spots.are_small | raised | clipped
+    # A halo may be taken for the disc, wide and dim, of the LED in its middle.
+    x, y = np.rint(spots.centers).astype(np.int64).T
+    tops = (image[y, x] - [disc.levels.background for disc in discs]) / full_scale
+    is_halo = tops > CORE * spots.contrasts
+    chosen = spots.are_small | raised | clipped | is_halo
     if chosen.sum() > LIT * fits.sum():
         chosen |= rough_radii < (LARGEST_RADIUS if are_lit else ALIKE_RADIUS)
     small = np.flatnonzero(chosen)
@@ -319,6 +324,7 @@ def _with_small(
     found = measure_small(image, spots.centers[small], rough_radii[small], full_scale)
     unwhole = SpotFlaw.CUT | SpotFlaw.MERGED
     kept = spots.flaws[small] & (SpotFlaw.BLURRED | unwhole)
+    kept &= ~np.where(is_halo[small], int(SpotFlaw.BLURRED), 0)
     # What was parted at high levels and is whole in its own window is not cut.
     reach = found.radii[:, None]
     height, width = image.shape

@@ -257,3 +257,28 @@ def test_blur_that_joins_small_leds_leaves_them_too_small() -> None:
     panel = replace(CLEAN, width=2.0, psf=1.0, gains=(2.5, 6.0))
     shown = panel_image(panel, np.random.default_rng(1)).image
     assert detect_spots(shown).tiny_width == pytest.approx(3.0, abs=0.4)
+
+
+def test_a_wide_halo_is_not_taken_for_the_led_in_it() -> None:
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[:300, :400]
+    light = np.full((300, 400), 0.05)
+    columns, rows = np.meshgrid(np.arange(7), np.arange(5))
+    grid = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    centers = [104, 86] + 32 * grid + rng.uniform(-2, 2, (35, 2))
+    for center in centers:
+        away = np.hypot(x - center[0], y - center[1])
+        led, height = np.clip(3.0 - away, 0, 1), rng.uniform(0.5, 0.8)
+        # Halos lie beside their LEDs, so that their middles are another place.
+        aside = np.hypot(x - center[0] - 1, y - center[1])
+        halo = rng.uniform(0.1, 0.2) * np.exp(-0.5 * (aside / 6) ** 2)
+        light += height * (led + halo)
+    image = cv2.GaussianBlur(light, (0, 0), 0.8) * 255 + rng.normal(0, 1, light.shape)
+
+    spots = detect_spots(np.clip(np.rint(image), 0, 255).astype(np.uint8))
+
+    gaps = np.linalg.norm(spots.centers - centers[:, None], axis=2)
+    assert len(spots) == 35
+    assert gaps.min(axis=1).max() < 0.15
+    assert not spots.flaws.any()
+    assert spots.areas.max() < 40
