@@ -24,6 +24,7 @@ MESSAGES = {
     "images.too-small": "The LEDs are {width:.1f} px wide in most images; at least {needed:.0f} px are needed. Bring the camera nearer, or use a longer focal length or a camera of higher resolution.",
     "images.none-readable": "None of the {n_images} images can be read. {why}",
     "images.other-size": "{n_wrong} of {n_readable} images are {size}, the intrinsics file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.",
+    "images.other-than-binned": "{n_wrong} of {n_readable} images are {size}. The intrinsics file is for {width} x {height} px: it states binning or a region (binning_x, binning_y, roi) of {of_width} x {of_height} px. Correct these entries, or choose the file for this camera.",
     "centers.outside": "The LED centres reach to ({x:.0f}, {y:.0f}) px, the intrinsics file was made for {width} x {height} px. Choose the file for this camera.",
     "reason.unreadable": "unreadable",
     "reason.unhandled": "program error",

@@ -290,6 +290,17 @@ def _require_size(searched: list[_Searched], camera: Camera) -> None:
     wrong = [i.detail for i in searched if i.reason is Reason.WRONG_SIZE and i.detail]
     n_readable = sum(image.reason is not Reason.UNREADABLE for image in searched)
     if 2 * len(wrong) > n_readable:
+        if camera.unbinned_size is not None:
+            raise FileError(
+                "images.other-than-binned",
+                n_wrong=len(wrong),
+                n_readable=n_readable,
+                size=wrong[0],
+                width=camera.width,
+                height=camera.height,
+                of_width=camera.unbinned_size[0],
+                of_height=camera.unbinned_size[1],
+            )
         raise FileError(
             "images.other-size",
             n_wrong=len(wrong),

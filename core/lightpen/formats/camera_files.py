@@ -174,6 +174,7 @@ def _is_of_array(value: Tree) -> bool:
 
 def _of_images(camera: Camera, entries: Entries) -> Camera:
     """Return a camera of ROS for the images that its driver cuts and bins."""
+    whole = camera.image_size
     if _has_mapping(entries, "roi"):
         roi = entries.part("roi")
         names = ("x_offset", "y_offset", "width", "height")
@@ -185,6 +186,8 @@ def _of_images(camera: Camera, entries: Entries) -> Camera:
     if max(binning) > 1:
         check_window(camera, None, (binning[0], binning[1]), entries.name)
         camera = camera.binned(*binning)
+    if camera.image_size != whole:
+        camera = replace(camera, unbinned_size=whole)
     return camera
 
 

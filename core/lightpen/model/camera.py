@@ -86,6 +86,8 @@ class Camera:
     lens_field: LensField | None = None
     lens: LensModel = LensModel.BROWN
     found: FoundCamera | None = None  # before the images that it was found from
+    # Width and height before the binning and the region that its file states, px.
+    unbinned_size: tuple[int, int] | None = None
 
     @property
     def distortion_names(self) -> tuple[str, ...]:

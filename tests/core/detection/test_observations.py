@@ -17,6 +17,7 @@ from lightpen.detection.observations import (
 from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.detection.reasons import Reason
 from lightpen.errors import FileError
+from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import message
@@ -102,6 +103,21 @@ def test_images_of_another_camera_are_refused(images: list[Image]) -> None:
 
     with pytest.raises(FileError, match=r"1224 x 1024.*made for 2448 x 2048"):
         observe([loader(half)] * 3)
+
+
+def test_a_camera_file_that_states_binning_is_named_where_images_are_whole(
+    images: list[Image], tmp_path: Path
+) -> None:
+    file = tmp_path / "ros.yaml"
+    file.write_text(
+        "image_width: 2448\nimage_height: 2048\nbinning_x: 2\nbinning_y: 2\n"
+        "distortion_model: plumb_bob\ndistortion_coefficients: [0, 0, 0, 0, 0]\n"
+        "camera_matrix: [4640, 0, 1231, 0, 4640, 1018, 0, 0, 1]\n"
+    )
+    source = ImageSource(("a",), (), lambda: iter([loader(images[0])]))
+
+    with pytest.raises(FileError, match=r"states binning.*of 2448 x 2048 px"):
+        observe_images(source, read_camera(file), PEN)
 
 
 def test_a_bug_in_a_thread_is_not_swallowed() -> None:
