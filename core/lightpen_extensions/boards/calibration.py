@@ -29,13 +29,8 @@ from lightpen_extensions.boards.changes import (
     message_on_change,
     rotated_message,
 )
-from lightpen_extensions.boards.distortion import (
-    Choice,
-    choose_distortion,
-    fit_camera,
-    rms_together,
-)
-from lightpen_extensions.boards.effects import MixedFit, fit_effects
+from lightpen_extensions.boards.distortion import Choice, choose_distortion, fit_camera
+from lightpen_extensions.boards.effects import MixedFit, fit_effects, rms_together
 from lightpen_extensions.boards.start import start_any_camera, start_board_poses
 from lightpen_extensions.boards.views import (
     Views,
