@@ -34,7 +34,8 @@ MAX_ROUNDS = 10
 N_WAYS = 3  # zoom and shift of the principal point along x and y
 RIDGE = 1e-10  # of a normal matrix scaled to ones
 WORSE = 1.3  # ratio of the residuals of first groups that are turned to those before
-BETTER, NEARLY = 1.25, 0.9  # ratio of the errors, and its share of that by a change
+BETTER, NEARLY = 1.12, 0.9  # ratio of the errors, and its share of that by a change
+MOSTLY = 0.5  # mean of the gains over their root mean square
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +223,9 @@ def find_rotated(
         less = held_out_errors(_turned(views, turned), now)
     except CalibrationError:  # the camera does not image them so
         return none
+    gains = np.log(errors / less)
     is_better = np.sum(errors**2) > gain**2 * np.sum(less**2)
+    is_better &= gains.mean() > MOSTLY * np.sqrt(np.mean(gains**2))
     return min(turned, ~turned, key=np.count_nonzero) if is_better else none
 
 
