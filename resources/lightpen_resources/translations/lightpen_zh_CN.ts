@@ -6736,6 +6736,10 @@ needed</source>
         <translation>{n_views} 幅图像显示标定板；至少需要 {least} 幅，{enough} 幅更好。请增加标定板向各侧倾斜 20 至 40 度以及位于图像各角的视图。</translation>
     </message>
     <message>
+        <source>{n_wrong} of {n_readable} images are {size}. The intrinsics file is for {width} x {height} px: it states binning or a region (binning_x, binning_y, roi) of {of_width} x {of_height} px. Correct these entries, or choose the file for this camera.</source>
+        <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}。内参文件适用于 {width} × {height} px：该文件声明了 {of_width} × {of_height} px 图像的像素合并或区域（binning_x、binning_y、roi）。请更正这些条目，或选择这台相机的文件。</translation>
+    </message>
+    <message>
         <source>{name}</source>
         <translation>{name}</translation>
     </message>
