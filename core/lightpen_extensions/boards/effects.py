@@ -49,6 +49,7 @@ MAX_ROUNDS = 20
 CONVERGED = 0.1  # of twice the logarithm of the likelihood
 KNOWN = 1e-2  # least number of effects that a variance is estimated from
 LARGE = 4.0  # times the noise: a field beside which the fit is far off
+SIGNIFICANT = 6.0  # twice the gain of log-likelihood by a field, of two parameters
 WORTH = 0.01  # by which a larger model must lessen the held-out error
 SIGMAS = 2.0  # of the gain of all views
 MUCH = 1.0  # gain of all views together, of the logarithm of their errors
@@ -156,7 +157,8 @@ def _from(views: Views, fitted: BoardFit) -> MixedFit:
     held_out, alone = _robust(without)
     errors_alone = _of_views(views, held_out)
     rms, rms_alone = rms_together(errors, views), rms_together(errors_alone, views)
-    if is_significantly_less(rms, rms_alone, errors, errors_alone):
+    is_likely = without.deviance - best.deviance > SIGNIFICANT
+    if is_likely and rms < (1 - WORTH) * rms_alone:
         field, x = _field(best, total, fitted), best.x[: plain.n_plain]
     else:
         field, x, errors, robust = None, without.x, errors_alone, alone
