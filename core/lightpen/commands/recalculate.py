@@ -17,8 +17,12 @@ from lightpen.commands.console import (
 )
 from lightpen.comparisons.led_file import calibrate_again
 from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
-from lightpen.estimation.statistics.workers import local_workers
+from lightpen.estimation.monte_carlo import (
+    MIN_TRIALS,
+    MonteCarlo,
+    local_workers,
+    run_monte_carlo,
+)
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
 from lightpen.formats.json_records import plain

@@ -29,12 +29,16 @@ from lightpen.estimation.bundle.adjustment import Adjustment, adjust
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.change_point import ChangePoint, step_of_poses
 from lightpen.estimation.bundle.consistency_findings import Contradiction
-from lightpen.estimation.bundle.disc_diameter import read_diameter
-from lightpen.estimation.bundle.field_findings import FoundField, found_fields
+from lightpen.estimation.bundle.field_search import FoundField, found_fields
+from lightpen.estimation.bundle.led_quality import (
+    LedQuality,
+    TipFrames,
+    measure_leds,
+    tip_frames,
+)
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.estimation.bundle.priors import Priors, priors_of
+from lightpen.estimation.bundle.priors import Priors, priors_of, read_diameter
 from lightpen.estimation.bundle.self_check import SelfCheck, check_prediction
-from lightpen.estimation.bundle.tip_frames import TipFrames, tip_frames
 from lightpen.estimation.contact.camera_motion import (
     CameraPath,
     SteadyImages,
@@ -47,7 +51,6 @@ from lightpen.estimation.contact.joint import (
     fit_contact,
     joint_at,
 )
-from lightpen.estimation.contact.led_quality import LedQuality, measure_leds
 from lightpen.estimation.contact.single_images import (
     PosedImages,
     require_fit,
@@ -58,9 +61,12 @@ from lightpen.estimation.pivot.two_stage import (
     fit_two_stage,
     projection_bias,
 )
-from lightpen.estimation.rigs.initial_extrinsics import find_initial_extrinsics
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
-from lightpen.estimation.rigs.rig_poses import RigPoses, join_poses
+from lightpen.estimation.rigs.rig_poses import (
+    RigPoses,
+    find_initial_extrinsics,
+    join_poses,
+)
 from lightpen.estimation.rigs.synchrony import TimeLag
 from lightpen.estimation.uncertainty.budget import (
     Budget,

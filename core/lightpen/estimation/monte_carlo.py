@@ -11,9 +11,14 @@ References
 .. [1] JCGM 101:2008, "Propagation of distributions using a Monte Carlo method".
 """
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from multiprocessing import get_context
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -22,12 +27,10 @@ from lightpen.detection.observations import Observations
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.components import NONE
-from lightpen.estimation.bundle.disc_diameter import modelled_areas
 from lightpen.estimation.bundle.linearised import N_CONE, BundleState
-from lightpen.estimation.bundle.priors import Priors
+from lightpen.estimation.bundle.priors import Priors, modelled_areas
+from lightpen.estimation.bundle.unknowns import NONE
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.statistics.workers import Map
 from lightpen.estimation.uncertainty.budget import (
     POSTURES,
     ContributionName,
@@ -43,6 +46,56 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.information import symmetric_root
 from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import rig_of
+
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+T = TypeVar("T")
+S = TypeVar("S")
+Report = Callable[[float], None]
+
+
+class Map(Protocol):
+    """Does something to all items in worker processes."""
+
+    def __call__(
+        self, function: Callable[[S], T], items: Sequence[S], report: Report
+    ) -> list[T]:
+        """Return the results of the function for all items, in order.
+
+        ``report`` is called with the fraction done; an exception from it ends the
+        computation, and pending items are dropped.
+        """
+
+
+@contextmanager
+def local_workers(n_workers: int | None = None) -> Iterator[Map]:
+    """Open worker processes, by default one a core."""
+    context = get_context("spawn")  # a fork would copy threads that hold locks
+    with ProcessPoolExecutor(
+        n_workers or os.cpu_count() or 1, context, initializer=_use_one_thread
+    ) as executor:
+
+        def mapped(
+            function: Callable[[S], T], items: Sequence[S], report: Report
+        ) -> list[T]:
+            futures = [executor.submit(function, item) for item in items]
+            try:
+                for n_done, _ in enumerate(as_completed(futures), 1):
+                    report(n_done / len(futures))
+                return [future.result() for future in futures]
+            except BaseException:
+                for future in futures:
+                    future.cancel()
+                raise
+
+        yield mapped
+
+
+def _use_one_thread() -> None:
+    """Let each process keep to its core."""
+    for name in ONE_THREAD:
+        os.environ[name] = "1"
+
 
 SEED = 0
 MIN_TRIALS = 20  # fewer give a standard deviation to worse than a sixth

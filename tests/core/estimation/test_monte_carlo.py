@@ -10,7 +10,7 @@ import pytest
 
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.disc_diameter import DiameterReading
+from lightpen.estimation.bundle.priors import DiameterReading
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.monte_carlo import (
     MonteCarlo,

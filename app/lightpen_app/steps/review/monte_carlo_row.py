@@ -5,8 +5,12 @@ import os
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
-from lightpen.estimation.statistics.workers import local_workers
+from lightpen.estimation.monte_carlo import (
+    MIN_TRIALS,
+    MonteCarlo,
+    local_workers,
+    run_monte_carlo,
+)
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.record.swings.solving import Solution
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout

@@ -5,7 +5,7 @@ extrinsics in the rig, the LEDs, the pen's scale and the diameter of its discs, 
 with a prior: the value of its file, with the uncertainty that the file states or that
 is assumed in its place. Errors of the LEDs, of the seat as it follows the pen's lean
 and of a drift are random effects, whose standard deviations are estimated from the
-images (`lightpen.estimation.statistics.variance_components`).
+images (`lightpen.estimation.variance_components`).
 
 The rotations are eliminated image by image [1]_, equation (3), so that other priors
 need no new linearisation. The tip is given in the frame in which the file's LEDs fit
@@ -27,7 +27,6 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
-from lightpen.estimation.bundle.components import NO_COMPONENTS, Components
 from lightpen.estimation.bundle.image_fields import FieldName, ImageField
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
@@ -40,9 +39,14 @@ from lightpen.estimation.bundle.linearised import (
 )
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.seat_modes import SeatModes
-from lightpen.estimation.bundle.unknowns import ParameterLayout, Unknowns
+from lightpen.estimation.bundle.unknowns import (
+    NO_COMPONENTS,
+    Components,
+    ParameterLayout,
+    Unknowns,
+)
 from lightpen.estimation.contact.joint import inliers
-from lightpen.estimation.statistics.variance_components import RandomEffect, find_jitter
+from lightpen.estimation.variance_components import RandomEffect, find_jitter
 from lightpen.model.information import inverse
 
 CONVERGED = 1e-5  # mm

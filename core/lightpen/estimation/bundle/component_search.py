@@ -6,10 +6,14 @@ from functools import partial
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.components import NO_COMPONENTS, NONE, Components
 from lightpen.estimation.bundle.image_fields import size_of
-from lightpen.estimation.bundle.unknowns import Unknowns
-from lightpen.estimation.statistics.variance_components import (
+from lightpen.estimation.bundle.unknowns import (
+    NO_COMPONENTS,
+    NONE,
+    Components,
+    Unknowns,
+)
+from lightpen.estimation.variance_components import (
     FITTED,
     Component,
     find_beside,

@@ -23,7 +23,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations
 from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.single_images import PosedImages, pose_images
-from lightpen.estimation.statistics.variance_components import CERTAIN
+from lightpen.estimation.variance_components import CERTAIN
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.quantiles import chi_square_quantile

@@ -47,7 +47,7 @@ from lightpen.estimation.reports.methods import (
 )
 from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.uncertainty.distance import distance_repeatability
+from lightpen.estimation.uncertainty.budget import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.estimation.uncertainty.second_cone import SecondCone
 from lightpen.formats.hashes import Inputs

@@ -12,8 +12,11 @@ from lightpen.estimation.reports.methods import (
     result_of,
     two_stage_difference,
 )
-from lightpen.estimation.reports.rejected_centres import rejected_centres
-from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
+from lightpen.estimation.reports.report_warnings import (
+    count_dropped,
+    rejected_centres,
+    warnings_of,
+)
 from lightpen.estimation.reports.verdict import Verdict
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.method import METHODS

@@ -9,12 +9,11 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.bundle.led_quality import DISPLACED
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.contact.led_quality import DISPLACED
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.methods import reported, two_stage_difference
-from lightpen.estimation.reports.rejected_centres import rejected_centres
-from lightpen.estimation.reports.report_warnings import late_cameras
+from lightpen.estimation.reports.report_warnings import late_cameras, rejected_centres
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
     ContributionName,

@@ -17,7 +17,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_poses
 from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.single_images import PosedImages
-from lightpen.estimation.rigs.initial_extrinsics import InitialExtrinsics
+from lightpen.estimation.rigs.rig_poses import InitialExtrinsics
 from lightpen.messages import COMMA, Message, message
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig

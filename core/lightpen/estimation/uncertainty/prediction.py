@@ -19,7 +19,6 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.adjustment import shrunk_priors
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
-from lightpen.estimation.bundle.components import NO_COMPONENTS
 from lightpen.estimation.bundle.field_search import SearchedField, search_fields
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
@@ -30,7 +29,7 @@ from lightpen.estimation.bundle.linearised import (
 )
 from lightpen.estimation.bundle.priors import Priors, priors_of
 from lightpen.estimation.bundle.seat_modes import seat_modes_of
-from lightpen.estimation.bundle.unknowns import Unknowns
+from lightpen.estimation.bundle.unknowns import NO_COMPONENTS, Unknowns
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,

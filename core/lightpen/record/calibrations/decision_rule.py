@@ -12,7 +12,7 @@ References
 """
 
 from lightpen.estimation.bundle.consistency_test import LIMIT as CONTRADICTED
-from lightpen.estimation.contact.led_quality import DISPLACED
+from lightpen.estimation.bundle.led_quality import DISPLACED
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.calibration_record import VerdictLimits
 from lightpen.estimation.reports.verdict import (

@@ -16,13 +16,63 @@ from lightpen.estimation.reports.calibration_record import (
     CalibrationRecord,
     InstrumentRecord,
 )
-from lightpen.estimation.running_tip import RunningTip, fit_running_tip
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.model.camera import Camera, lens_model_of
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.pen import Pen
 from lightpen.model.posture import directions_of, tilts_of
+from lightpen.model.rigid import skew
+
+# Convergence of a tip with the number of images, from single-image poses.
+#
+# Each image i says ``R_i tip_pen + t_i = cone_cam`` with the covariance of its pose.
+# The normal equations of weighted least squares add up over images, so that the tip by
+# the first n of them, for every n, costs one pass.
+
+
+@dataclass(frozen=True, eq=False)
+class RunningTip:
+    """The tip by the first n images, for n = `first`, `first` + 1 ..."""
+
+    first: int
+    tips: FloatArray  # (M, 3), pen frame, mm
+    # (M, 3, 3), by noise that is independent from image to image, mm^2.
+    covariances: FloatArray
+
+
+def fit_running_tip(
+    rotations: FloatArray,
+    translations: FloatArray,
+    covariances: FloatArray,
+    tip_pen: FloatArray,
+    first: int,
+) -> RunningTip:
+    """Fit the tip to the first poses, to one more, and so on to all.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen in the order of capture, mm.
+    covariances : (N, 6, 6) array
+        Of each pose's (theta, dt) in rad and mm, see `lightpen.detection.pose`.
+    tip_pen : (3,) array
+        About where the tip is, to weight the poses by, mm.
+    first : int
+        Poses to begin with; they must fix the tip.
+    """
+    levers = skew(rotations @ tip_pen)
+    by_pose = np.concatenate([-levers, np.broadcast_to(np.eye(3), levers.shape)], -1)
+    spread = by_pose @ covariances @ np.swapaxes(by_pose, 1, 2)
+    by_points = np.concatenate(
+        [rotations, np.broadcast_to(-np.eye(3), rotations.shape)], axis=-1
+    )
+    weighted = np.swapaxes(by_points, 1, 2) @ np.linalg.inv(spread)
+    normal = np.cumsum(weighted @ by_points, axis=0)[first - 1 :]
+    right = np.cumsum(-weighted @ translations[..., None], axis=0)[first - 1 :]
+    inverse = np.linalg.inv(normal)
+    return RunningTip(first, (inverse @ right)[:, :3, 0], inverse[:, :3, :3])
+
 
 N_COEFFICIENTS = (4, 5, 8)  # of distortion that a camera may have; 4 a fisheye
 

@@ -8,12 +8,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_centers
-from lightpen.estimation.bundle.disc_diameter import (
-    MIN_READINGS,
-    SHARP_EDGE,
-    read_diameter,
-)
 from lightpen.estimation.bundle.linearised import BundleState
+from lightpen.estimation.bundle.priors import MIN_READINGS, SHARP_EDGE, read_diameter
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, judge

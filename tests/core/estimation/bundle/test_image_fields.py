@@ -10,7 +10,7 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.adjustment import adjust
-from lightpen.estimation.bundle.field_findings import FoundField, found_fields
+from lightpen.estimation.bundle.field_search import FoundField, found_fields
 from lightpen.estimation.bundle.image_fields import FieldName, ImageField, size_of
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of

@@ -8,7 +8,7 @@ import pytest
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.bundle.led_noise import find_center_noise, find_led_noise
+from lightpen.estimation.bundle.adjustment import find_center_noise, find_led_noise
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.formats.hashes import InputFile, Inputs

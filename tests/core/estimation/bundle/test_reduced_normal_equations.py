@@ -7,12 +7,12 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle.image_fields import image_fields
 from lightpen.estimation.bundle.linearised import BundleState, eliminate
-from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.reduced_normal_equations import (
+from lightpen.estimation.bundle.noise_correlation import (
     ImageRows,
     rows_of,
     summed_products,
 )
+from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
 from lightpen.model.assumptions import USUAL

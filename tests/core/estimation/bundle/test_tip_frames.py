@@ -9,12 +9,11 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.led_quality import LedQuality, tip_frames
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.bundle.seat_modes import seat_modes_of
-from lightpen.estimation.bundle.tip_frames import tip_frames
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.contact.led_quality import LedQuality
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.formats.observation_files import Centers

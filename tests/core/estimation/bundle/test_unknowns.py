@@ -12,8 +12,8 @@ from lightpen.estimation.bundle.seat_modes import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
-from lightpen.estimation.statistics.variance_components import Component
 from lightpen.estimation.uncertainty.budget import ContributionName, contributions_of
+from lightpen.estimation.variance_components import Component
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid

@@ -10,8 +10,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.reports.rejected_centres import rejected_centres
-from lightpen.estimation.reports.report_warnings import warnings_of
+from lightpen.estimation.reports.report_warnings import rejected_centres, warnings_of
 from lightpen.estimation.reports.verdict import (
     Change,
     Grade,
@@ -26,12 +25,12 @@ from lightpen.estimation.reports.verdict import (
     judge_unknown,
     repeats,
 )
-from lightpen.estimation.statistics.variance_components import Component
 from lightpen.estimation.uncertainty.budget import (
     ContributionName,
     SplitHalfCheck,
     UncertaintyContribution,
 )
+from lightpen.estimation.variance_components import Component
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera

@@ -7,8 +7,8 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.rigs.initial_extrinsics import InitialExtrinsics
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
+from lightpen.estimation.rigs.rig_poses import InitialExtrinsics
 from lightpen.messages import Message
 from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import rotation_from_vector

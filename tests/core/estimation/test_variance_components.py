@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.statistics.variance_components import (
+from lightpen.estimation.variance_components import (
     find_beside,
     find_component,
     find_jitter,

@@ -9,9 +9,9 @@ from tests.simulated_centers import drop_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.led_quality import LedQuality, measure_leds
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
-from lightpen.estimation.contact.led_quality import LedQuality, measure_leds
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of

@@ -5,7 +5,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.pivot.pose_conventions import (
+from lightpen.estimation.pivot_calibration import (
     is_likely_inverted,
     require_usual_reading,
 )

@@ -1,1 +1,0 @@
-"""Statistics of a fit: variance components, correlation, information, workers."""
