@@ -3,9 +3,8 @@
 Usage: python benchmarks/run.py [--update-docs] [SECTION ...]
 
 Figures on the image sets need LIGHTPEN_DATA. Nothing else should run meanwhile: the
-sections `measure`, `hostile`, `archive`, `soak` and `events` take from ten minutes to
-an hour, all others together some thirty minutes. Exit status 1 if a limit is
-missed.
+sections `hostile`, `archive`, `soak` and `events` take from ten minutes to an hour, all
+others together some thirty minutes. Exit status 1 if a limit is missed.
 """
 
 import argparse

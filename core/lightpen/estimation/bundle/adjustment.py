@@ -215,7 +215,7 @@ def _fit_consistent(
     every = image_fields(pixels, bundle.used, rig.cameras, state.rotations)
     among = fit(priors, fields=every, begin=bundle)
     both = zip(every, among.components.fields, strict=True)
-    fields = tuple(each for each, found in both if found.is_supported)
+    fields = tuple(each for each, found in both if each.is_supported(found))
     if fields:
         fit = partial(fit, fields=fields)
         bundle = fit(priors, begin=among)

@@ -101,7 +101,7 @@ def found_fields(bundle: Bundle) -> tuple[FoundField, ...]:
         bundle.components.fields,
         strict=True,
     ):
-        if component.is_supported and np.isfinite(component.gain):
+        if field.is_supported(component) and np.isfinite(component.gain):
             seen = bundle.used[:, field.camera]
             shifts = field.columns[:, field.camera] @ bundle.values[place]
             size = float(np.sqrt(np.mean(shifts[seen] ** 2)))

@@ -28,8 +28,6 @@ from lightpen.model.quantiles import chi_square_quantile
 DEGREE = 6  # of the polynomials of a lens field
 NODES = 10  # along a side, at which polynomials take the covariance of a field
 LENGTHS = np.array([0.1, 0.18, 0.32, 0.56])  # of the image's width
-# How often chance alone supports a field, at most; one too many hardly costs accuracy.
-CHANCE = 0.1
 NONE = 0.4  # prior probability that there is no field
 N_SCALES = 60  # standard deviations tried
 SMALLEST = 1e-3  # of the largest one
@@ -42,8 +40,19 @@ class FieldName(StrEnum):
     TILT = "camera tilt"
 
 
+# How often chance alone supports a field, at most. One lens field too many hardly costs
+# accuracy; a tilt too many may cost several standard uncertainties of the tip.
+CHANCE = {FieldName.LENS: 0.1, FieldName.TILT: 0.01}
 # Largest standard deviations, px, of a tilt by the sine of the lean.
 LARGEST = {FieldName.LENS: 0.08, FieldName.TILT: 0.3}
+
+
+class FieldComponent(NamedTuple):
+    """Size of a field by likelihood."""
+
+    sigma: float  # standard deviation of maximum likelihood, px
+    gain: float  # twice the log likelihood ratio to no field
+    covariance: FloatArray  # (k, k), of the unknowns, averaged over the likelihood
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +78,9 @@ class ImageField:
         """A square root of each shape, (k, k)."""
         return tuple(map(symmetric_root, self.shapes))
 
-
-class FieldComponent(NamedTuple):
-    """Size of a field by likelihood."""
-
-    sigma: float  # standard deviation of maximum likelihood, px
-    gain: float  # twice the log likelihood ratio to no field
-    covariance: FloatArray  # (k, k), of the unknowns, averaged over the likelihood
-
-    @property
-    def is_supported(self) -> bool:
-        """Whether chance alone makes such a gain less than once in ten."""
-        return self.gain > chi_square_quantile(1, CHANCE)
+    def is_supported(self, found: FieldComponent) -> bool:
+        """Return whether chance alone hardly makes such a gain."""
+        return found.gain > chi_square_quantile(1, CHANCE[self.name])
 
 
 def held(field: ImageField) -> FieldComponent:
