@@ -85,18 +85,6 @@ _AT_THE_SCREEN: dict[Code, str] = {
     Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Press Space to continue."),
     Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "{0} See the list in Review."),
 }
-_SHARES: dict[ContributionName, str] = {
-    ContributionName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
-    ContributionName.FORM: QT_TRANSLATE_NOOP("phrases", "form of ball, cone"),
-    ContributionName.SEAT: QT_TRANSLATE_NOOP("phrases", "seating"),
-    ContributionName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
-    ContributionName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),
-    ContributionName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "disc diameter"),
-    ContributionName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
-    ContributionName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
-    ContributionName.METHOD: QT_TRANSLATE_NOOP("phrases", "two-stage method"),
-    ContributionName.LENS: QT_TRANSLATE_NOOP("phrases", "lens"),
-}
 _LACKS: dict[MissingInput, str] = {
     MissingInput.STATION: QT_TRANSLATE_NOOP(
         "phrases", "Enter the name of the station."
@@ -265,9 +253,53 @@ def reason_text(reason: Reason) -> str:
     return worded(reason.words) if reason else ""
 
 
-def share_text(name: ContributionName) -> str:
-    """Return a part of the uncertainty in the user's language."""
-    return _translated(_SHARES[name])
+def share_text(name: ContributionName, *, is_whole: bool = False) -> str:
+    """Return a contribution to U in a word or two, as in plots, or as a whole."""
+    return _translated(_share_texts(name)[is_whole])
+
+
+def _share_texts(name: ContributionName) -> tuple[str, str]:
+    match name:
+        case ContributionName.NOISE:
+            return QT_TRANSLATE_NOOP("phrases", "noise"), QT_TRANSLATE_NOOP(
+                "phrases", "Image noise"
+            )
+        case ContributionName.FORM:
+            return QT_TRANSLATE_NOOP(
+                "phrases", "form of ball, cone"
+            ), QT_TRANSLATE_NOOP("phrases", "Form error of ball and cone")
+        case ContributionName.SEAT:
+            return QT_TRANSLATE_NOOP("phrases", "seating"), QT_TRANSLATE_NOOP(
+                "phrases", "Seating of the tip in the cone"
+            )
+        case ContributionName.DRIFT:
+            return QT_TRANSLATE_NOOP("phrases", "drift"), QT_TRANSLATE_NOOP(
+                "phrases", "Drift of cone and camera"
+            )
+        case ContributionName.LEDS:
+            return QT_TRANSLATE_NOOP("phrases", "LEDs"), QT_TRANSLATE_NOOP(
+                "phrases", "LED positions of the LED file"
+            )
+        case ContributionName.DIAMETER:
+            return QT_TRANSLATE_NOOP("phrases", "disc diameter"), QT_TRANSLATE_NOOP(
+                "phrases", "Diameter of the LED discs"
+            )
+        case ContributionName.CAMERA:
+            return QT_TRANSLATE_NOOP("phrases", "camera"), QT_TRANSLATE_NOOP(
+                "phrases", "Intrinsics of the camera"
+            )
+        case ContributionName.EXTRINSICS:
+            return QT_TRANSLATE_NOOP("phrases", "rig"), QT_TRANSLATE_NOOP(
+                "phrases", "Extrinsics of the cameras"
+            )
+        case ContributionName.METHOD:
+            return QT_TRANSLATE_NOOP("phrases", "two-stage method"), QT_TRANSLATE_NOOP(
+                "phrases", "Two-stage method, difference from the joint fit"
+            )
+        case ContributionName.LENS:
+            return QT_TRANSLATE_NOOP("phrases", "lens"), QT_TRANSLATE_NOOP(
+                "phrases", "Lens and LED centres"
+            )
 
 
 def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:

@@ -9,7 +9,6 @@ from PySide6.QtGui import QPainter
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord, Pair
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.laboratory import Laboratory
 from lightpen.model.origin import Origin
@@ -19,7 +18,7 @@ from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
 from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.results.results import TipChange
-from lightpen_app.look.phrases import grade_text, origin_text, reason_text
+from lightpen_app.look.phrases import grade_text, origin_text, reason_text, share_text
 from lightpen_app.look.quantities import (
     AXES,
     MAX_DECIMALS,
@@ -270,7 +269,7 @@ def _budget_rows(calibration: CalibrationRecord) -> list[tuple[str, ...]]:
     decimals = _u_and_decimals(calibration)[1]
     return [
         (
-            _share_name(share.name),
+            share_text(share.name, is_whole=True),
             *(
                 number_text(MICROMETRES * value, decimals)
                 for value in (
@@ -288,23 +287,6 @@ def _u_and_decimals(calibration: CalibrationRecord) -> tuple[FloatArray, int]:
     """Return U (3,), micrometres, and the decimals of the budget."""
     u = MICROMETRES * np.array(calibration.expanded_uncertainty_mm)
     return u, 1 + max(map(decimals_for, u.tolist()))
-
-
-def _share_name(name: ContributionName) -> str:
-    return {
-        ContributionName.NOISE: translate("paper", "Image noise"),
-        ContributionName.SEAT: translate("paper", "Seating of the tip in the cone"),
-        ContributionName.FORM: translate("paper", "Form error of ball and cone"),
-        ContributionName.DRIFT: translate("paper", "Drift of cone and camera"),
-        ContributionName.LEDS: translate("paper", "LED positions of the LED file"),
-        ContributionName.DIAMETER: translate("paper", "Diameter of the LED discs"),
-        ContributionName.CAMERA: translate("paper", "Intrinsics of the camera"),
-        ContributionName.EXTRINSICS: translate("paper", "Extrinsics of the cameras"),
-        ContributionName.METHOD: translate(
-            "paper", "Two-stage method, difference from the joint fit"
-        ),
-        ContributionName.LENS: translate("paper", "Lens and LED centres"),
-    }[name]
 
 
 def _image_texts(

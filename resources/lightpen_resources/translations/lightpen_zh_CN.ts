@@ -9892,30 +9892,6 @@ needed</source>
         <translation>未测量</translation>
     </message>
     <message>
-        <source>Image noise</source>
-        <translation>图像噪声</translation>
-    </message>
-    <message>
-        <source>Lens and LED centres</source>
-        <translation>镜头与 LED 中心</translation>
-    </message>
-    <message>
-        <source>Seating of the tip in the cone</source>
-        <translation>测头在锥孔中的就位</translation>
-    </message>
-    <message>
-        <source>Form error of ball and cone</source>
-        <translation>测球和锥孔的形状误差</translation>
-    </message>
-    <message>
-        <source>LED positions of the LED file</source>
-        <translation>LED 文件中的 LED 位置</translation>
-    </message>
-    <message>
-        <source>Extrinsics of the cameras</source>
-        <translation>相机的外参</translation>
-    </message>
-    <message>
         <source>assumed</source>
         <translation>假定</translation>
     </message>
@@ -9946,22 +9922,6 @@ needed</source>
     <message>
         <source>Name, date, signature</source>
         <translation>姓名、日期、签字</translation>
-    </message>
-    <message>
-        <source>Drift of cone and camera</source>
-        <translation>锥孔与相机的漂移</translation>
-    </message>
-    <message>
-        <source>Diameter of the LED discs</source>
-        <translation>LED 发光面直径</translation>
-    </message>
-    <message>
-        <source>Intrinsics of the camera</source>
-        <translation>相机内参</translation>
-    </message>
-    <message>
-        <source>Two-stage method, difference from the joint fit</source>
-        <translation>两步法，与联合拟合之差</translation>
     </message>
     <message>
         <source>joint adjustment of all images</source>
@@ -10421,6 +10381,46 @@ needed</source>
     <message>
         <source>towards you and right</source>
         <translation>右后方</translation>
+    </message>
+    <message>
+        <source>Image noise</source>
+        <translation>图像噪声</translation>
+    </message>
+    <message>
+        <source>Form error of ball and cone</source>
+        <translation>测球和锥孔的形状误差</translation>
+    </message>
+    <message>
+        <source>Seating of the tip in the cone</source>
+        <translation>测头在锥孔中的就位</translation>
+    </message>
+    <message>
+        <source>Drift of cone and camera</source>
+        <translation>锥孔与相机的漂移</translation>
+    </message>
+    <message>
+        <source>LED positions of the LED file</source>
+        <translation>LED 文件中的 LED 位置</translation>
+    </message>
+    <message>
+        <source>Diameter of the LED discs</source>
+        <translation>LED 发光面直径</translation>
+    </message>
+    <message>
+        <source>Intrinsics of the camera</source>
+        <translation>相机内参</translation>
+    </message>
+    <message>
+        <source>Extrinsics of the cameras</source>
+        <translation>相机的外参</translation>
+    </message>
+    <message>
+        <source>Two-stage method, difference from the joint fit</source>
+        <translation>两步法，与联合拟合之差</translation>
+    </message>
+    <message>
+        <source>Lens and LED centres</source>
+        <translation>镜头与 LED 中心</translation>
     </message>
     <message>
         <source>ACCEPTED</source>
