@@ -347,8 +347,8 @@ def _started(
 def _begun(unknowns: Unknowns, begin: Bundle, pixels: FloatArray) -> _Linearised:
     """Linearise the images about another solution."""
     values, at, of = np.zeros(unknowns.number), unknowns.layout, begin.layout
-    for kind in ("extrinsics", "diameter", "scale", "leds", "between"):
-        values[getattr(at, kind)] = begin.values[getattr(of, kind)]
+    for place, known in zip(at.of_files, of.of_files, strict=True):
+        values[place] = begin.values[known]
     for place, known in zip(at.cameras, of.cameras, strict=True):
         values[place] = begin.values[known]
     views = unknowns.views_at(begin.state, pixels)

@@ -75,6 +75,12 @@ class ParameterLayout(NamedTuple):
     between: slice
 
     @property
+    def of_files(self) -> tuple[slice, ...]:
+        """Indices of what the same files state in any fit, the cameras apart."""
+        own = {"tip", "cone", "cameras", "fields", "seat", "drift"}
+        return tuple(getattr(self, name) for name in self._fields if name not in own)
+
+    @property
     def whole_seat(self) -> slice:
         """Indices of all seat modes."""
         return slice(self.seat[0].start, self.seat[-1].stop)
