@@ -40,7 +40,7 @@ from lightpen_extensions.measure.verification.tasks.task import (
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 CAMERAS = 1, 2
-N_PARTS, N_CHUNKS = 100, 50
+N_PARTS, N_CHUNKS = 400, 20
 BALL = 10.0  # mm
 SHAPE = 0.01  # mm, standard deviation of a part's surface from its features
 ASKEW = np.radians(10.0)  # rms angle of an approach to the normal, about each axis
