@@ -198,7 +198,7 @@ def _set(of: Named, part: str | int, words: str) -> None:
 
 def anew(value: V) -> V | str:
     """Return a text in the present language; any other value as it is."""
-    return value.again() if isinstance(value, Text) else value
+    return Text(value.again) if isinstance(value, Text) else value
 
 
 def _contexts(kind: type) -> tuple[str, ...]:

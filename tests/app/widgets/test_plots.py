@@ -15,6 +15,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import ContributionName
 from lightpen_app.look.arrows import arrow_scale
 from lightpen_app.look.budget_figure import budget_figure
+from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
 from lightpen_app.steps.review.budget_plot import BudgetPlot
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
@@ -25,6 +26,7 @@ from lightpen_app.steps.review.residual_plots import (
     MisfitPlot,
 )
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.steps.swing.plots_panel import SwingPlots
 from lightpen_app.widgets.figure import Axes, Figure
 from lightpen_app.widgets.plot_canvas import Canvas
 from lightpen_app.widgets.plots import Curve, Plot, TracePlot
@@ -422,3 +424,17 @@ def test_an_axis_within_a_decade_has_more_than_one_number(qtbot: QtBot) -> None:
         _, _, words = axis.generateDrawSpecs(painter)
 
     assert len(words) > 1, words
+
+
+def test_the_words_of_a_plot_follow_every_change_of_language(
+    qapp: QApplication, qtbot: QtBot
+) -> None:
+    plots = SwingPlots()
+    qtbot.addWidget(plots)
+    switch, plot = LanguageSwitch(qapp), plots.plots()[0]
+    english = plot.accessibleName()
+    for language in ("zh_CN", "en", "zh_CN", "en"):
+        switch.set_language(language)
+        qapp.processEvents()
+        assert (plot.accessibleName() == english) is (language == "en")
+    switch.remove()
