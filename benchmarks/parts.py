@@ -31,12 +31,9 @@ from lightpen_extensions.measure.measuring.plan import Plan as MeasuringPlan
 from lightpen_extensions.measure.measuring.starts import frame_about
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.probed_point import measure_touches
-from lightpen_extensions.measure.verification.tasks.task import (
-    Conditions,
-    VerificationChoices,
-)
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.probed_point import measure_touches
+from lightpen_extensions.measure.tasks.task import Conditions, VerificationChoices
 from lightpen_extensions.simulator.swings import PAPER_CONE
 
 CAMERAS = 1, 2

@@ -17,7 +17,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen_extensions.measure.verification.tasks.probed_point import (
+from lightpen_extensions.measure.tasks.probed_point import (
     SEATING,
     ProbingFrame,
     StillFrames,

@@ -21,7 +21,7 @@ from lightpen.comparisons.pen_health import examine_pen
 from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import VerificationLimits
-from lightpen_extensions.measure.verification.tasks.drift import Drift
+from lightpen_extensions.measure.tasks.drift import Drift
 from lightpen_extensions.simulator.swings import paper_camera
 
 N_STATIONS = 300

@@ -14,14 +14,14 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen_extensions.measure.measuring.artefacts import artefact_plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.verification.session.session import (
+from lightpen_extensions.measure.session.session import (
     SessionSetup,
     SessionState,
     advance_session,
 )
-from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
+from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses

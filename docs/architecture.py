@@ -24,7 +24,7 @@ SOURCES = {
 MEASURED = (
     "lightpen",
     "lightpen.estimation",
-    "lightpen_extensions.measure.verification",
+    "lightpen_extensions.measure",
     "lightpen.record",
     "lightpen.swing",
     "lightpen.archive",

@@ -68,17 +68,14 @@ from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.session.session import (
+from lightpen_extensions.measure.session.session import (
     SessionSetup,
     SessionState,
     advance_session,
 )
-from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.task import (
-    HandGoal,
-    VerificationChoices,
-)
+from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.follower import GuidedOperator
 from lightpen_extensions.simulator.hand import Operator

@@ -27,19 +27,19 @@ from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen_extensions.measure.verification.tasks.artefact import measure_artefacts
-from lightpen_extensions.measure.verification.tasks.drift import measure_drift
-from lightpen_extensions.measure.verification.tasks.fixed_point import (
+from lightpen_extensions.measure.tasks.artefact import measure_artefacts
+from lightpen_extensions.measure.tasks.drift import measure_drift
+from lightpen_extensions.measure.tasks.fixed_point import (
     FIXED_POINT,
     measure_fixed_point,
 )
-from lightpen_extensions.measure.verification.tasks.probed_point import (
+from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
     ProbingFrame,
     StillFrames,
     measure_touches,
 )
-from lightpen_extensions.measure.verification.tasks.task import (
+from lightpen_extensions.measure.tasks.task import (
     Conditions,
     Found,
     VerificationChoices,

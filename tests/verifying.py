@@ -23,17 +23,17 @@ from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.measuring.artefacts import artefact_plan
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
-from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
-from lightpen_extensions.measure.verification.runner import VerificationRunner
-from lightpen_extensions.measure.verification.session.session import SessionState
-from lightpen_extensions.measure.verification.session.status import (
+from lightpen_extensions.measure.probing.probing import ProbingPhase
+from lightpen_extensions.measure.runner import VerificationRunner
+from lightpen_extensions.measure.session.session import SessionState
+from lightpen_extensions.measure.session.status import (
     ReadingState,
     SessionEventKind,
     VerificationStatus,
 )
-from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.task import (
+from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.task import (
     FoundT,
     VerificationChoices,
     VerificationTask,

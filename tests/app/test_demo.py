@@ -21,7 +21,7 @@ from lightpen_app.work.settings import Settings
 from lightpen_app.work.stations import Station
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.simulator.scenes import Scene
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
 from lightpen_extensions.measure.measuring.plan_checks import write_plan
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_program.extensions import main
 
 if TYPE_CHECKING:

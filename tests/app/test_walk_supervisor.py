@@ -11,7 +11,7 @@ from lightpen.record.swings.names import Names
 from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
-from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
+from lightpen_extensions.measure.tasks.task import VerificationChoices
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -21,9 +21,9 @@ from lightpen.swing.image_sources import SourceChoice
 from lightpen_app.widgets.fitted_window import FRAME
 from lightpen_app.work.settings import Settings, stored_group
 from lightpen_app.work.stations import Station, StoredCamera
-from lightpen_extensions.measure.verification.tasks.fixed_point import FIXED_POINT
-from lightpen_extensions.measure.verification.tasks.registry import TASKS
-from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
+from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
+from lightpen_extensions.measure.tasks.registry import TASKS
+from lightpen_extensions.measure.tasks.task import VerificationChoices
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

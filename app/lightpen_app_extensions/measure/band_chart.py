@@ -13,7 +13,7 @@ from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import draw_sign
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
-from lightpen_extensions.measure.verification.tasks.task import Band
+from lightpen_extensions.measure.tasks.task import Band
 
 LEAST_ROW, TALL_ROW, TALLEST_ROW = 3 * GRID, 5 * GRID, 7 * GRID  # px
 NAME_SHARE, BAR_SHARE = 0.3, 0.33  # of the width; the rest is for the value

@@ -10,14 +10,8 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.translated import Translated
-from lightpen_extensions.measure.verification.session.session import (
-    SessionSetup,
-    SessionState,
-)
-from lightpen_extensions.measure.verification.tasks.task import (
-    ResultTable,
-    points_table,
-)
+from lightpen_extensions.measure.session.session import SessionSetup, SessionState
+from lightpen_extensions.measure.tasks.task import ResultTable, points_table
 
 MOST_TABLES = 3  # of a task
 

@@ -15,11 +15,8 @@ from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app_extensions.measure.band_chart import BandChart
 from lightpen_app_extensions.measure.part_view import PartValue, PartView
-from lightpen_extensions.measure.verification.session.session import (
-    SessionSetup,
-    SessionState,
-)
-from lightpen_extensions.measure.verification.tasks.task import Band
+from lightpen_extensions.measure.session.session import SessionSetup, SessionState
+from lightpen_extensions.measure.tasks.task import Band
 
 PICTURE_HEIGHT = 18 * GRID  # px, at least
 

@@ -29,18 +29,18 @@ from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.view_state import VerifyView
 from lightpen_extensions.measure.measuring.report import DECISIONS
 from lightpen_extensions.measure.measuring.surfaces import NAMES
-from lightpen_extensions.measure.verification.session.session import (
+from lightpen_extensions.measure.session.session import (
     SessionSetup,
     SessionState,
     bands_so_far,
 )
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import (
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.part_course import (
     FeatureSoFar,
     feature_so_far,
     planned_at,
 )
-from lightpen_extensions.measure.verification.tasks.task import Band
+from lightpen_extensions.measure.tasks.task import Band
 
 FEW = 4  # values that leave room for the picture
 NEAR = 10.0  # mm, from which the deviation of the tip at present is shown

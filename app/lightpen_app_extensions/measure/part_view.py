@@ -14,15 +14,9 @@ from lightpen_app.look.theme import GRID, colors_of
 from lightpen_app.look.tooltips import set_tooltip
 from lightpen_app.widgets.translated import Translated
 from lightpen_extensions.measure.measuring.drawing import of_centres, outline_of
-from lightpen_extensions.measure.verification.session.session import (
-    SessionSetup,
-    SessionState,
-)
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import (
-    feature_so_far,
-    fit_of,
-)
+from lightpen_extensions.measure.session.session import SessionSetup, SessionState
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.part_course import feature_so_far, fit_of
 
 MARGIN = 0.1  # of the sides
 DOT, TIP, GOAL = 3.0, 6.0, 9.0  # px, radii

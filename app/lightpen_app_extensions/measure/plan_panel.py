@@ -31,9 +31,9 @@ from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature, fre
 from lightpen_extensions.measure.measuring.plan_checks import read_plan, write_plan
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
 from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.verification.session.status import VerificationStatus
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import planned_at
+from lightpen_extensions.measure.session.status import VerificationStatus
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.part_course import planned_at
 
 SUFFIXES = "*.yaml *.yml"
 BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least

@@ -31,8 +31,8 @@ from lightpen_app_extensions.measure.view_state import (
     is_held,
     lamps_message,
 )
-from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
-from lightpen_extensions.measure.verification.session.session import (
+from lightpen_extensions.measure.probing.probing import ProbingPhase
+from lightpen_extensions.measure.session.session import (
     BROKEN_OFF,
     SessionSetup,
     SessionState,
@@ -41,12 +41,9 @@ from lightpen_extensions.measure.verification.session.session import (
     instruction,
     is_at_rest,
 )
-from lightpen_extensions.measure.verification.session.status import (
-    ReadingState,
-    VerificationStatus,
-)
-from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
-from lightpen_extensions.measure.verification.tasks.task import Band, rule_of
+from lightpen_extensions.measure.session.status import ReadingState, VerificationStatus
+from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask
+from lightpen_extensions.measure.tasks.task import Band, rule_of
 
 
 @dataclass(frozen=True, eq=False)

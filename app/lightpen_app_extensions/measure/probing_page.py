@@ -23,7 +23,7 @@ from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.simulator_controls import ProbingSimulatorControls
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_app_extensions.measure.view_state import VerifyView
-from lightpen_extensions.measure.verification.session.status import SessionEventKind
+from lightpen_extensions.measure.session.status import SessionEventKind
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped
 

@@ -25,16 +25,14 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.measure.plate import plate_plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.verification.storage.session_files import (
-    abandon_interrupted,
-)
-from lightpen_extensions.measure.verification.storage.session_record import (
+from lightpen_extensions.measure.storage.session_files import abandon_interrupted
+from lightpen_extensions.measure.storage.session_record import (
     InterruptedVerification,
     find_interrupted,
 )
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.registry import ALL_TASKS, task_of
-from lightpen_extensions.measure.verification.tasks.task import VerificationChoices
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.registry import ALL_TASKS, task_of
+from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_extensions.simulator.hand import Operator
 
 KEY = "measure"

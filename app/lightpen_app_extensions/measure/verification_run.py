@@ -11,8 +11,8 @@ from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.work.notifications import Notifications
 from lightpen_app.work.run_view import RunView
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.verification.runner import VerificationRunner
-from lightpen_extensions.measure.verification.session.status import (
+from lightpen_extensions.measure.runner import VerificationRunner
+from lightpen_extensions.measure.session.status import (
     SessionEventKind,
     VerificationStatus,
 )

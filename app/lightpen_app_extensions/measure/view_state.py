@@ -9,13 +9,10 @@ from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.sign_label import StatusMessage
 from lightpen_app_extensions.measure.check_list import CheckRow
-from lightpen_extensions.measure.verification.probing.probing import (
-    SETTLING,
-    ProbingPhase,
-)
-from lightpen_extensions.measure.verification.session.session import SessionState
-from lightpen_extensions.measure.verification.session.status import VerificationStatus
-from lightpen_extensions.measure.verification.tasks.registry import AnyTask
+from lightpen_extensions.measure.probing.probing import SETTLING, ProbingPhase
+from lightpen_extensions.measure.session.session import SessionState
+from lightpen_extensions.measure.session.status import VerificationStatus
+from lightpen_extensions.measure.tasks.registry import AnyTask
 
 
 @dataclass(frozen=True)

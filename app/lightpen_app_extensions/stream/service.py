@@ -14,7 +14,7 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_app_extensions.stream.stream_dialog import StreamDialog, StreamState
 from lightpen_app_extensions.stream.streaming import Streaming
-from lightpen_extensions.measure.verification.tasks.part import PART
+from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.stream.points import points_of
 from lightpen_extensions.stream.server import StreamPlace
 

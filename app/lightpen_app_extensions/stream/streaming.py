@@ -9,9 +9,7 @@ from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.job import Job, LatestJob, Report
-from lightpen_extensions.measure.verification.probing.current_tip import (
-    read_tip_in_force,
-)
+from lightpen_extensions.measure.probing.current_tip import read_tip_in_force
 from lightpen_extensions.stream.messages import StreamedTip, tip_metadata
 from lightpen_extensions.stream.server import PoseStream, StreamPlace, StreamStatus
 

@@ -68,8 +68,8 @@ from lightpen_extensions.discover.tracks import (
     follow,
     without_lamps,
 )
-from lightpen_extensions.measure.verification.tasks.artefact import measure_artefacts
-from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.measure.tasks.artefact import measure_artefacts
+from lightpen_extensions.measure.tasks.task import Conditions
 
 NOT_SETTLED = (
     "bundle.not-settled",

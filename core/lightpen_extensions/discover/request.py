@@ -10,7 +10,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen_extensions.discover.scale import MeasuredLength
 from lightpen_extensions.discover.sightings import Sightings
-from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
+from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 
 
 @dataclass(frozen=True, eq=False)

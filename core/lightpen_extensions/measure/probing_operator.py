@@ -5,17 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen_extensions.measure.verification.probing.probing import ProbingPhase
-from lightpen_extensions.measure.verification.session.session import (
+from lightpen_extensions.measure.probing.probing import ProbingPhase
+from lightpen_extensions.measure.session.session import (
     SessionSetup,
     SessionState,
     is_at_rest,
 )
-from lightpen_extensions.measure.verification.tasks.registry import AnyTask
-from lightpen_extensions.measure.verification.tasks.task import (
-    HandGoal,
-    VerificationChoices,
-)
+from lightpen_extensions.measure.tasks.registry import AnyTask
+from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
 from lightpen_extensions.simulator.hand import HandActivity, Operator
 
 

@@ -37,11 +37,11 @@ from lightpen.record.calibrations.export_status import with_status
 from lightpen.record.calibrations.tip_bending import bending_of
 from lightpen.record.swings.names import Names
 from lightpen.record.swings.recordings import FilesBeside, files_beside
-from lightpen_extensions.measure.verification.probing.image_locations import (
+from lightpen_extensions.measure.probing.image_locations import (
     touch_place,
     viewers_of_camera,
 )
-from lightpen_extensions.measure.verification.probing.sources import instrument_of
+from lightpen_extensions.measure.probing.sources import instrument_of
 from lightpen_extensions.stream.messages import StreamedTip, tip_metadata
 from lightpen_extensions.stream.server import (
     LOOPBACK,

@@ -20,7 +20,7 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.record.calibrations.calibrations import CalibrationFile
 from lightpen.record.calibrations.export_status import status_of
 from lightpen.record.swings.names import Names
-from lightpen_extensions.measure.verification.tasks.probed_point import (
+from lightpen_extensions.measure.tasks.probed_point import (
     ProbingFrame,
     StillFrames,
     measure_touches,

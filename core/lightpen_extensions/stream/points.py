@@ -3,12 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightpen_extensions.measure.verification.session.session import (
-    SessionSetup,
-    SessionState,
-)
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.part_course import planned_at
+from lightpen_extensions.measure.session.session import SessionSetup, SessionState
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.part_course import planned_at
 
 POINTS = "Points"
 

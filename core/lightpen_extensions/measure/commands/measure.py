@@ -28,18 +28,11 @@ from lightpen_extensions.measure.commands.touched import (
 from lightpen_extensions.measure.measuring.exports import EXPORTS
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan
-from lightpen_extensions.measure.verification.probing.drift_reference import judged_with
-from lightpen_extensions.measure.verification.reports.summaries import (
-    found_text,
-    touches_text,
-)
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.probed_point import point_entries
-from lightpen_extensions.measure.verification.tasks.task import (
-    Runs,
-    VerificationChoices,
-    rule_of,
-)
+from lightpen_extensions.measure.probing.drift_reference import judged_with
+from lightpen_extensions.measure.reports.summaries import found_text, touches_text
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.probed_point import point_entries
+from lightpen_extensions.measure.tasks.task import Runs, VerificationChoices, rule_of
 
 POINTS = "points"
 

@@ -34,13 +34,13 @@ from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
 from lightpen.record.calibrations.tip_bending import bending_of
 from lightpen.record.folder.verifications import conditions_entries
-from lightpen_extensions.measure.verification.probing.current_tip import cone_before
-from lightpen_extensions.measure.verification.probing.drift_reference import (
+from lightpen_extensions.measure.probing.current_tip import cone_before
+from lightpen_extensions.measure.probing.drift_reference import (
     LampDrift,
     LampObservations,
     lamp_drift_entries,
 )
-from lightpen_extensions.measure.verification.probing.image_locations import (
+from lightpen_extensions.measure.probing.image_locations import (
     ImageLocation,
     PenCameras,
     RecordedConditions,
@@ -48,31 +48,31 @@ from lightpen_extensions.measure.verification.probing.image_locations import (
     read_viewers,
     touch_place,
 )
-from lightpen_extensions.measure.verification.probing.probing import (
+from lightpen_extensions.measure.probing.probing import (
     FAST,
     ONE_IMAGE,
     PRECISE,
     SETTLING,
     ProbingRules,
 )
-from lightpen_extensions.measure.verification.probing.sources import (
+from lightpen_extensions.measure.probing.sources import (
     ProbingRun,
     instrument_of,
     lamp_drift_of,
     observe_place,
     touches_of,
 )
-from lightpen_extensions.measure.verification.storage.session_files import (
+from lightpen_extensions.measure.storage.session_files import (
     camera_serials,
     viewer_entries,
 )
-from lightpen_extensions.measure.verification.tasks.probed_point import (
+from lightpen_extensions.measure.tasks.probed_point import (
     NO_DRIFT,
     ProbedPoint,
     RejectedFrame,
     rejected_entries,
 )
-from lightpen_extensions.measure.verification.tasks.task import Conditions
+from lightpen_extensions.measure.tasks.task import Conditions
 
 
 def add_touch_inputs(parser: argparse.ArgumentParser, tip_help: str) -> None:

@@ -27,15 +27,12 @@ from lightpen_extensions.measure.commands.touched import (
     add_touch_inputs,
     given_runs,
 )
-from lightpen_extensions.measure.verification.probing.drift_reference import judged_with
-from lightpen_extensions.measure.verification.reports.summaries import found_text
-from lightpen_extensions.measure.verification.tasks.artefact import (
-    measure_artefacts,
-    size_table,
-)
-from lightpen_extensions.measure.verification.tasks.part import PART
-from lightpen_extensions.measure.verification.tasks.registry import TASKS, AnyTask
-from lightpen_extensions.measure.verification.tasks.task import (
+from lightpen_extensions.measure.probing.drift_reference import judged_with
+from lightpen_extensions.measure.reports.summaries import found_text
+from lightpen_extensions.measure.tasks.artefact import measure_artefacts, size_table
+from lightpen_extensions.measure.tasks.part import PART
+from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask
+from lightpen_extensions.measure.tasks.task import (
     Found,
     ResultTable,
     VerificationChoices,

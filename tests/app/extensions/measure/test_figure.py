@@ -12,7 +12,7 @@ from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app_extensions.measure.band_chart import BandChart, value_text
 from lightpen_app_extensions.measure.check_list import CheckList, CheckRow
 from lightpen_app_extensions.measure.figure import dial_of
-from lightpen_extensions.measure.verification.tasks.task import Band
+from lightpen_extensions.measure.tasks.task import Band
 
 
 def test_a_field_of_the_dial_is_full_that_was_touched_in() -> None:

@@ -14,9 +14,9 @@ from lightpen_extensions.discover.discover import discover, with_touched_length
 from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.numbering import number_by_sketch
 from lightpen_extensions.discover.request import TouchedLength
-from lightpen_extensions.measure.verification.probing.probing import ONE_IMAGE
-from lightpen_extensions.measure.verification.probing.sources import touches_of
-from lightpen_extensions.measure.verification.tasks.probed_point import ProbedPoint
+from lightpen_extensions.measure.probing.probing import ONE_IMAGE
+from lightpen_extensions.measure.probing.sources import touches_of
+from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 from lightpen_extensions.simulator.swings import swing_from_postures
 
 N = 60  # images

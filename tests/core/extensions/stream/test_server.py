@@ -26,7 +26,7 @@ from lightpen.model.origin import Origin
 from lightpen.model.rig import rig_of
 from lightpen.record.calibrations.calibrations import read_calibration
 from lightpen.record.swings.names import Names
-from lightpen_extensions.measure.verification.tasks.probed_point import (
+from lightpen_extensions.measure.tasks.probed_point import (
     ProbingFrame,
     StillFrames,
     measure_touches,

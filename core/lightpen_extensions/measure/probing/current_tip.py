@@ -1,0 +1,126 @@
+"""The current tip of a station, and the instrument that it makes with its files."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.errors import UsageError
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.hashes import InputFile, hashed
+from lightpen.messages import printable
+from lightpen.model.bending import ASSUMED_BENDING, Bending
+from lightpen.model.origin import Origin
+from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations.tip_bending import bending_of
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.record.swings.names import Names
+from lightpen.swing.preparation import Preparation
+from lightpen_extensions.measure.probing.image_locations import (
+    PenCameras,
+    viewers_of_camera,
+    viewers_of_rig,
+)
+from lightpen_extensions.measure.probing.sources import instrument_of
+
+
+@dataclass(frozen=True, eq=False)
+class CurrentTip:
+    """A tip that was accepted, with the files that it is verified by."""
+
+    names: Names
+    origin: Origin
+    calibration: CalibrationFile
+    instrument: Instrument
+    nominal_tip: FloatArray | None  # (3,), mm
+    cone_cam: FloatArray | None  # (3,), mm; None before another camera
+    masks: tuple[FloatArray, ...]  # (M, 3), stray light: x, y, radius, px
+    viewers: PenCameras
+    tip_file: InputFile
+    pen_file: InputFile
+    temperature_c: float | None = None  # of the pen on that day
+    humidity_percent: float | None = None  # of the room on that day
+    bending: Bending = ASSUMED_BENDING
+
+    @property
+    def region(self) -> RegionOfInterest:
+        """Target of the detection."""
+        pen, rig = self.instrument.pen, self.instrument.rig
+        first, *others = (
+            RegionOfInterest(camera, pen, mask)
+            for camera, mask in zip(rig.cameras, self.masks, strict=True)
+        )
+        return replace(first, others=tuple(others))
+
+    def is_like(self, other: "CurrentTip") -> bool:
+        """Return whether points probed with the other tip are valid for this one."""
+        return (
+            self.names == other.names
+            and self.origin is other.origin
+            and self.tip_file == other.tip_file
+            and self.viewers.hashes == other.viewers.hashes
+            and self.pen_file == other.pen_file
+            and all(map(np.array_equal, self.masks, other.masks))
+        )
+
+
+def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> CurrentTip:
+    """Return the current tip of the pen and tip that are chosen, with both files.
+
+    Raises `LightpenError` if there is none, its result was changed, or it is of another
+    LED file.
+    """
+    names, origin = preparation.names, preparation.origin
+    pen_file = preparation.pen_file
+    viewers = _viewers(preparation)
+    if viewers is None or pen_file is None:
+        raise ValueError("Cameras and `pen_file` must be chosen.")
+    file = archive.file_in_force(
+        names.pen, names.tip, is_simulated=origin is Origin.SIMULATED
+    )
+    if file is None:
+        raise UsageError(
+            "verification.no-tip", tip=printable(names.tip), pen=printable(names.pen)
+        )
+    calibration = read_calibration(file)
+    today = preparation.assumptions_today
+    bending = bending_of(calibration)
+    instrument = instrument_of(
+        *(calibration, viewers, pen_file.pen, pen_file.path),
+        *(today.temperature_c, bending),
+    )
+    nominal_tip = preparation.nominal_tip
+    for known in (pen_file.pen.nominal_tip, calibration.nominal_tip):
+        nominal_tip = known if nominal_tip is None else nominal_tip
+    return CurrentTip(
+        names=names,
+        origin=origin,
+        calibration=calibration,
+        instrument=instrument,
+        nominal_tip=nominal_tip,
+        cone_cam=cone_before(calibration, viewers),
+        masks=tuple(map(preparation.mask_of, range(viewers.rig.n_cameras))),
+        viewers=viewers,
+        tip_file=hashed(file),
+        pen_file=hashed(pen_file.path),
+        temperature_c=today.temperature_c,
+        humidity_percent=today.humidity_percent,
+        bending=bending,
+    )
+
+
+def cone_before(calibration: CalibrationFile, viewers: PenCameras) -> FloatArray | None:
+    """Return the cone of the calibration, (3,), mm; None for other cameras."""
+    is_same = viewers.hashes == calibration.camera_hashes
+    return calibration.cone_cam if is_same else None
+
+
+def _viewers(preparation: Preparation) -> PenCameras | None:
+    """Return the cameras that are chosen."""
+    rig_file, camera_file = preparation.rig_file, preparation.camera_file
+    if preparation.second is not None:
+        return None if rig_file is None else viewers_of_rig(rig_file)
+    if camera_file is None:
+        return None
+    return viewers_of_camera(camera_file.camera, camera_file.path)

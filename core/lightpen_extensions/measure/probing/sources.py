@@ -1,0 +1,312 @@
+"""From files to touches: the calibration that is verified, and the images of a run."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import Observations, observe_images
+from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
+from lightpen.detection.reasons import counted
+from lightpen.detection.rig_observations import observe_rig_images
+from lightpen.detection.rig_pose import see_together
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
+from lightpen.estimation.reports.calibration_record import InstrumentRecord
+from lightpen.estimation.uncertainty.instrument import (
+    Instrument,
+    PenScale,
+    instrument_of_files,
+    with_rig,
+)
+from lightpen.estimation.uncertainty.use import in_use
+from lightpen.formats.files import sha256
+from lightpen.formats.pairing import pair_images
+from lightpen.messages import Message, message, printable
+from lightpen.model.bending import ASSUMED_BENDING, Bending
+from lightpen.model.camera import Camera
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen_extensions.measure.probing.drift_reference import (
+    LampDrift,
+    LampObservations,
+    lamps_in,
+)
+from lightpen_extensions.measure.probing.image_locations import (
+    ImageLocation,
+    PenCameras,
+    RecordedTouch,
+)
+from lightpen_extensions.measure.probing.probing import (
+    ProbingRules,
+    take_all,
+    touch_frame,
+)
+from lightpen_extensions.measure.tasks.probed_point import (
+    ProbedPoint,
+    RejectedFrame,
+    StillFrames,
+    measure_touches,
+)
+
+MAX_RMS = 1.0  # px; LED errors of 0.3 mm make this
+
+
+@dataclass(frozen=True, eq=False)
+class ProbingRun:
+    """The touches of one run, images that belong to none, and all their lamps."""
+
+    name: str
+    touches: tuple[ProbedPoint, ...]
+    rejected: tuple[RejectedFrame, ...]
+    lamps: LampObservations
+
+
+def lamp_drift_of(
+    runs: Sequence[ProbingRun], instrument: Instrument, limits: VerificationLimits
+) -> LampDrift | None:
+    """Return the drift of fixed lamps over runs in the order of time."""
+    lamps = LampObservations()
+    for run in runs:
+        lamps = lamps.then(run.lamps)
+    return lamps.lamp_drift(instrument.rig.cameras, limits)
+
+
+def instrument_of(
+    calibration: CalibrationFile,
+    viewers: PenCameras,
+    pen: Pen,
+    pen_file: Path,
+    temperature_c: float | None = None,
+    bending: Bending = ASSUMED_BENDING,
+) -> Instrument:
+    """Return the instrument of a calibration of the same pen, as it measures.
+
+    With other cameras than in the calibration, tip and LEDs are taken from the swing
+    and the cameras from their files. ``temperature_c`` is that of the pen while it
+    measures, None if not known.
+    """
+    assumed = calibration.calibration.assumptions
+    conditions = replace(assumed, temperature_c=temperature_c)
+    found = _calibrated_instrument(calibration, viewers, pen, pen_file)
+    return in_use(found, pen, conditions, bending)
+
+
+def _calibrated_instrument(
+    calibration: CalibrationFile, viewers: PenCameras, pen: Pen, pen_file: Path
+) -> Instrument:
+    """Return the instrument as adjusted by a calibration of the same pen."""
+    record = calibration.calibration
+    if sha256(pen_file) != calibration.pen_sha256 or pen.n_leds != len(record.leds):
+        raise UsageError(
+            "verification.another-pen",
+            tip=calibration.path,
+            its_pen=printable(record.inputs.pen.file),
+            pen=pen_file,
+        )
+    if record.method != "joint":
+        return instrument_of_files(
+            viewers.rig,
+            pen,
+            calibration.tip_pen,
+            np.array(record.covariance)[:3, :3],
+            record.sigma_px,
+        )
+    fitted = record.instrument
+    instrument = Instrument(
+        rig=_fitted_rig(viewers, fitted),
+        pen=replace(
+            pen, leds=np.array(fitted.leds_mm), diameter=fitted.disc_diameter_mm
+        ),
+        tip_pen=calibration.tip_pen,
+        covariance=np.array(fitted.covariance),
+        sigma=record.sigma_px,
+        scale=PenScale(
+            growth=fitted.scale.growth,
+            file_sigma=fitted.scale.file_sigma,
+            thermal_sigma=fitted.scale.thermal_sigma,
+            deviation=fitted.scale.deviation,
+            variance=fitted.scale.variance,
+            covariance=np.array(fitted.scale.covariance),
+        ),
+    )
+    is_same = viewers.hashes == calibration.camera_hashes
+    return instrument if is_same else with_rig(instrument, viewers.rig)
+
+
+def _fitted_rig(viewers: PenCameras, fitted: InstrumentRecord) -> Rig:
+    """Return the cameras as adjusted by a swing."""
+    one = viewers.rig.cameras[0]  # whose images are as large
+    of_files = dict(enumerate(viewers.rig.cameras))
+    others = fitted.other_cameras
+    intrinsics = [fitted.intrinsics, *(other.intrinsics for other in others)]
+    return replace(
+        viewers.rig,
+        cameras=tuple(
+            of_files.get(c, one).with_intrinsics(np.array(each))
+            for c, each in enumerate(intrinsics)
+        ),
+        rotations=np.array([np.eye(3), *(o.cam_from_rig_rotation for o in others)]),
+        translations=np.array(
+            [np.zeros(3), *(o.cam_from_rig_translation_mm for o in others)]
+        ),
+        covariance=None,
+    )
+
+
+def touch_run(
+    place: ImageLocation, instrument: Instrument, rules: ProbingRules
+) -> ProbingRun:
+    """Find the touches in images.
+
+    With one image a touch, and none to settle, each image is a touch; else the pen must
+    be held still through as many as the rules say. Images with a recorded touch need no
+    rules. Raises `CalibrationError` if no image shows the pen, or the LEDs are of
+    another pen.
+    """
+    seen = observe_place(place, instrument)
+    return touches_of(place.name, seen, instrument, rules, place.touches)
+
+
+def observe_place(
+    place: ImageLocation, instrument: Instrument
+) -> tuple[Observations, ...]:
+    """Find and label the LEDs in the images of each camera; see `touch_run`."""
+    rig, pen = instrument.rig, instrument.pen
+    if len(place.images) != rig.n_cameras:
+        raise UsageError(
+            "verification.other-number-of-cameras",
+            place=printable(place.name),
+            n_given=len(place.images),
+            n_cameras=rig.n_cameras,
+        )
+    if rig.n_cameras == 1:
+        images, mask = place.images[0], place.masks[0]
+        return (observe_images(images, instrument.camera, pen, mask=mask),)
+    pairing = pair_images([each.names for each in place.images], rig.names)
+    return observe_rig_images(place.images, pairing, rig, pen, masks=place.masks)
+
+
+def touches_of(
+    name: str,
+    seen: Sequence[Observations],
+    instrument: Instrument,
+    rules: ProbingRules,
+    touches_known: Sequence[RecordedTouch] | None = None,
+) -> ProbingRun:
+    """Return the touches in the observations of each camera; see `touch_run`."""
+    images = _detections(seen, instrument)
+    if not any(detection.has_pose for _, detection in images):
+        raise _no_pen(name, seen[0])
+    if touches_known is None:
+        held = _held(images, instrument, rules)
+    else:
+        held = _held_as_recorded(images, touches_known)
+    if not held:
+        raise CalibrationError(
+            "verification.never-still",
+            run=name,
+            n_all=rules.n_settling + rules.n_frames,
+            n_settling=rules.n_settling,
+            n_frames=rules.n_frames,
+        )
+    touches = measure_touches(instrument, held)
+    require_leds_fit(name, touches)
+    named = {each.name for touch in touches for each in touch.rejected}
+    rejected = tuple(
+        RejectedFrame(image, detection.reason)
+        for image, detection in images
+        if not detection.has_pose and image not in named
+    )
+    return ProbingRun(name, touches, rejected, lamps_in(seen))
+
+
+def require_leds_fit(name: str, touches: Sequence[ProbedPoint]) -> None:
+    """Reject touches with a median residual that is too large for this pen."""
+    rms = float(np.median([touch.rms for touch in touches]))
+    if rms > MAX_RMS:
+        raise CalibrationError(
+            "verification.leds-do-not-fit", run=name, rms=rms, usual=USUAL_SIGMA
+        )
+
+
+def _held(
+    images: Sequence[tuple[str, PenDetection]],
+    instrument: Instrument,
+    rules: ProbingRules,
+) -> tuple[StillFrames, ...]:
+    if rules.n_frames + rules.n_settling > 1:
+        return take_all(instrument, rules, images).taken
+    return tuple(
+        StillFrames((touch_frame(name, detection),))
+        for name, detection in images
+        if detection.has_pose
+    )
+
+
+def _held_as_recorded(
+    images: Sequence[tuple[str, PenDetection]], touches: Sequence[RecordedTouch]
+) -> tuple[StillFrames, ...]:
+    """Return the images of each touch."""
+    by_touch: dict[int, list[tuple[str, PenDetection]]] = {}
+    approaches: dict[int, FloatArray | None] = {}
+    for image, touch in zip(images, touches, strict=True):
+        if touch.number:
+            by_touch.setdefault(touch.number, []).append(image)
+            approaches.setdefault(touch.number, touch.approach_cam)
+    held = (
+        StillFrames(
+            tuple(touch_frame(*image) for image in own if image[1].has_pose),
+            tuple(
+                RejectedFrame(name, seen.reason)
+                for name, seen in own
+                if not seen.has_pose
+            ),
+            approaches[number],
+        )
+        for number, own in by_touch.items()
+    )
+    return tuple(still for still in held if still.frames)
+
+
+def _detections(
+    seen: Sequence[Observations], instrument: Instrument
+) -> list[tuple[str, PenDetection]]:
+    """Return name and sighting of each moment, by all cameras together."""
+    rig, pen = instrument.rig, instrument.pen
+    images = []
+    for i, name in enumerate(seen[0].names):
+        views = [
+            _detection(rig.cameras[c], pen, each, i) for c, each in enumerate(seen)
+        ]
+        detection = replace(views[0], others=tuple(views[1:]))
+        name = name or next(each.names[i] for each in seen if each.names[i])
+        images.append((name, see_together(rig, pen, detection)))
+    return images
+
+
+def _detection(camera: Camera, pen: Pen, seen: Observations, i: int) -> PenDetection:
+    if seen.reasons[i]:
+        return unseen(pen, seen.reasons[i])
+    return detect_from_centers(
+        camera, pen, seen.pixels[i], seen.rotations[i], seen.translations[i]
+    )
+
+
+def _no_pen(name: str, seen: Observations) -> CalibrationError:
+    why: tuple[Message, ...] = tuple(
+        counted(n_images, reason) for reason, n_images in Counter(seen.reasons).items()
+    )
+    advice = seen.advice or message("verification.show-pen")
+    return CalibrationError(
+        "verification.no-pen",
+        run=name,
+        n_images=len(seen.names),
+        why=why,
+        advice=advice,
+    )

@@ -1,0 +1,349 @@
+"""The files of verifications: a record for each task that was done, and the conclusion.
+
+A task's record has the format that the command of its kind writes, with operator, item
+and session in addition. A verification is concluded when its task is complete: accepted
+if the limits are kept, else refused. Who accepts the tip all the same concludes it once
+more, with a reason: the last conclusion of a session counts. One that is given up
+before is abandoned. Each names all records of its session by their hashes, so that it
+stands for the whole. Files of simulated pens are kept apart.
+"""
+
+import logging
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from lightpen.comparisons.assessment import VerificationAssessment
+from lightpen.comparisons.records import verification_record
+from lightpen.errors import AcceptanceError, FileError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.formats.files import unreadable
+from lightpen.formats.hashes import InputFile, all_hashed, hashed
+from lightpen.formats.json_records import file_entry, plain, record_heading
+from lightpen.model.origin import Origin
+from lightpen.record.folder.outcome import TrialOutcome
+from lightpen.record.folder.verifications import (
+    CONCLUSION,
+    conditions_entries,
+    keep_verification,
+    verifications_folder,
+)
+from lightpen.record.library.signing.keys import SigningKey
+from lightpen.record.library.supervision import (
+    Signature,
+    Supervision,
+    require_supervisor,
+)
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.record.swings.writing import RecordWriter
+from lightpen_extensions.measure.probing.current_tip import CurrentTip
+from lightpen_extensions.measure.probing.drift_reference import lamp_drift_entries
+from lightpen_extensions.measure.probing.image_locations import PenCameras
+from lightpen_extensions.measure.session.session import SessionSetup
+from lightpen_extensions.measure.session.status import VerificationStatus
+from lightpen_extensions.measure.storage.resuming import ResumedVerification
+from lightpen_extensions.measure.storage.session_record import (
+    DAMAGED,
+    WHAT,
+    BeginRecord,
+    InterruptedVerification,
+    SessionRecord,
+    VerificationCheckpoint,
+    remove_note,
+    written_since,
+)
+from lightpen_extensions.measure.tasks.task import rule_of
+
+_logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The end of a verification."""
+
+    outcome: TrialOutcome
+    session: datetime  # when it began
+    at: datetime
+    found: VerificationAssessment | None = None  # the worst, if any
+    reason: str = ""  # why the tip is used despite findings
+    supervisor: str = ""  # who approved that, if needed
+    supervisor_key: SigningKey | None = None  # signs the record
+
+
+def conclusion_record(
+    names: Names,
+    origin: Origin,
+    tip_file: InputFile,
+    conclusion: Conclusion,
+    files: tuple[InputFile, ...],
+) -> dict[str, Any]:
+    """Return the record of a conclusion on the result in ``tip_file``.
+
+    ``files`` are all records of the session.
+    """
+    found = conclusion.found
+    return {
+        **record_heading(conclusion.at),
+        "verification": CONCLUSION,
+        "outcome": conclusion.outcome,
+        "session": conclusion.session.isoformat(timespec="seconds"),
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": origin,
+        "verdict": None
+        if found is None
+        else {"grade": found.grade.value, **plain(found.reason)},
+        "supervisor": conclusion.supervisor,
+        "reason": conclusion.reason,
+        "inputs": {"tip": file_entry(tip_file)},
+        "records": [file_entry(file) for file in files],
+    }
+
+
+def accepting_supervisor(
+    supervision: Supervision, found: VerificationAssessment, signature: Signature | None
+) -> tuple[str, SigningKey | None]:
+    """Return name and key of the supervisor who accepts the tip.
+
+    An empty name and no key if none is needed; `AcceptanceError` if one is, and none
+    signs or the password is wrong.
+    """
+    if not supervision.is_guarded and found.grade is not Grade.REPEAT:
+        return "", None
+    if signature is None:
+        raise AcceptanceError("verification.no-supervisor", why=found.reason)
+    key = require_supervisor(supervision, signature)
+    return signature.name.strip(), key
+
+
+def task_record(
+    status: VerificationStatus, now: datetime, journal: list[dict[str, str]]
+) -> dict[str, Any] | None:
+    """Return the record of a complete task; None if there is none.
+
+    ``journal`` names the images of its points.
+    """
+    setup, state, tip = status.setup, status.state, status.tip
+    if setup is None or state is None or state.found is None or tip is None:
+        return None
+    task, names, limits = setup.task, tip.names, asdict(setup.choices.limits)
+    return verification_record(
+        task.kind,
+        {
+            "session": (status.began or now).isoformat(timespec="seconds"),
+            "station": names.station,
+            "operator": names.operator,
+            "pen": names.pen,
+            "tip": names.tip,
+            "origin": tip.origin,
+            "camera_serials": camera_serials(tip.instrument),
+            "remarks": list(tip.instrument.remarks),
+            **conditions_entries(tip.temperature_c, tip.humidity_percent),
+            **task.entries(state.found, tip.instrument),
+            "rejected": [],
+            "witness": lamp_drift_entries(status.lamp_drift),
+        },
+        state.found.assessment,
+        {name: limits[name] for name in task.limits},
+        {
+            "tip": file_entry(tip.tip_file),
+            **viewer_entries(tip.viewers),
+            "pen": file_entry(tip.pen_file),
+            "images": [],
+            "touches": journal,
+        },
+        rule_of(setup.choices, setup.choices.limits),
+    )
+
+
+def camera_serials(instrument: Instrument) -> list[str]:
+    """Return the serial number of each camera, as an entry of a record."""
+    return [each.serial for each in instrument.rig.cameras]
+
+
+def viewer_entries(viewers: PenCameras) -> dict[str, Any]:
+    """Return the files of cameras, as inputs of a record."""
+    first, *others = (file_entry(file) for file in viewers.files)
+    if not others:
+        return {"camera": first}
+    return {"camera": others[0], "rig": first, "cameras": others}
+
+
+@dataclass(frozen=True, eq=False)
+class PendingRecord:
+    """A record to be written, after earlier ones of its session."""
+
+    record_of: Callable[[tuple[InputFile, ...]], Mapping[str, Any]]  # by files before
+    is_simulated: bool
+    ends: SessionRecord | None = None  # that this record concludes
+    supervisor: SigningKey | None = None  # whom the record names
+
+
+class SessionKeeping:
+    """Stores points and results in a data folder as soon as they are known."""
+
+    def __init__(
+        self, data: Path, begin: BeginRecord, now: Callable[[], datetime]
+    ) -> None:
+        self._data = data
+        self._begin = begin
+        self._now = now
+        self.images = SessionRecord(begin)
+        self._files: list[Path] = []  # of the current session
+        self._waiting: list[tuple[PendingRecord, list[Path]]] = []  # with its files
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The written files of the current session."""
+        return tuple(self._files)
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether something could not be written yet."""
+        return bool(self._waiting)
+
+    def root(self, tip: CurrentTip) -> Path:
+        """Return the folder of the verifications of a tip."""
+        is_simulated = tip.origin is Origin.SIMULATED
+        return verifications_folder(self._data, is_simulated=is_simulated)
+
+    def add_task(self, status: VerificationStatus) -> None:
+        """Have the result of a complete task written, now or as soon as it can be."""
+        record, tip = task_record(status, self._now(), self.images.journal), status.tip
+        if record is not None and tip is not None:
+            is_simulated = tip.origin is Origin.SIMULATED
+            self._queue(PendingRecord(lambda _: record, is_simulated))
+
+    def conclude(self, status: VerificationStatus, outcome: TrialOutcome) -> None:
+        """Write the outcome of the verification with all its records."""
+        tip, began = status.tip, status.began
+        if tip is not None and began is not None:
+            conclusion = Conclusion(outcome, began, self._now(), status.assessment)
+            self._queue(_concluding(tip, conclusion, self.images))
+
+    def accept(self, tip: CurrentTip, conclusion: Conclusion) -> None:
+        """Write the acceptance of a tip despite findings."""
+        self._write(_concluding(tip, conclusion, None), self._files)
+
+    def give_up(self, status: VerificationStatus) -> None:
+        """Conclude an incomplete session, as another begins."""
+        if status.began is not None and not status.is_done:
+            self.images.end(DISCARDED)
+            self.conclude(status, TrialOutcome.ABANDONED)
+
+    def begin(self) -> None:
+        """Begin another session."""
+        if not any(kept.ends is self.images for kept, _ in self._waiting):
+            self.images.release()
+        self._files, self.images = [], SessionRecord(self._begin)
+
+    def write(self) -> None:
+        """Write pending records; what cannot be written stays pending."""
+        while self._waiting:
+            self._write(*self._waiting[0])
+            self._waiting.pop(0)
+
+    def note(self, status: VerificationStatus) -> None:
+        """Write the checkpoint from which the verification can be resumed."""
+        tip, setup = status.tip, status.setup
+        if tip is None or setup is None or status.began is None or status.is_done:
+            return
+        self.images.note(_checkpoint(tip, setup, status.began, self.images.n_runs))
+
+    def take_over(self, path: Path, before: ResumedVerification) -> None:
+        """Continue an interrupted verification, unless another window has it."""
+        n_runs = before.under_way.n_runs
+        self.images = SessionRecord.resume(path, n_runs, self._begin)
+        self._files = list(before.files)
+
+    def _queue(self, kept: PendingRecord) -> None:
+        self._waiting.append((kept, self._files))
+
+    def _write(self, kept: PendingRecord, files: list[Path]) -> None:
+        """Write a record, after the files of its session before it."""
+        record = kept.record_of(all_hashed(files))
+        file = keep_verification(
+            self._data, record, kept.supervisor, is_simulated=kept.is_simulated
+        )
+        files.append(file)
+        _logger.info("verification written: %s", file)
+        if kept.ends is not None:
+            kept.ends.close()
+
+
+def _concluding(
+    tip: CurrentTip, conclusion: Conclusion, ends: SessionRecord | None
+) -> PendingRecord:
+    """Return the record of a conclusion, to be written when its session is."""
+    return PendingRecord(
+        lambda files: conclusion_record(
+            tip.names, tip.origin, tip.tip_file, conclusion, files
+        ),
+        tip.origin is Origin.SIMULATED,
+        ends=ends,
+        supervisor=conclusion.supervisor_key,
+    )
+
+
+def _checkpoint(
+    tip: CurrentTip, setup: SessionSetup, began: datetime, n_runs: int
+) -> VerificationCheckpoint:
+    return VerificationCheckpoint(
+        began=began,
+        names=tip.names,
+        origin=tip.origin,
+        tip_file=tip.tip_file.path.name,
+        tip_sha256=tip.tip_file.sha256,
+        pen_sha256=tip.pen_file.sha256,
+        seen_by=tip.viewers.hashes,
+        choices=setup.choices,
+        n_runs=n_runs,
+    )
+
+
+def abandon_interrupted(
+    data: Path, interrupted: InterruptedVerification, now: datetime
+) -> None:
+    """Conclude an interrupted verification as abandoned; its files are kept.
+
+    A damaged file is set aside.
+    """
+    under_way, path = interrupted.under_way, interrupted.path
+    with _writer_of(path.parent) as writer:
+        writer.conclude(DISCARDED)
+        if under_way is None:
+            try:
+                path.replace(path.with_suffix(DAMAGED))
+            except OSError as error:
+                raise unreadable(path, WHAT, error) from error
+            return
+        root, files = path.parents[2], []
+        for name in written_since(root, under_way).files:
+            with suppress(FileError):
+                files.append(hashed(root / name))
+        record = conclusion_record(
+            under_way.names,
+            under_way.origin,
+            InputFile(Path(under_way.tip_file), under_way.tip_sha256),
+            Conclusion(TrialOutcome.ABANDONED, under_way.began, now),
+            tuple(files),
+        )
+        is_simulated = under_way.origin is Origin.SIMULATED
+        keep_verification(data, record, is_simulated=is_simulated)
+        remove_note(path)
+
+
+def _writer_of(folder: Path) -> RecordWriter:
+    """Return the writer of a record, which may be damaged; refuse one in use."""
+    try:
+        record = open_record(folder)
+    except FileError:
+        return RecordWriter.of_damaged(folder)
+    return RecordWriter.resume(record)

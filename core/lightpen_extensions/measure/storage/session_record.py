@@ -1,0 +1,299 @@
+"""A verification on disk: the images of its points, and how far it is.
+
+The images are one record, see `lightpen.record.swings.reading`: an image is written,
+with the numbers of point and run, before it counts; one that no longer counts is
+excluded.
+So a session can be read like any recorded images. Beside them a file says what is
+verified and how far. It is replaced whole at each step and removed with the
+conclusion; a record that has it and that no program writes to was interrupted.
+"""
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self, TypeAlias
+
+from msgspec import Struct, to_builtins
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.errors import FileError
+from lightpen.formats.files import (
+    LARGEST_RECORD,
+    MEGABYTE,
+    read_bytes,
+    sync_folder,
+    unreadable,
+    write_whole,
+)
+from lightpen.formats.hashes import hashed
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    ZonedTime,
+    parse_checked,
+    parse_own_json,
+    require_usual,
+    with_checksum,
+)
+from lightpen.formats.part_files import sweep_parts
+from lightpen.messages import Message, message
+from lightpen.model.origin import Origin
+from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.library.numbered_files import numbered_files
+from lightpen.record.results.result_folder import SIMULATED
+from lightpen.record.swings.header import Header
+from lightpen.record.swings.journal import JOURNAL
+from lightpen.record.swings.lock import is_locked
+from lightpen.record.swings.names import Names
+from lightpen.record.swings.reading import image_name, open_record
+from lightpen.record.swings.writing import RecordWriter, SecondaryView
+from lightpen_extensions.measure.probing.probing import ProbingEventKind, ProbingPhase
+from lightpen_extensions.measure.session.session import SessionState, SessionTransition
+from lightpen_extensions.measure.tasks.task import VerificationChoices
+
+SESSION, DAMAGED = "session.json", ".damaged"
+CONCLUDED = "concluded"
+NOT_COUNTED = "not counted"
+WHAT = message("file.under-way")
+BeginRecord: TypeAlias = Callable[[], tuple[Path, Header]]  # makes the folder
+
+
+class VerificationCheckpoint(Struct, frozen=True):
+    """A verification that began and is not concluded."""
+
+    began: ZonedTime
+    names: Names
+    origin: Origin
+    tip_file: str  # name of the result that is verified
+    tip_sha256: Digest
+    pen_sha256: Digest
+    seen_by: tuple[Digest, ...]  # of the camera files
+    choices: VerificationChoices
+    n_runs: int = 0  # that are complete
+
+    def __post_init__(self) -> None:
+        require_usual(self.began)
+
+
+@dataclass(frozen=True)
+class InterruptedVerification:
+    """A verification that no window holds, or why it cannot be resumed."""
+
+    path: Path  # of its file, in the record of its images
+    under_way: VerificationCheckpoint | None
+    fault: Message | None = None
+
+
+class SessionRecord:
+    """Keeps the images of one session; no other program writes to it meanwhile."""
+
+    def __init__(self, begin: BeginRecord) -> None:
+        self._begin = begin
+        self._folder: Path | None = None
+        self._writer: RecordWriter | None = None
+        self._numbers: dict[str, int] = {}  # of images of this run that count, by name
+        self._point = 1  # of the next image
+        self.n_runs = 0  # that are complete
+        self._noted: VerificationCheckpoint | None = None
+
+    @classmethod
+    def resume(cls, path: Path, n_runs: int, begin: BeginRecord) -> Self:
+        """Continue an interrupted session; refuse if another program has it."""
+        record = open_record(path.parent)
+        resumed = cls(begin)
+        resumed._writer = RecordWriter.resume(record)
+        sweep_parts(path.parent)
+        resumed._folder, resumed.n_runs = path.parent, n_runs
+        resumed._numbers = {
+            point_image_name(image.number): image.number
+            for image in record.used_images
+            if image.run > n_runs
+        }
+        resumed._point = 1 + max((image.touch for image in record.images), default=0)
+        return resumed
+
+    @property
+    def has_images(self) -> bool:
+        """Whether an image is kept."""
+        return self._folder is not None
+
+    @property
+    def journal(self) -> list[dict[str, str]]:
+        """Folder and hash of the journal, for a record; empty without one."""
+        if self._folder is None:
+            return []
+        digest = hashed(self._folder / JOURNAL).sha256
+        return [{"folder": self._folder.name, "journal_sha256": digest}]
+
+    def keep(
+        self, frame: Frame, seen: PenDetection, approach: FloatArray | None = None
+    ) -> str:
+        """Put an image on the disk, and return its name in the record."""
+        if self._writer is None:
+            folder, header = self._begin()
+            self._writer = RecordWriter.create(folder, header, is_swing=False)
+            self._folder = folder
+        others = frame.others[: len(seen.others)]
+        number = self._writer.append(
+            frame.image,
+            seen.pixels,
+            seen.rotation,
+            seen.translation,
+            frame.host_ts_ns * 1e-9,
+            frame.device_ts_ns,
+            others=[
+                SecondaryView(other.image, view.pixels, other.device_ts_ns)
+                for other, view in zip(others, seen.others, strict=True)
+            ],
+            touch=self._point,
+            run=self.n_runs + 1,
+            approach=approach,
+        )
+        name = point_image_name(number)
+        self._numbers[name] = number
+        return name
+
+    def follow(self, before: SessionState, transition: SessionTransition) -> None:
+        """Exclude images that no longer count, and end a completed run."""
+        state = transition.state
+        is_over = transition.finished is not None
+        has_ended = is_over or len(state.runs) > len(before.runs)
+        counting = before if has_ended else state
+        touching = counting.touching
+        names = {frame.name for still in touching.taken for frame in still.frames}
+        recorded = [
+            event
+            for event in transition.events
+            if event.what is ProbingEventKind.RECORDED
+        ]
+        if has_ended:
+            names.update(name for event in recorded for name in event.names)
+        else:
+            deviating = () if touching.deviating is None else (touching.deviating,)
+            held = touching.held if touching.phase is ProbingPhase.HOLDING else ()
+            names.update(seen.frame.name for seen in (*held, *deviating))
+        self._point += len(recorded)
+        self._exclude([name for name in self._numbers if name not in names])
+        if has_ended:
+            self._numbers = {}
+            self.n_runs += 1
+        if is_over:
+            self.end(CONCLUDED)
+
+    def note(self, value: VerificationCheckpoint) -> None:
+        """Write how far the session is, if that has changed."""
+        if self._folder is None or value == self._noted:
+            return
+        text = json.dumps(to_builtins(value), allow_nan=False)
+        write_whole(self._folder / SESSION, with_checksum(text.encode()))
+        self._noted = value
+
+    def end(self, verdict: str) -> None:
+        """Conclude the images; the session stays open until it is closed."""
+        if self._writer is not None:
+            self._writer.conclude(verdict)
+
+    def close(self) -> None:
+        """Close the session: its conclusion is written."""
+        if self._folder is not None:
+            remove_note(self._folder / SESSION)
+        self.release()
+
+    def release(self) -> None:
+        """Let another program take over."""
+        if self._writer is not None:
+            self._writer.close()
+
+    def _exclude(self, names: list[str]) -> None:
+        if names and self._writer is not None:
+            self._writer.exclude([self._numbers[name] for name in names], NOT_COUNTED)
+            for name in names:
+                del self._numbers[name]
+
+
+def point_image_name(number: int) -> str:
+    """Return the name of an image in the record of a session, from 1."""
+    return Path(image_name(number)).name
+
+
+def remove_note(path: Path) -> None:
+    """Remove the file of a concluded session."""
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+        sync_folder(path.parent)
+
+
+def find_interrupted(data: Path) -> tuple[InterruptedVerification, ...]:
+    """Return the verifications that no window holds, the newest first."""
+    found: list[InterruptedVerification] = []
+    for root in (data, data / SIMULATED):
+        folder = root / VERIFICATIONS / TOUCHES
+        try:
+            paths = folder.glob(f"*/{SESSION}")
+            found += (
+                _read(path) for path in paths if not is_locked(path.parent / JOURNAL)
+            )
+        except OSError as error:
+            raise unreadable(folder, WHAT, error) from error
+    open_ones = [each for each in found if not _is_concluded(each)]
+    return tuple(
+        sorted(open_ones, key=lambda each: each.path.parent.name, reverse=True)
+    )
+
+
+@dataclass(frozen=True)
+class SessionFiles:
+    """Records of a verification with their tasks, the oldest first."""
+
+    files: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+
+
+def written_since(folder: Path, under_way: VerificationCheckpoint) -> SessionFiles:
+    """Return the files written of a verification that is under way."""
+    session = under_way.began.isoformat(timespec="seconds")
+    since: list[tuple[str, str]] = []
+    for file in numbered_files(folder):
+        try:
+            record = parse_own_json(read_bytes(file, WHAT, LARGEST_RECORD), _OfSession)
+        except (FileError, DamagedError):
+            continue  # reported by whoever reads the archive
+        if record.created < under_way.began.replace(microsecond=0):
+            break
+        if record.session == session:
+            since.insert(0, (file.name, record.verification))
+    return SessionFiles(*zip(*since, strict=True)) if since else SessionFiles()
+
+
+class _OfSession(Struct):
+    created: ZonedTime
+    verification: str
+    session: str = ""
+
+
+def _is_concluded(found: InterruptedVerification) -> bool:
+    """Return whether it is concluded; then its left-over file is deleted."""
+    if found.under_way is None:
+        return False
+    since = written_since(found.path.parents[2], found.under_way)
+    if CONCLUSION not in since.kinds:
+        return False
+    remove_note(found.path)
+    return True
+
+
+def _read(path: Path) -> InterruptedVerification:
+    try:
+        data = read_bytes(path, WHAT, MEGABYTE)
+        return InterruptedVerification(
+            path, parse_checked(data, VerificationCheckpoint)
+        )
+    except FileError as error:
+        return InterruptedVerification(path, None, error.message)
+    except DamagedError:
+        why = message("under-way.damaged", file=path)
+        return InterruptedVerification(path, None, why)

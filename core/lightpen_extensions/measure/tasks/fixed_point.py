@@ -1,0 +1,385 @@
+"""The tip check: a fixed point in new postures, the paper's Table 2.
+
+A tip that is right stays where it is, however the pen is held; one that is off by d in
+the pen's frame moves by ``R_i d``. So where the points scatter, the postures
+determine the tip by which they would not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.comparisons.assessment import (
+    MORE_POINTS,
+    VERIFY_AGAIN,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.comparisons.repeatability import Scatter
+from lightpen.errors import CalibrationError
+from lightpen.estimation.pivot.pivot import in_deviations
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.coverage import posture_spread
+from lightpen.model.decision_rules import Decision
+from lightpen.model.expanded_uncertainty import COVERAGE, COVERAGE_FACTOR
+from lightpen.model.information import symmetric_root
+from lightpen.model.limits import VerificationLimits
+from lightpen.model.quantiles import chi_quantile, chi_square_quantile
+from lightpen_extensions.measure.tasks.probed_point import (
+    ProbedPoint,
+    joint_covariance,
+    point_entries,
+    with_tip,
+)
+from lightpen_extensions.measure.tasks.task import (
+    ANY,
+    Band,
+    Conditions,
+    Found,
+    HandGoal,
+    ResultRow,
+    ResultTable,
+    Runs,
+    Screening,
+    VerificationChoices,
+    VerificationTask,
+    keep_all,
+)
+from lightpen_extensions.measure.tasks.tip_evidence import (
+    TipEvidence,
+    judged_tip,
+    not_the_tip,
+    points_evidence,
+    tip_entries,
+)
+
+MIN_TOUCHES = 3
+NEW_POSTURE = float(np.radians(8.0))
+ELSEWHERE = 5.0  # mm from the other points: the tip was not in the cone at all
+TILT = 0.6  # rad, to lean the pen by, once round the cone
+N_DRAWS = 2000
+MIN_SPREAD = np.radians(3.0)  # rms turn of the best direction; less verifies nothing
+ASTRAY = 8.0  # times the median distance from the middle
+LIFTED = 0.2  # mm; nearer points scatter, farther ones may be of a lifted pen
+OUTLYING = 1e-6  # probability of such a distance by noise
+UNUSUAL = 0.001  # probability of such a scatter by chance
+
+
+@dataclass(frozen=True, eq=False)
+class FixedPoint(Found):
+    """A fixed point by N probed points."""
+
+    touches: tuple[ProbedPoint, ...]
+    left_out: tuple[ProbedPoint, ...]  # far from all others: the pen was lifted
+    calibrated: Scatter
+    nominal: Scatter | None  # with the nominal tip, if known
+    uncertainty: FloatArray  # (3,), U (k = 2) of the mean, mm
+    expected_deviation: FloatArray  # (3,), of a touch by its covariance, mm
+    half_range_uncertainty: FloatArray  # (3,): 95 % of the half ranges by noise, mm
+    tip: TipEvidence
+    moved: FloatArray | None  # (3,), mean less the calibration's cone, mm
+
+    @property
+    def probed(self) -> tuple[ProbedPoint, ...]:
+        """Probed points whose postures are shown."""
+        return self.touches
+
+
+def measure_fixed_point(
+    runs: Runs, conditions: Conditions, choices: VerificationChoices | None = None
+) -> FixedPoint:
+    """Measure a fixed point by all runs, and judge the tip by its scatter.
+
+    Raises `CalibrationError` if there are too few points at one place.
+    """
+    instrument, cone_cam = conditions.instrument.seated, conditions.cone_cam
+    touches = [point.seated for _, points in runs for point in points]
+    kept, left_out = _at_one_place(touches)
+    calibrated = scatter_of(kept)
+    covariance = joint_covariance(kept, instrument)
+    n = len(kept)
+    blocks = covariance.reshape(n, 3, n, 3)
+    of_mean = blocks.sum(axis=(0, 2)) / n**2
+    own = np.einsum("nini->i", blocks) / n
+    expected = np.sqrt(np.maximum((own - np.diag(of_mean)) * n / (n - 1), 0.0))
+    found = FixedPoint(
+        touches=kept,
+        left_out=left_out,
+        calibrated=calibrated,
+        nominal=nominal_scatter(kept, instrument, conditions.nominal_tip),
+        uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + conditions.drift**2),
+        expected_deviation=expected,
+        half_range_uncertainty=_half_range_by_noise(covariance),
+        tip=points_evidence(kept, instrument, conditions.drift),
+        moved=None if cone_cam is None else calibrated.mean - cone_cam,
+        assessment=accepted(_steady(calibrated)),
+    )
+    return replace(found, assessment=_assessment(found, conditions.limits))
+
+
+def _half_range_by_noise(covariance: FloatArray) -> FloatArray:
+    """Return the half range that a point at rest shows with 95 % probability, mm."""
+    rng = np.random.default_rng(0)
+    drawn = rng.standard_normal((N_DRAWS, len(covariance)))
+    drawn = (drawn @ symmetric_root(covariance)).reshape(N_DRAWS, -1, 3)
+    half = np.ptp(drawn, axis=1) / 2
+    return np.asarray(np.quantile(half, COVERAGE, axis=0))
+
+
+def _steady(scatter: Scatter) -> Message:
+    u, v, w = scatter.half_range.tolist()
+    return message("fixed-point.steady", u=u, v=v, w=w)
+
+
+def scatter_of(touches: Sequence[ProbedPoint]) -> Scatter:
+    """Return the coordinates of touches."""
+    return Scatter(np.array([touch.point_cam for touch in touches]))
+
+
+def nominal_scatter(
+    touches: Sequence[ProbedPoint],
+    instrument: Instrument,
+    nominal_tip: FloatArray | None,
+) -> Scatter | None:
+    """Return the coordinates of touches with the nominal tip; None if not known."""
+    if nominal_tip is None:
+        return None
+    return scatter_of([with_tip(each, instrument, nominal_tip) for each in touches])
+
+
+def _at_one_place(
+    touches: Sequence[ProbedPoint],
+) -> tuple[tuple[ProbedPoint, ...], tuple[ProbedPoint, ...]]:
+    if not touches:
+        raise _too_few(0)
+    points = scatter_of(touches).points
+    distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    limit = max(ASTRAY * float(np.median(distances)), LIFTED)
+    noises = np.array([touch.noise for touch in touches])
+    unlikely = in_deviations(points - np.median(points, axis=0), noises)
+    off = (distances > limit) & (unlikely > chi_quantile(3, OUTLYING))
+    kept = tuple(t for t, is_off in zip(touches, off, strict=True) if not is_off)
+    left_out = tuple(t for t, is_off in zip(touches, off, strict=True) if is_off)
+    if len(kept) < MIN_TOUCHES:
+        raise _too_few(len(kept))
+    return kept, left_out
+
+
+def _too_few(n_touches: int) -> CalibrationError:
+    return CalibrationError(
+        "fixed-point.too-few",
+        n_touches=n_touches,
+        needed=MIN_TOUCHES,
+        usual=VerificationChoices.n_cone,
+    )
+
+
+def _assessment(
+    found: FixedPoint, limits: VerificationLimits
+) -> VerificationAssessment:
+    """Judge the tip first, as it explains a scatter; tolerate the expected noise."""
+    against = judged_tip(found.tip, limits)
+    if against is not None:
+        return against
+    deviation, limit = found.calibrated.deviation, _limit(found, limits)
+    axis = int(np.argmax(deviation / limit))
+    if deviation[axis] > limit[axis]:
+        return refused(
+            message(
+                "fixed-point.scatters",
+                deviation=float(deviation[axis]),
+                axis="uvw"[axis],
+                limit=float(limit[axis]),
+            ),
+            VERIFY_AGAIN,
+        )
+    rotations = np.array([touch.rotation for touch in found.touches])
+    spread = float(posture_spread(rotations)[0][-1])
+    if spread < MIN_SPREAD:
+        return check(
+            message(
+                "fixed-point.same-posture",
+                found=float(np.degrees(spread)),
+                needed=float(np.degrees(MIN_SPREAD)),
+            ),
+            VERIFY_AGAIN,
+        )
+    if found.left_out:
+        return check(
+            message(
+                "fixed-point.lifted",
+                n_left_out=len(found.left_out),
+                n_touches=len(found.left_out) + len(found.touches),
+                first=found.left_out[0].label,
+            ),
+            VERIFY_AGAIN,
+        )
+    if not found.tip.verifies_tip(limits):
+        return check(not_the_tip(found.tip, limits), MORE_POINTS)
+    power = message("tip.verified", detectable=found.tip.detectable)
+    reason = _steady(found.calibrated)
+    return accepted(message("tip.with-power", reason=reason, power=power))
+
+
+def _limit(found: FixedPoint, limits: VerificationLimits) -> FloatArray:
+    """Return the limit of the standard deviation, (3,), mm, or what noise may show."""
+    n_free = len(found.touches) - 1
+    by_chance = np.sqrt(chi_square_quantile(n_free, UNUSUAL) / n_free)
+    limit = np.array([limits.across, limits.across, limits.along])
+    return np.asarray(np.maximum(limit, by_chance * found.expected_deviation))
+
+
+def without_others(
+    points: Sequence[ProbedPoint], limit: float = ELSEWHERE
+) -> Screening:
+    """Accept the points within a limit, mm, of most of them."""
+    places = scatter_of(points).points
+    distances = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+    kept = np.flatnonzero(distances <= limit).tolist()
+    if len(points) < 3 or len(kept) == len(points):  # of two, either may be wrong
+        return keep_all(len(points))
+    return Screening(kept, elsewhere(float(distances.max())))
+
+
+def elsewhere(distance: float) -> Message:
+    """Reject a point at this distance from the others, mm."""
+    return message("session.elsewhere", distance=distance)
+
+
+def _entries(found: FixedPoint, instrument: Instrument) -> dict[str, Any]:
+    return {
+        "calibrated": _scatter_entries(found.calibrated),
+        "nominal": None if found.nominal is None else _scatter_entries(found.nominal),
+        "expanded_uncertainty_mm": found.uncertainty,
+        "expected_std_mm": found.expected_deviation,
+        "half_range_mm": found.calibrated.half_range,
+        "half_range_expanded_uncertainty_mm": found.half_range_uncertainty,
+        "moved_mm": found.moved,
+        **tip_entries(found.tip),
+        "touches": point_entries(found.touches, instrument.seated),
+        "left_out": point_entries(found.left_out, instrument.seated),
+    }
+
+
+def _scatter_entries(scatter: Scatter) -> dict[str, Any]:
+    return {
+        "points_cam_mm": scatter.points,
+        "mean_mm": scatter.mean,
+        "std_mm": scatter.deviation,
+        "range_mm": scatter.range,
+    }
+
+
+def _tables(found: FixedPoint, conditions: Conditions) -> tuple[ResultTable, ...]:
+    own = [
+        ResultRow(
+            message("fixed-point.half-range"), found.calibrated.half_range.tolist()
+        ),
+        ResultRow(message("table.uncertainty"), found.half_range_uncertainty.tolist()),
+        ResultRow(message("table.mean-uncertainty"), found.uncertainty.tolist()),
+    ]
+    if found.moved is not None:
+        own.append(ResultRow(message("fixed-point.moved"), found.moved.tolist()))
+    change = [
+        ResultRow(message("fixed-point.tip-change"), found.tip.change.tolist()),
+        ResultRow(
+            message("fixed-point.tip-change-uncertainty"),
+            found.tip.uncertainty.tolist(),
+        ),
+    ]
+    tables = (
+        _points(message("fixed-point.table"), found.calibrated.points),
+        _comparison(found.calibrated, found.nominal, own, change),
+    )
+    if found.nominal is None:
+        return tables
+    nominal = _points(message("fixed-point.nominal-table"), found.nominal.points)
+    return *tables, nominal
+
+
+def _bands(found: FixedPoint, conditions: Conditions) -> tuple[Band, ...]:
+    """Return the error of the tip, and the standard deviation along each axis."""
+    limits, tip = conditions.limits, found.tip
+    error, known = float(np.linalg.norm(tip.known_change)), tip.known_uncertainty
+    decision = limits.decision(error, known, limits.tip)
+    name = message("fixed-point.tip-error")
+    bands = [Band(name, error, known, upper=limits.tip, decision=decision)]
+    share = COVERAGE_FACTOR / np.sqrt(2 * (len(found.touches) - 1))
+    for axis, value, u, limit in zip(
+        "uvw",
+        found.calibrated.deviation.tolist(),
+        (share * found.expected_deviation).tolist(),
+        _limit(found, limits).tolist(),
+        strict=True,
+    ):
+        name = message("fixed-point.deviation-along", axis=axis)
+        kept = Decision.ACCEPTED if value <= limit else Decision.REJECTED
+        bands.append(Band(name, value, u, upper=limit, decision=kept))
+    return tuple(bands)
+
+
+def _points(title: Message, places: FloatArray) -> ResultTable:
+    """Return the coordinates of each point: the paper's Table 2."""
+    rows = (
+        ResultRow(message("table.point", number=i), place)
+        for i, place in enumerate(places.tolist(), 1)
+    )
+    return ResultTable(title, tuple("uvw"), tuple(rows))
+
+
+def _comparison(
+    own: Scatter,
+    nominal: Scatter | None,
+    more: Sequence[ResultRow] = (),
+    change: Sequence[ResultRow] = (),
+) -> ResultTable:
+    rows = [*_spread(message("fixed-point.current-tip"), own), *more]
+    if nominal is not None:
+        rows += _spread(message("fixed-point.nominal-tip"), nominal)
+    notes = () if nominal is not None else (message("fixed-point.no-nominal-tip"),)
+    return ResultTable(
+        message("fixed-point.comparison"), tuple("uvw"), (*rows, *change), notes
+    )
+
+
+def _spread(name: Message, scatter: Scatter) -> list[ResultRow]:
+    return [
+        ResultRow(name, scatter.mean.tolist()),
+        ResultRow(message("table.deviation"), scatter.deviation.tolist()),
+        ResultRow(message("table.range"), scatter.range.tolist()),
+    ]
+
+
+FIXED_POINT = VerificationTask(
+    kind="fixed point",
+    summary="the cone, probed in new postures",
+    run_help="points in the cone, each in another posture",
+    title=message("fixed-point.title"),
+    purpose=message("fixed-point.purpose"),
+    first=message("task.probe-cone"),
+    another=message("fixed-point.another"),
+    known=message("session.same-posture"),
+    limits=("across", "along", "tip"),
+    measure=measure_fixed_point,
+    entries=_entries,
+    tables=_tables,
+    bands=_bands,
+    hand=lambda choices, run, step: HandGoal(
+        tilt=TILT, direction=2 * pi * step / choices.n_cone
+    ),
+    n_points=lambda choices, run: choices.n_cone,
+    n_frames=lambda choices: choices.n_cone_frames,
+    instruction=lambda choices, progress: message("session.touch-cone"),
+    screen=lambda progress: without_others(progress.points),
+    newness=(NEW_POSTURE, ANY),
+    is_pooled=True,
+    compares_nominal_tip=True,
+    shows_postures=True,
+)

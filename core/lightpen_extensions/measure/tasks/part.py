@@ -1,0 +1,352 @@
+"""A part measured by a plan, one run for each of its features.
+
+`lightpen_extensions.measure.measuring` does the geometry; here are the touches, their
+order, and the shown and recorded results. A plan that is ended early gives the results
+of the probed features.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from msgspec import structs
+
+from lightpen.arrays import FloatArray
+from lightpen.comparisons.assessment import (
+    BETTER_POSTURES,
+    CHECK_FILES,
+    VerificationAssessment,
+    accepted,
+    check,
+    refused,
+)
+from lightpen.errors import CalibrationError
+from lightpen.estimation.reports.verdict import Grade
+from lightpen.estimation.uncertainty.instrument import Instrument
+from lightpen.messages import Message, message
+from lightpen.model.artefacts import Side
+from lightpen.model.decision_rules import Decision
+from lightpen.record.folder.verifications import MEASURED_PART
+from lightpen_extensions.measure.measuring.artefacts import QUANTITIES
+from lightpen_extensions.measure.measuring.part import (
+    CharacteristicResult,
+    MeasuredPart,
+    measure_part,
+)
+from lightpen_extensions.measure.measuring.plan import IS_ANGLE, Plan
+from lightpen_extensions.measure.measuring.plan_checks import missing_normal
+from lightpen_extensions.measure.measuring.report import (
+    PartRow,
+    characteristic_rows,
+    feature_rows,
+    part_entries,
+)
+from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
+from lightpen_extensions.measure.tasks.part_course import (
+    hand_goal,
+    planned_at,
+    touches_of_part,
+)
+from lightpen_extensions.measure.tasks.pen_scale import scale_of
+from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, point_entries
+from lightpen_extensions.measure.tasks.task import (
+    ANY,
+    Band,
+    Conditions,
+    Found,
+    ResultRow,
+    ResultTable,
+    Runs,
+    TaskProgress,
+    VerificationChoices,
+    VerificationTask,
+)
+
+NEW_PLACE = 0.5  # mm
+MOST_NAMED = 5  # characteristics in a sentence
+
+
+@dataclass(frozen=True, eq=False)
+class Part(Found):
+    """A measured part."""
+
+    part: MeasuredPart
+    points: tuple[tuple[str, ProbedPoint], ...]  # feature and ball centre
+    missing: tuple[str, ...]  # features that were not probed
+
+    def deviations(self) -> list[FloatArray | None]:
+        """Return the way from its feature to each point, (3,), mm; None if unknown."""
+        found: list[FloatArray | None] = [None] * len(self.points)
+        for name, one in self.part.features.items():
+            if one.feature is not None:
+                at = self.part.touches.of(name).tolist()
+                for i, offset in zip(at, one.feature.offsets, strict=True):
+                    found[i] = offset
+        return found
+
+
+def measure_by_plan(
+    runs: Runs, conditions: Conditions, choices: VerificationChoices
+) -> Part:
+    """Measure a part by its plan, up to the features probed so far.
+
+    Runs are named after features, or in the order of the plan. Raises
+    `CalibrationError` if the touches of a feature are too few, show no side or do not
+    determine it.
+    """
+    if choices.plan is None:
+        raise CalibrationError("part.no-plan")
+    found = _owned(runs, choices)
+    names = {name for name, _ in found}
+    plan = choices.plan.limited_to(names)
+    if not plan.features:
+        raise CalibrationError("part.nothing-probed")
+    touches = touches_of_part(found, conditions)
+    part = measure_part(plan, touches, conditions.limits)
+    missing = tuple(e.name for e in choices.features if e.name not in names)
+    assessment = _assessment(part, missing)
+    return Part(assessment, part, tuple(found), missing)
+
+
+def check_feature(
+    runs: Runs, conditions: Conditions, choices: VerificationChoices
+) -> None:
+    """Refuse the last of some runs if it does not determine its feature.
+
+    The normal of a point or line may come from a feature that is probed later.
+    """
+    if choices.plan is None:
+        return
+    found = _owned(runs, choices)
+    name = found[-1][0]
+    own = [(owner, point) for owner, point in found if owner == name]
+    planned = choices.plan.feature(name)
+    if planned.kind in {FeatureKind.POINT, FeatureKind.LINE}:
+        planned = structs.replace(planned, side=Side.CENTRE, surface="", normal=None)
+    touches = touches_of_part(own, conditions)
+    measure_part(Plan(choices.plan.name, (planned,)), touches)
+
+
+def _owned(runs: Runs, choices: VerificationChoices) -> list[tuple[str, ProbedPoint]]:
+    """Return the touches with their features."""
+    names = [each.name for each in choices.features]
+    found = []
+    for i, (run, points) in enumerate(runs):
+        if run not in names and i >= len(names):
+            raise CalibrationError(
+                "measuring.unknown-feature", name=run, names=", ".join(names)
+            )
+        found += [(run if run in names else names[i], point) for point in points]
+    return found
+
+
+def sizes_of(part: MeasuredPart) -> list[CharacteristicResult]:
+    """Return the certified sizes of artefacts."""
+    return [
+        each
+        for each in part.results
+        if each.planned.certified is not None and each.planned.quantity in QUANTITIES
+    ]
+
+
+def _assessment(part: MeasuredPart, missing: tuple[str, ...]) -> VerificationAssessment:
+    def named(decision: Decision) -> list[Message]:
+        results = part.results
+        return [each.planned.words for each in results if each.decision is decision]
+
+    judged = [each for each in part.results if each.decision is not None]
+    certified = [each for each in judged if each.planned.certified is not None]
+    out, unclear = named(Decision.REJECTED), named(Decision.OPEN)
+    n_judged, name = len(judged), part.plan.words
+    if out and len(certified) == n_judged:
+        return _judged_size(certified)
+    if out:
+        reason = message(
+            "part.out", n_out=len(out), names=_listed(out), part=name, n_judged=n_judged
+        )
+        return refused(reason, message("part.rework"))
+    if missing and n_judged:
+        reason = message(
+            "part.incomplete",
+            part=name,
+            names=_listed([message("measuring.named", name=each) for each in missing]),
+        )
+        return check(reason, message("part.complete"))
+    if unclear:
+        reason = message(
+            "part.unclear",
+            n_open=len(unclear),
+            names=_listed(unclear),
+            part=name,
+            n_judged=n_judged,
+        )
+        return check(reason, message("part.more-points"))
+    if not n_judged:
+        n_features = len(part.features)
+        reason = message("part.measured", part=name, n_features=n_features)
+        return accepted(reason, message("part.done"))
+    if certified:
+        return _judged_size(certified)
+    good = message("part.good", part=name, n_judged=n_judged)
+    return accepted(good, message("part.done"))
+
+
+def _judged_size(results: Sequence[CharacteristicResult]) -> VerificationAssessment:
+    """Judge certified values by the one with the largest error for its limit."""
+    worst = max(results, key=lambda each: abs(each.deviation or 0.0) / each.margin)
+    words, error = worst.planned.words, worst.deviation or 0.0
+    u, limit = worst.value.uncertainty, worst.margin
+    if worst.decision is Decision.REJECTED:
+        off = message(
+            "artefact.off", name=words, error=error, uncertainty=u, limit=limit
+        )
+        return refused(off, CHECK_FILES)
+    # Form by noisy points is an upper bound: it says nothing against a size.
+    sizes = [e for e in results if e.planned.quantity in QUANTITIES] or results
+    least = max(sizes, key=lambda each: each.value.uncertainty / each.margin)
+    if least.value.uncertainty > least.margin:
+        reason = message(
+            "artefact.uncertain",
+            name=least.planned.words,
+            uncertainty=least.value.uncertainty,
+            limit=least.margin,
+        )
+        return check(reason, message("part.more-points"))
+    good = message("artefact.good", name=words, error=error, uncertainty=u, limit=limit)
+    return accepted(good, BETTER_POSTURES, Grade.SCALE)
+
+
+def _listed(names: Sequence[Message]) -> tuple[Message, ...]:
+    more = [message("measuring.named", name="...")] if len(names) > MOST_NAMED else []
+    return (*names[:MOST_NAMED], *more)
+
+
+def _entries(found: Part, instrument: Instrument) -> dict[str, Any]:
+    points = [point for _, point in found.points]
+    scale = scale_of(found.part, points, instrument)
+    return {
+        **part_entries(found.part),
+        "scale": None
+        if scale is None
+        else {
+            "factor": scale.factor,
+            "expanded_uncertainty": scale.uncertainty,
+            "expanded_uncertainty_before": scale.uncertainty_before,
+        },
+        "missing": list(found.missing),
+        "touches": [
+            {
+                "feature": name,
+                "approach_cam": point.approach_cam,
+                "deviation_cam_mm": off,
+                **entry,
+            }
+            for (name, point), off, entry in zip(
+                found.points,
+                found.deviations(),
+                point_entries(points, instrument),
+                strict=True,
+            )
+        ],
+    }
+
+
+def _tables(found: Part, conditions: Conditions) -> tuple[ResultTable, ...]:
+    part = found.part
+    in_part = message("part.features-in-part")
+    in_camera = message("part.features-in-camera")
+    features = ResultTable(
+        in_camera if part.alignment is None else in_part,
+        (
+            *("x", "y", "z", message("part.position-uncertainty")),
+            *(message("part.size"), message("part.size-uncertainty")),
+            message("part.form"),
+            message("part.kind"),
+        ),
+        _rows(feature_rows(part)),
+    )
+    characteristics = ResultTable(
+        message("part.characteristics"),
+        (
+            message("part.nominal"),
+            message("part.tolerance"),
+            message("part.actual"),
+            message("part.deviation"),
+            message("table.uncertainty"),
+            message("part.probability"),
+            message("part.decision"),
+        ),
+        _rows(characteristic_rows(part)),
+    )
+    return tuple(each for each in (characteristics, features) if each.rows)
+
+
+def _rows(rows: Iterable[PartRow]) -> tuple[ResultRow, ...]:
+    return tuple(ResultRow(each.name, each.values, 4, each.remark) for each in rows)
+
+
+def _bands(found: Part, conditions: Conditions) -> tuple[Band, ...]:
+    return tuple(
+        Band(
+            each.planned.words,
+            each.value.value,
+            each.value.uncertainty,
+            each.lower,
+            each.upper,
+            each.planned.nominal or 0.0,
+            each.decision,
+            each.planned.features,
+            each.planned.quantity in IS_ANGLE,
+        )
+        for each in found.part.results
+    )
+
+
+def _n_points(choices: VerificationChoices, run: int) -> int:
+    planned = planned_at(choices, run)
+    return 0 if planned is None else planned.n_touches
+
+
+def _instruction(choices: VerificationChoices, progress: TaskProgress) -> Message:
+    planned = planned_at(choices, len(progress.runs))
+    if planned is None:
+        return message("part.no-plan")
+    what: Message = message("measuring.named", name=planned.name)
+    if planned.kind is not None and planned.kind.value not in planned.name.casefold():
+        what = message("part.of-kind", kind=NAMES[planned.kind], name=planned.name)
+    n_points, needed = len(progress.points), planned.n_touches
+    return message("part.instruction", what=what, n_points=n_points, needed=needed)
+
+
+def _missing(
+    choices: VerificationChoices, ball_diameter: float | None
+) -> Message | None:
+    if choices.plan is None:
+        return message("part.no-plan")
+    return missing_normal(choices.plan) if ball_diameter else None
+
+
+PART = VerificationTask(
+    kind=MEASURED_PART,
+    summary="a part by a plan",
+    run_help="probed points of a feature",
+    title=message("part.title"),
+    purpose=message("part.title"),
+    first=message("part.first"),
+    another=message("task.next-point"),
+    other_run=message("part.other-feature"),
+    known=message("session.same-place"),
+    limits=(),
+    measure=measure_by_plan,
+    check=check_feature,
+    entries=_entries,
+    tables=_tables,
+    bands=_bands,
+    judges_points=False,
+    hand=hand_goal,
+    n_points=_n_points,
+    n_runs=lambda choices: max(len(choices.features), 1),
+    instruction=_instruction,
+    newness=(ANY, NEW_PLACE),
+    missing=_missing,
+)

@@ -1,1 +1,0 @@
-"""Verification of a tip on artefacts; the state of pen and camera over time."""

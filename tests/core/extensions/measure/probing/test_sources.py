@@ -1,0 +1,218 @@
+"""Touches in the images of a run, held still, one an image, or as recorded."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.accepted_tip import Hold, Holder
+from tests.verifying import FRAME
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.reasons import Reason
+from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
+from lightpen.formats.observation_files import Centers
+from lightpen.model.limits import VerificationLimits
+from lightpen_extensions.measure.probing.drift_reference import (
+    LampImages,
+    LampObservations,
+    lamps_in,
+)
+from lightpen_extensions.measure.probing.image_locations import (
+    ImageLocation,
+    RecordedTouch,
+)
+from lightpen_extensions.measure.probing.probing import ONE_IMAGE, ProbingRules
+from lightpen_extensions.measure.probing.sources import (
+    ProbingRun,
+    lamp_drift_of,
+    observe_place,
+    require_leds_fit,
+    touches_of,
+)
+from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+)
+
+DOWN = np.array([0.0, 1.0, 0.0])
+LIMITS = VerificationLimits()
+
+
+def observed(instrument: Instrument, places: list[float | None]) -> Observations:
+    """What is seen of a tip at so many mm beside the cone; None shows no pen."""
+    holder = Holder(instrument.rig, instrument.pen)
+    pixels = [
+        np.full((instrument.pen.n_leds, 2), np.nan)
+        if place is None
+        else next(holder.still(Hold((place, 0.0, 0.0)))).pixels
+        for place in places
+    ]
+    centers = Centers(np.arange(1, len(places) + 1), np.array(pixels), Path("centers"))
+    return observe_centers(centers, instrument.camera, instrument.pen)
+
+
+def run(instrument: Instrument, places: list[float | None], **by: Any) -> ProbingRun:
+    usual = {"rules": ProbingRules(2, 1), "touches_known": None}
+    return touches_of("run", [observed(instrument, places)], instrument, **usual | by)
+
+
+def named(found: ProbingRun) -> list[tuple[str, ...]]:
+    names = sorted(name for touch in found.touches for name in touch.names)
+    assert len(names) == len({*names})
+    return [touch.names for touch in found.touches]
+
+
+def test_images_of_a_run_are_parted_by_how_the_pen_is_held(
+    instrument: Instrument,
+) -> None:
+    places = [0.0, 0.0, 0.0, None, 30.0, 30.0, 30.0, None]
+    held = run(instrument, places)
+    single = run(instrument, places, rules=ONE_IMAGE)
+    names = observed(instrument, places).names
+
+    assert named(held) == [names[1:3], names[5:7]]
+    assert named(single) == [(each,) for i, each in enumerate(names) if i not in (3, 7)]
+    for found in (held, single):
+        offs = [touch.point_cam - PAPER_CONE for touch in found.touches]
+        np.testing.assert_allclose(offs[0], 0.0, atol=0.1)
+        np.testing.assert_allclose(offs[-1], [30.0, 0.0, 0.0], atol=0.1)
+        assert [each.name for each in found.rejected] == [names[3], names[7]]
+        assert found.rejected[0].reason is not Reason.NONE
+        assert found.name == "run"
+
+
+def test_recorded_touches_have_their_images_and_approach(
+    instrument: Instrument,
+) -> None:
+    places = [0.0, 0.0, None, 5.0, 30.0, None, 30.0]
+    numbers = [2, 2, 2, 0, 1, 3, 1]
+    known = [RecordedTouch(n, DOWN if n == 2 else None) for n in numbers]
+    found = run(instrument, places, touches_known=known)
+    names = observed(instrument, places).names
+
+    assert named(found) == [names[:2], (names[4], names[6])]
+    first, second = found.touches
+    assert first.approach_cam is DOWN
+    assert second.approach_cam is None
+    assert [each.name for each in first.rejected] == [names[2]]
+    assert first.rejected[0].reason is not Reason.NONE
+    assert [each.name for each in found.rejected] == [names[5]]
+
+
+def test_a_run_without_pen_or_touch_is_refused_with_figures(
+    instrument: Instrument,
+) -> None:
+    with pytest.raises(CalibrationError) as refused:
+        run(instrument, [None] * 3)
+    assert refused.value.message.code == "verification.no-pen"
+    assert refused.value.message.values["n_images"] == 3
+    with pytest.raises(CalibrationError) as refused:
+        run(instrument, [0.0, 30.0, 60.0], rules=ProbingRules(7, 4))
+    assert refused.value.message.code == "verification.never-still"
+    said = refused.value.message.values
+    assert [said[name] for name in ("n_all", "n_settling", "n_frames")] == [11, 4, 7]
+
+
+@pytest.mark.parametrize(("rms", "fits"), [(0.99, True), (1.01, False)])
+def test_leds_do_not_fit_by_the_median_of_a_run(rms: float, fits: bool) -> None:
+    touches: list[Any] = [SimpleNamespace(rms=each) for each in (9.0, rms, 0.0)]
+    if fits:
+        require_leds_fit("run", touches)
+        return
+    with pytest.raises(CalibrationError) as refused:
+        require_leds_fit("run", touches)
+    assert refused.value.message.values["rms"] == rms
+
+
+def test_a_place_of_more_cameras_than_the_rig_has_is_refused(
+    instrument: Instrument,
+) -> None:
+    place: Any = SimpleNamespace(name="run", images=(None, None))
+    assert ImageLocation("run", (), None).masks == (None,)
+    with pytest.raises(UsageError) as refused:
+        observe_place(place, instrument)
+    said = refused.value.message.values
+    assert (said["n_given"], said["n_cameras"]) == (2, 1)
+
+
+def test_a_moment_has_the_name_of_its_first_image() -> None:
+    rig, pen = beside(paper_camera(), PAPER_CONE), paper_pen()
+    both = instrument_of_files(rig, pen, PAPER_TIP, 1e-6 * np.eye(3), 0.01)
+    held = [next(Holder(rig, pen).still(Hold((x, 0.0, 0.0)))) for x in (0.0, 30.0)]
+    views = [(each.pixels, each.others[0].pixels) for each in held]
+    seen = [
+        observe_centers(Centers(np.arange(2), np.array(own), Path("c")), camera, pen)
+        for camera, own in zip(rig.cameras, zip(*views, strict=True), strict=True)
+    ]
+    names = ("", "left 2.png"), ("right 1.png", "right 2.png")
+    found = touches_of(
+        "run",
+        [replace(each, names=own) for each, own in zip(seen, names, strict=True)],
+        both,
+        ONE_IMAGE,
+    )
+
+    assert named(found) == [("right 1.png",), ("left 2.png",)]
+
+
+def test_lamps_are_those_of_images_that_show_the_pen(instrument: Instrument) -> None:
+    seen = observed(instrument, [0.0, None, 30.0])
+    lamps = np.array([[[1.0, 2.0], [np.nan] * 2], [[5.0, 6.0]] * 2, [[3.0, 4.0]] * 2])
+    (found,) = lamps_in([replace(seen, lamps=lamps)]).cameras
+
+    assert [each.tolist() for each in found.lights] == [[[1, 2]], [[3, 4], [3, 4]]]
+    assert found.distances == (seen.translations[0, 2], seen.translations[2, 2])
+
+
+def test_each_camera_of_a_rig_has_its_own_lamps() -> None:
+    pen, rig = paper_pen(), beside(paper_camera(), PAPER_CONE)
+    holder = Holder(rig, pen)
+    both = next(holder.still(Hold()))
+    (lost,) = holder.away(1)
+    one, other = (RegionOfInterest(camera, pen) for camera in rig.cameras)
+    region = replace(one, others=(other,))
+    frame = replace(FRAME, others=(FRAME,))
+
+    def distances(
+        frame: Frame, *views: Any, region: RegionOfInterest = region
+    ) -> list[tuple[float, ...]]:
+        seen = replace(views[0], others=views[1:])
+        found = LampObservations().with_frame(frame, seen, region)
+        assert all(len(each.lights) == len(each.distances) for each in found.cameras)
+        assert all(not light.size for each in found.cameras for light in each.lights)
+        return [each.distances for each in found.cameras]
+
+    near, far = both.translation[2], both.others[0].translation[2]
+    assert distances(frame, both, both.others[0]) == [(near,), (far,)]
+    assert distances(frame, both, lost) == [(near,), ()]
+    assert distances(frame, lost, both.others[0]) == [(), (far,)]
+    assert distances(FRAME, both) == [(near,), ()]
+    assert distances(FRAME, both, region=one) == [(near,)]
+
+
+def test_lamps_of_runs_are_taken_in_the_order_of_time(instrument: Instrument) -> None:
+    def shown(n: int, x: float) -> ProbingRun:
+        lights: tuple[FloatArray, ...] = (np.array([[x, 100.0]]),) * n
+        images = LampImages(lights, (1000.0,) * n)
+        return ProbingRun("", (), (), LampObservations((images,)))
+
+    scale = 1000.0 / instrument.camera.fx
+    runs = shown(16, 300.0), shown(8, 310.0)
+    there = lamp_drift_of(runs, instrument, LIMITS)
+    back = lamp_drift_of(runs[::-1], instrument, LIMITS)
+
+    assert there is not None
+    assert back is not None
+    np.testing.assert_allclose(there.moves[:, 0], scale * np.array([0, 0, 10.0]))
+    np.testing.assert_allclose(back.moves[:, 0], scale * np.array([0, -10.0, -10.0]))
+    assert lamp_drift_of((), instrument, LIMITS) is None
