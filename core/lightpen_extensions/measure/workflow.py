@@ -263,6 +263,7 @@ class VerificationWorkflow:
         self._task.drop()
         self._give_up()
         self._write()
+        self._keeping.release()
 
     # Images
 

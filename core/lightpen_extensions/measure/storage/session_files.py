@@ -244,6 +244,12 @@ class SessionKeeping:
             self.images.release()
         self._files, self.images = [], SessionRecord(self._begin)
 
+    def release(self) -> None:
+        """Close the images of sessions whose records could not be written."""
+        for kept, _ in self._waiting:
+            if kept.ends is not None:
+                kept.ends.release()
+
     def write(self) -> None:
         """Write pending records; what cannot be written stays pending."""
         while self._waiting:
