@@ -98,11 +98,6 @@ class BoardFit:
         """Return the indices of the intrinsics of a camera."""
         return intrinsics_at(self.state.cameras)[camera]
 
-    def prior_of(self, camera: int) -> FloatArray:
-        """Return the prior information of a camera's intrinsics, (4 + n, 4 + n)."""
-        at = self.of_intrinsics(camera)
-        return self.prior[at, at]
-
     @property
     def of_places(self) -> slice:
         """Indices of the extrinsics of all cameras but the first."""

@@ -117,11 +117,6 @@ class SessionRecord:
         return resumed
 
     @property
-    def has_images(self) -> bool:
-        """Whether an image is kept."""
-        return self._folder is not None
-
-    @property
     def journal(self) -> list[dict[str, str]]:
         """Folder and hash of the journal, for a record; empty without one."""
         if self._folder is None:
