@@ -104,7 +104,7 @@ _FIELD_ENTRIES = (
     *("amplitude", "correlation_length", "columns", "rows", "values", "covariance"),
     *_COVARIANCE,
 )
-_MODELS = {"plumb_bob", "rational_polynomial", "radtan", "none"}
+_MODELS = {"plumb_bob", "rational_polynomial", "radtan", "radial_tangential", "none"}
 _FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4"}
 _MONTHS = [
     *("Jan", "Feb", "Mar", "Apr", "May", "Jun"),

@@ -34,6 +34,7 @@ _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")  # xlsx and od
 _ROM = b"NDI\x00"
 _FOREIGN = (  # how files begin that cannot be read
     (rb"\s*<", "XML (Motive, Vicon)"),
+    (rb"ply\r?\n", "PLY (point cloud)"),
     (rb"\s*Format Version,", "Motive (CSV)"),
     (rb"\s*\[\w+\]\s*\n\s*\w+\s*=", "INI (Atracsys)"),
 )

@@ -308,6 +308,9 @@ def test_a_realsense_without_distortion_is_read_whatever_its_model(
         ({"v2 brown": {"projection_type": "brown", "focal_x": 0.7}}, "OpenSfM"),
         ({"boardName": "OAK-D", "cameraData": []}, "DepthAI (OAK-D)"),
         ("#polynomial coefficients for the DIRECT mapping function\n\n5 -46", "OCam"),
+        ("Dimensions = 9 9\nModel = CAHVOR = perspective, distortion\n", "CAHVOR"),
+        ("Pix4D camera calibration file 0\n#Focal\nF 16.0\n", "Pix4D"),
+        ("[LEFT_CAM_2K]\nfx=1400\nfy=1400\n", "ZED"),
         ("<document version='1.2.0'>\n<chunk label='a'></chunk></document>", "project"),
         (CAMODOCAL.replace("PINHOLE", "MEI"), '"MEI"'),
         (f"image_width: 9\nimage_height: 9\nxi: 1.2\nK: {MATRIX}\n", "omnidirect"),
@@ -413,6 +416,14 @@ def test_binning_and_region_of_ros_are_applied(tmp_path: Path) -> None:
 
     assert found.image_size == (800, 600)
     np.testing.assert_allclose(found.project(point), centre, atol=1e-6)
+
+
+def test_the_distortion_of_euroc_is_that_of_radtan(tmp_path: Path) -> None:
+    renamed = ros().replace("plumb_bob", "radial-tangential")
+
+    found, expected = read(tmp_path, renamed), read(tmp_path, ros())
+
+    np.testing.assert_array_equal(found.intrinsics, expected.intrinsics)
 
 
 def test_a_file_is_written_for_binned_and_cropped_images(tmp_path: Path) -> None:

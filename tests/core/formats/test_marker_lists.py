@@ -264,6 +264,7 @@ def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
         ("<?xml version='1.0'?>\n<RigidBodies><Marker X='1'/></RigidBodies>", "XML"),
         ("Format Version,1.23,Length Units,Millimeters\n\n,,Marker\n", "Motive"),
         ("[geometry]\ncount=4\nid=5\n[fiducial0]\nx=1\n", "Atracsys"),
+        ("ply\nformat ascii 1.0\nelement vertex 4\n", "PLY"),
     ],
 )
 def test_lists_that_cannot_be_read_are_named(
