@@ -179,7 +179,8 @@ def _check(board: Board, text: str) -> None:
         cv2.aruco, board.dictionary
     ):
         raise UsageError("board.dictionary", text=text)
-    known, needed = len(marker_dictionary(board).bytesList), _n_markers(board)
+    known = len(marker_dictionary(board).bytesList)
+    needed = board.columns * board.rows // 2
     if needed > known:
         raise UsageError(
             "board.markers",
@@ -188,10 +189,6 @@ def _check(board: Board, text: str) -> None:
             dictionary=board.dictionary,
             known=known,
         )
-
-
-def _n_markers(board: Board) -> int:
-    return board.columns * board.rows // 2
 
 
 def _no_board(text: str) -> UsageError:

@@ -252,7 +252,7 @@ def change_error(change: CameraChange, names: tuple[str, ...]) -> CalibrationErr
             cx=camera.cx,
             cy=camera.cy,
             n_views=int(which.sum()),
-            names=listed_names(_named(names, which)),
+            names=_listed(names, which),
         )
         for which, camera in zip(
             (~change.is_second, change.is_second), change.settings, strict=True
@@ -263,11 +263,10 @@ def change_error(change: CameraChange, names: tuple[str, ...]) -> CalibrationErr
 
 def rotated_message(names: tuple[str, ...], which: BoolArray) -> Message:
     """Return the message on images that are rotated by 180 degrees."""
-    named = _named(names, which)
     return message(
         "intrinsics.turned",
-        names=listed_names(named),
-        n_named=len(named),
+        names=_listed(names, which),
+        n_named=int(which.sum()),
         n_views=len(names),
     )
 
@@ -277,7 +276,7 @@ def message_on_change(change: CameraChange, names: tuple[str, ...]) -> Message:
     fx, _, cx, cy, *_ = change.difference.tolist()
     return message(
         "intrinsics.apart",
-        names=listed_names(_named(names, change.fewer)),
+        names=_listed(names, change.fewer),
         n_named=int(change.fewer.sum()),
         n_views=len(names),
         px=change.in_image,
@@ -299,5 +298,5 @@ def changed_camera(camera: Camera, change: CameraChange) -> Camera:
     return replace(camera, covariance=covariance, lens_field=field)
 
 
-def _named(names: tuple[str, ...], which: BoolArray) -> tuple[str, ...]:
-    return tuple(name for name, own in zip(names, which, strict=True) if own)
+def _listed(names: tuple[str, ...], which: BoolArray) -> str:
+    return listed_names(tuple(np.array(names)[which].tolist()))

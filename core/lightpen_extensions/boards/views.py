@@ -44,10 +44,8 @@ class Views:
 
     def chosen(self, which: BoolArray) -> "Views":
         """Return some of the views."""
-        names = tuple(
-            name for name, keep in zip(self.names, which, strict=True) if keep
-        )
-        return Views(self.board, names, self.pixels[which], self.image_sizes)
+        names = np.array(self.names)[which].tolist()
+        return Views(self.board, tuple(names), self.pixels[which], self.image_sizes)
 
     def of_camera(self, camera: int) -> "Views":
         """Return the views in which one camera saw the board."""
@@ -73,10 +71,7 @@ def without_duplicates(views: Views) -> tuple[Views, tuple[str, ...]]:
             kept.append(v)
     which = np.zeros(views.n_views, dtype=np.bool_)
     which[kept] = True
-    others = tuple(
-        name for name, keep in zip(views.names, which, strict=True) if not keep
-    )
-    return views.chosen(which), others
+    return views.chosen(which), tuple(np.array(views.names)[~which].tolist())
 
 
 def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
