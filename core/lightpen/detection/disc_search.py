@@ -15,8 +15,15 @@ import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from lightpen.arrays import FloatArray, Image
-from lightpen.detection.disc_moments import Disc, Starts, with_rims
+from lightpen.arrays import BoolArray, FloatArray, Image
+from lightpen.detection.disc_moments import (
+    NO_DISCS,
+    Discs,
+    Starts,
+    joined,
+    rows_of,
+    with_rims,
+)
 from lightpen.detection.disc_stack import measure_discs
 from lightpen.detection.pixel_box import PixelBox, bounding_box
 from lightpen.model.quantiles import normal_quantile
@@ -93,7 +100,8 @@ def survey(image: Image, mask: FloatArray | None, stride: int) -> Survey:
 def _quantile(values: MatLike, share: float) -> int:
     """Return the quantile of values for a share."""
     rank = int(share * values.size)
-    return int(np.partition(values, rank, axis=None)[rank])
+    # On bytes this is ten times as fast as what numpy has.
+    return int(cv2.sort(values.reshape(1, -1), cv2.SORT_EVERY_ROW)[0, rank])
 
 
 def flattened(image: Image, full_scale: int) -> Image:
@@ -127,8 +135,8 @@ def _thinned(image: Image, stride: int) -> MatLike:
 
 
 def find_discs(
-    scene: Survey, budget: Iterator[int], before: Starts = list
-) -> list[Disc]:
+    scene: Survey, budget: Iterator[int], before: Starts | None = None
+) -> Discs:
     """Return whatever may be an LED, each once."""
     rise = scene.peak - scene.background
     level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
@@ -138,21 +146,37 @@ def find_discs(
         boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
 
     measured, hidden = _measured(scene, boxes, level, 0.0, budget)
-    unclear: list[tuple[PixelBox, Disc | None]] = [(box, None) for box in hidden]
     measured = with_rims(scene.image, measured, before)
-    discs = [disc for disc in measured if disc.is_whole]
-    unclear += [(disc.box, disc) for disc in measured if not disc.is_whole]
-    for box, region in unclear:
-        discs += _parted(scene, box, level, region, budget)
-    return _unique(discs) if unclear or len(discs) != len(boxes) else discs
+    if len(measured.boxes) == len(boxes) and measured.are_whole.all() and not hidden:
+        return measured
+    discs = [rows_of(measured, measured.are_whole)]
+    for box in hidden:
+        discs += _parted(scene, box, level, None, budget)
+    for region in _each(measured, ~measured.are_whole):
+        discs += _parted(scene, _box(region), level, region, budget)
+    return _unique(joined(discs))
+
+
+def _each(discs: Discs, chosen: BoolArray) -> list[Discs]:
+    """Return some discs, each by itself."""
+    return [rows_of(discs, [i]) for i in np.flatnonzero(chosen).tolist()]
+
+
+def _box(disc: Discs) -> PixelBox:
+    """Return the box of one disc."""
+    return PixelBox(*disc.boxes[0].tolist())
 
 
 def _parted(
-    scene: Survey, box: PixelBox, level: float, disc: Disc | None, budget: Iterator[int]
-) -> list[Disc]:
+    scene: Survey,
+    box: PixelBox,
+    level: float,
+    disc: Discs | None,
+    budget: Iterator[int],
+) -> list[Discs]:
     """Return the discs that a region parts into at higher levels, or itself."""
     if disc is not None:
-        level = max(level, disc.cut_level)
+        level = max(level, float(disc.cut_levels[0]))
     parts: list[PixelBox] = []
     for _ in range(MAX_LEVELS_AT_ONCE):
         if next(budget, None) is None:
@@ -161,28 +185,30 @@ def _parted(
         parts = _regions(scene, box, level)
         if len(parts) != 1 or not parts[0].is_close_to(box):
             break
-    blocks: list[Disc] = []
+    blocks: list[Discs] = []
     found, hidden = _measured(scene, parts, level, level, budget)
     for part in hidden:
         blocks += _parted(scene, part, level, None, budget)
-    for block in with_rims(scene.image, found):
-        if block.is_whole:
+    found = with_rims(scene.image, found)
+    for block in _each(found, np.ones(len(found.boxes), dtype=bool)):
+        if block.are_whole[0]:
             blocks.append(block)
         else:
-            blocks += _parted(scene, block.box, level, block, budget)
-    is_parted = len(blocks) > 1 or any(block.is_whole for block in blocks)
+            blocks += _parted(scene, _box(block), level, block, budget)
+    is_parted = len(blocks) > 1 or any(block.are_whole[0] for block in blocks)
     if disc is None or is_parted or not _resembles_disc(disc):
         return blocks
     return [disc]
 
 
-def _unique(discs: list[Disc]) -> list[Disc]:
+def _unique(discs: Discs) -> Discs:
     """Drop duplicates and spots inside a larger disc."""
-    kept: list[Disc] = []
-    for disc in sorted(discs, key=lambda disc: disc.moments.area, reverse=True):
-        if not any(larger.box.holds_center_of(disc.box) for larger in kept):
-            kept.append(disc)
-    return kept
+    kept: list[int] = []
+    boxes = [PixelBox(*box) for box in discs.boxes.tolist()]
+    for i in np.argsort(-discs.moments.area, kind="stable").tolist():
+        if not any(boxes[larger].holds_center_of(boxes[i]) for larger in kept):
+            kept.append(i)
+    return rows_of(discs, kept)
 
 
 def _regions(scene: Survey, box: PixelBox, level: float) -> list[PixelBox]:
@@ -229,7 +255,7 @@ def _measured(
     level: float,
     floor: float,
     budget: Iterator[int],
-) -> tuple[list[Disc], list[PixelBox]]:
+) -> tuple[Discs, list[PixelBox]]:
     """Return the discs in boxes, and the boxes that are too large or hide some.
 
     Further regions that coarse sampling merged are measured too.
@@ -237,29 +263,29 @@ def _measured(
     largest = max(MAX_DIAMETER * min(scene.image.shape), FINE_SIZE)
     hidden = [box for box in boxes if box.size > largest]
     boxes = [box for box in boxes if box.size <= largest]
-    found, seen = [], set(boxes)
+    found, seen = [NO_DISCS], set(boxes)
     while boxes := [box for box, _ in zip(boxes, budget, strict=False)]:
-        discs = measure_discs(scene.image, boxes, level, scene.noise, floor)
-        more = []
-        for box, disc in zip(boxes, discs, strict=True):
-            if disc is not None:
-                seen.add(disc.box)
-                more += [each for each in disc.others if each.size < box.size]
-                height = disc.levels.plateau - scene.background
-                # Less contrast is the texture of something bright.
-                if disc.levels.contrast > MIN_RELATIVE_CONTRAST * height:
-                    found.append(disc)
-                    continue
-            if scene.hides_light(box, level):
-                hidden.append(box)
+        discs, at, others = measure_discs(scene.image, boxes, level, scene.noise, floor)
+        seen |= {PixelBox(*box) for box in discs.boxes.tolist()}
+        # Less contrast is the texture of something bright.
+        heights = discs.levels.plateau - scene.background
+        are_discs = discs.levels.contrast > MIN_RELATIVE_CONTRAST * heights
+        found.append(discs if are_discs.all() else rows_of(discs, are_discs))
+        clear = set(at[are_discs].tolist())
+        hidden += [
+            box
+            for i, box in enumerate(boxes)
+            if i not in clear and scene.hides_light(box, level)
+        ]
         # Two regions that each lead to the other would loop for ever.
+        more = [other for i, other in others if other.size < boxes[i].size]
         boxes = [box for box in dict.fromkeys(more) if box not in seen]
         seen |= set(boxes)
-    return found, hidden
+    return joined(found[1:] or found), hidden
 
 
-def _resembles_disc(disc: Disc) -> bool:
+def _resembles_disc(disc: Discs) -> bool:
     """Return whether a region may be a cut or merged LED."""
     major, minor = disc.moments.axes
-    is_round = disc.moments.roundness > MIN_ROUNDNESS
-    return bool(is_round and major < MAX_AXIS_RATIO * minor)
+    is_round = disc.moments.roundness[0] > MIN_ROUNDNESS
+    return bool(is_round and major[0] < MAX_AXIS_RATIO * minor[0])

@@ -2,23 +2,27 @@
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from cv2.typing import MatLike
 
-from lightpen.arrays import FloatArray, Image
+from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.detection.disc_moments import (
-    BESIDE,
+    HIGH,
+    LOW,
     MIN_SIZE,
-    Disc,
+    Discs,
     Levels,
     assessed,
+    joined,
+    moments_by_sums,
     rim_start,
-    window_levels,
+    rows_of,
 )
+from lightpen.detection.edge_fit import EdgeStarts
 from lightpen.detection.pixel_box import PixelBox, Reals, stacked
-from lightpen.detection.region_moments import HIGH, LOW, DiscMoments, moments_by_sums
 
 LOW_SIGMAS = 3.5  # the noise of the background stays below `low`
 MAX_LOW = 0.3
@@ -26,10 +30,23 @@ MAX_FLOOR = 0.85  # higher, the noise of the plateau makes the outline
 MIN_RAMP = 0.2  # least high - low, fraction of the contrast
 MIN_SIGMAS = 6.0  # least contrast in terms of the noise
 HOLE = 1.05  # times the light of a ring, with its middle filled; noise has less
+FULL = 254.5  # of 255, the plateau
 FULLY = 250  # of 255, the crest of a ring
 WIDE_EDGE = 4.5  # px; sharp discs have 2 to 3
 MARGIN = 5  # px around a box: the foot of the rim and some background
 ALIKE = 2  # times the smallest of a stack, at most, is its largest box
+GROWTH = np.array([-1, -1, 1, 1])  # of left, top, right and bottom
+NOTHING = np.zeros((0, 1, 2), np.int32)  # contour of no region
+SHARES = np.arange(8) / 8  # of a side: a hole of a ring is wider
+SAMPLES = 16  # per side of a window, to find background and plateau
+
+
+class Measured(NamedTuple):
+    """Discs in boxes."""
+
+    discs: Discs
+    box: IntArray  # (N,), which box each disc is in
+    others: list[tuple[int, PixelBox]]  # further regions in boxes, after the box
 
 
 def measure_discs(
@@ -38,8 +55,8 @@ def measure_discs(
     level: float,
     noise: float,
     floor: float = 0.0,
-) -> list[Disc | None]:
-    """Return the discs in boxes; None if nothing there is large and bright enough.
+) -> Measured:
+    """Return the discs in boxes where something is large and bright enough.
 
     Parameters
     ----------
@@ -56,185 +73,230 @@ def measure_discs(
         The intensity above which the regions are apart from their neighbours, digital
         numbers; zero for regions that stand alone.
     """
-    found: list[Disc | None] = [None] * len(boxes)
-    for stack in _alike(boxes):
-        own = [boxes[i] for i in stack]
-        discs = _measured(image, own, 10, level, noise, floor)
-        wide = [k for k, disc in enumerate(discs) if disc and disc.leaves_window]
-        if wide:
-            regions = [disc.box for disc in discs if disc and disc.leaves_window]
+    every = np.array(boxes)
+    parts = []
+    for stack in _alike(every):
+        found = _measured(image, every[stack], 10, level, noise, floor)
+        wide = found.discs.leave_window
+        if wide.any():
+            whole, left = found.box[~wide], found.box[wide]
+            regions = found.discs.boxes[wide]
             again = _measured(image, regions, 4, level, noise, floor)
-            for k, disc in zip(wide, again, strict=True):
-                discs[k] = disc
-        for i, disc in zip(stack, discs, strict=True):
-            found[i] = disc
-    return found
+            others = [other for other in found.others if other[0] in whole]
+            kept = Measured(rows_of(found.discs, ~wide), whole, others)
+            found = _joined([kept, _of_boxes(again, left)])
+        parts.append(_of_boxes(found, stack))
+    return _joined(parts)
 
 
-def _alike(boxes: Sequence[PixelBox]) -> Iterator[list[int]]:
-    """Yield the indices of boxes of like sizes."""
-    left = sorted(range(len(boxes)), key=lambda i: boxes[i].size)
-    while left:
-        largest = ALIKE * boxes[left[0]].size
-        n = sum(boxes[i].size <= largest for i in left)
-        yield left[:n]
-        left = left[n:]
+def _of_boxes(found: Measured, boxes: IntArray) -> Measured:
+    """Return discs in some of more boxes."""
+    others = [(int(boxes[i]), other) for i, other in found.others]
+    return Measured(found.discs, boxes[found.box], others)
+
+
+def _joined(parts: Sequence[Measured]) -> Measured:
+    if len(parts) == 1:
+        return parts[0]
+    others = [other for part in parts for other in part.others]
+    discs, box = (
+        joined([part.discs for part in parts]),
+        np.concatenate([part.box for part in parts]),
+    )
+    return Measured(discs, box, others)
+
+
+def _alike(boxes: IntArray) -> Iterator[IntArray]:
+    """Yield the indices of boxes (N, 4) of like sizes."""
+    sizes = np.maximum(*_sides(boxes))
+    order = np.argsort(sizes, kind="stable")
+    while len(order):
+        n = int((sizes[order] <= ALIKE * sizes[order[0]]).sum())
+        yield order[:n]
+        order = order[n:]
 
 
 def _measured(
-    image: Image,
-    boxes: Sequence[PixelBox],
-    margin: int,
-    level: float,
-    noise: float,
-    floor: float,
-) -> list[Disc | None]:
+    image: Image, boxes: IntArray, margin: int, level: float, noise: float, floor: float
+) -> Measured:
     """Measure the discs in boxes grown by a share of their size, one over a number."""
-    frames = [box.grown(MARGIN + box.size // margin, image.shape) for box in boxes]
-    windows = [frame.of(image) for frame in frames]
-    light = stacked(windows)
-    levels = np.array([window_levels(window, level) for window in windows])
-    background, plateau = levels[:, 0], levels[:, 1]
-    contrast = np.maximum(plateau - background, 1)
+    sizes = np.maximum(*_sides(boxes))
+    height, width = image.shape
+    frames = boxes + (MARGIN + sizes // margin)[:, None] * GROWTH
+    frames = np.minimum(np.maximum(frames, 0), [width, height, width, height])
+    light = stacked(image, frames)
+    levels = _levels(light, frames, level)
+    background, contrast = levels.background, levels.contrast
     foot = np.minimum(np.maximum(LOW_SIGMAS * noise / contrast, LOW), MAX_LOW)
     low = np.rint(np.maximum(background + foot * contrast, floor))
     high = np.maximum(background + HIGH * contrast, low + MIN_RAMP * contrast)
-    scaled = light - _of_each(low)
-    scaled *= _of_each(255 / (high - low))
-    np.maximum(scaled, 0, out=scaled)
-    flat = cv2.convertScaleAbs(scaled.reshape(-1, light.shape[2]))
-    soft = np.asarray(flat, np.uint8).reshape(light.shape)
-    regions = _regions(soft, frames, boxes)
-    inner = np.asarray(cv2.erode(flat, BESIDE)).reshape(soft.shape) == 255
-    are_rings = np.zeros(len(boxes), dtype=bool)
-    for k, (region, _, _) in regions.items():
-        middle = region.grown(-region.size // 4, image.shape)
-        middle = middle.moved(-frames[k].left, -frames[k].top)
-        if middle.of(soft[k]).min(initial=255) < FULLY:
-            are_rings[k] = _fill(soft[k])
-    inner[are_rings] = False  # shows no shading
-    layers = np.empty((4, *soft.shape), np.float32)
-    layers[0], layers[1] = soft, inner
-    np.multiply(light, layers[1], out=layers[2])
+    layers = np.empty((4, *light.shape), np.float32)
+    soft, inner, weighted, lit = layers
+    np.subtract(light, _of_each(low), out=soft)
+    soft *= _of_each(255 / (high - low))
+    np.maximum(soft, 0, out=soft)
+    np.minimum(soft, 255, out=soft)
+    regions, contours, others = _regions(soft, frames, boxes)
+    inner[...] = _inside(soft > FULL)
+    rings = _filled(soft, regions - frames[:, [0, 1, 0, 1]])
+    inner[rings] = 0  # a ring shows no shading
+    np.multiply(light, inner, out=weighted)
     light -= _of_each(background)
-    np.minimum(layers[0], 1, out=layers[3])
-    layers[3] *= light
-    sums, inside, weighted, lit = _sums(layers)
-    squares = np.einsum("nyx,nyx->n", layers[0], layers[0])
-    ends, ramp = np.array(frames).T, (high - low) / contrast
+    np.minimum(soft, 1, out=lit)
+    lit *= light
+    rows = soft.reshape(len(boxes), 1, -1)
+    squares = (rows @ rows.transpose(0, 2, 1)).ravel()
+    sums, ramps = _sums(layers), (high - low) / contrast
+    x, y = frames[:, 0] + light.shape[2] // 2, frames[:, 1] + light.shape[1] // 2
     moments, are_whole, are_even, are_balanced = assessed(
-        moments_by_sums(sums, squares, ends[0], ends[1], ramp),
-        *(inside, weighted, lit, PixelBox(*ends), Levels(*levels.T), noise / contrast),
+        moments_by_sums(sums[:, :, 0], squares, x, y, ramps),
+        *(sums[:, :, 1:], x, y, levels, noise / contrast),
     )
-    enough = moments.are_enough & (plateau - background >= MIN_SIGMAS * noise)
-    enough &= floor <= background + MAX_FLOOR * contrast
+    are_enough = moments.are_enough & (contrast >= MIN_SIGMAS * noise)
+    are_enough &= floor <= background + MAX_FLOOR * contrast
     are_even &= are_whole
     # The outline of a ring that is as bright all round needs no fit of its rim.
-    are_clear = (are_even & (moments.edge_width < WIDE_EDGE)) | (
-        are_rings & are_whole & are_balanced
+    are_clear = are_even & (moments.edge_width < WIDE_EDGE)
+    are_clear[rings] |= are_whole[rings] & are_balanced[rings]
+    reached, ends = regions == frames, frames == [0, 0, width, height]
+    leave = reached.any(axis=1)
+    rims = np.full((len(boxes), 5), np.nan)
+    for k in np.flatnonzero(are_enough & ~are_clear & ~leave).tolist():
+        rims[k] = rim_start(contours[k])
+    rims[:, 1] -= np.arange(len(boxes)) * light.shape[1]
+    nothing = np.full(len(boxes), np.nan)
+    discs = Discs(
+        *(moments, levels, low, regions),
+        *(are_whole & ~leave, are_even & ~leave),
+        leave_image=(reached & ends).any(axis=1),
+        leave_window=(reached & ~ends).any(axis=1),
+        rims=EdgeStarts(
+            rims[:, :2] + frames[:, :2],
+            rims[:, [2, 3, 3, 4]].reshape(-1, 2, 2),
+            *(nothing, np.zeros((len(boxes), 2))),
+        ),
     )
-    found: list[Disc | None] = [None] * len(boxes)
-    columns = (np.stack(moments, axis=1), levels, low, are_whole, are_even, are_clear)
-    of_each = zip(*(column.tolist() for column in columns), strict=True)
-    for k, (row, of_window, cut, is_whole, is_even, is_clear) in enumerate(of_each):
-        if not enough[k]:
-            continue
-        region, contour, others = regions[k]
-        sides = zip(region, frames[k], (0, 0, *image.shape[::-1]), strict=True)
-        reached = [there == end for here, there, end in sides if here == there]
-        needs_rim = not is_clear and not reached
-        corner = frames[k].left, frames[k].top - k * light.shape[1]
-        found[k] = Disc(
-            *(DiscMoments(*row), Levels(*of_window), cut, region),
-            is_whole=is_whole and not reached,
-            is_even=is_even and not reached,
-            leaves_image=any(reached),
-            leaves_window=not all(reached),
-            others=others,
-            rim=rim_start(contour, corner) if needs_rim else None,
-        )
-    return found
+    box = np.flatnonzero(are_enough)
+    if len(box) < len(boxes):
+        discs = rows_of(discs, box)
+        others = [other for other in others if are_enough[other[0]]]
+    return Measured(discs, box, others)
+
+
+def _levels(light: Reals, frames: IntArray, level: float) -> Levels:
+    """Return the medians of two classes of pixels of each window."""
+    sizes = frames[:, 3:1:-1] - frames[:, 1::-1]
+    step = max(1, int(sizes.min()) // SAMPLES)
+    samples = light[:, ::step, ::step].copy()
+    down, right = (step * np.arange(n) for n in samples.shape[1:])
+    beyond = (down >= sizes[:, :1])[:, :, None] | (right >= sizes[:, 1:])[:, None]
+    samples[beyond] = np.inf
+    samples = np.sort(samples.reshape(len(frames), -1)).astype(np.float64)
+    n, each = (sizes // -step).prod(axis=1), np.arange(len(frames))
+    split: IntArray | FloatArray = np.full(len(frames), int(level))
+    for _ in range(2):
+        n_dark = (samples <= split[:, None]).sum(axis=1)
+        background = samples[each, n_dark // 2]
+        plateau = samples[each, np.minimum((n_dark + n) // 2, n - 1)]
+        split = (background + plateau) // 2
+    top = samples[each, np.minimum((n_dark + 9 * n) // 10, n - 1)]
+    return Levels(background, np.maximum(plateau, background + 1), top)
+
+
+def _inside(bright: BoolArray) -> BoolArray:
+    """Return the pixels of windows (N, H, W) without those beside others."""
+    width = bright.shape[2]
+    flat, inside = bright.ravel(), np.zeros(bright.size, dtype=bool)
+    along = flat[:-2] & flat[1:-1] & flat[2:]
+    inside[width + 1 : -width - 1] = (
+        along[: -2 * width] & along[width:-width] & along[2 * width :]
+    )
+    return inside.reshape(bright.shape)
 
 
 def _regions(
-    soft: Image, frames: Sequence[PixelBox], boxes: Sequence[PixelBox]
-) -> dict[int, tuple[PixelBox, MatLike, tuple[PixelBox, ...]]]:
+    soft: Reals, frames: IntArray, boxes: IntArray
+) -> tuple[IntArray, list[MatLike], list[tuple[int, PixelBox]]]:
     """Return the regions that boxes were drawn around, with contours in the stack.
 
-    Others vanish from ``soft``, and are the third if they are in the box.
+    Others vanish from ``soft``; the third are those in a box, after its index.
     """
     height, width = soft.shape[1:]
+    bright = (soft > 0).view(np.uint8).reshape(-1, width)
+    contours, _ = cv2.findContours(bright, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    regions, others = frames.copy(), []
+    outlines: list[MatLike] = [NOTHING] * len(boxes)
     found: dict[int, list[tuple[PixelBox, MatLike]]] = {}
-    contours, _ = cv2.findContours(
-        soft.reshape(-1, width), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
-    )
+    corners = frames.tolist()
     for contour in contours:
         x, y, right, down = cv2.boundingRect(contour)
         k, y = divmod(y, height)
-        x, y = x + frames[k].left, y + frames[k].top
+        x, y = x + corners[k][0], y + corners[k][1]
         region = PixelBox(x, y, x + right, y + down)
         found.setdefault(k, []).append((region, contour))
-    regions = {}
     for k, here in found.items():
         if len(here) > 1:
-            here.sort(key=lambda region: -region[0].overlap(boxes[k]))
-            alone: Image = np.zeros_like(soft[k])
+            box = PixelBox(*boxes[k].tolist())
+            here.sort(key=lambda region: -region[0].overlap(box))
+            alone = np.zeros(soft[k].shape, np.uint8)
             at = (0, -k * height)
-            cv2.drawContours(alone, [here[0][1]], 0, 255, cv2.FILLED, offset=at)
-            soft[k] &= alone
-        boxed = (other for other, _ in here[1:] if boxes[k].holds_center_of(other))
-        others = tuple(other for other in boxed if other.size >= MIN_SIZE)
-        regions[k] = (*here[0], others)
-    return regions
+            cv2.drawContours(alone, [here[0][1]], 0, 1, cv2.FILLED, offset=at)
+            soft[k] *= alone
+            others += [
+                (k, other)
+                for other, _ in here[1:]
+                if box.holds_center_of(other) and other.size >= MIN_SIZE
+            ]
+        regions[k], outlines[k] = here[0]
+    return regions, outlines, others
 
 
-def _fill(soft: Image) -> bool:
+def _filled(soft: Reals, regions: IntArray) -> list[int]:
+    """Fill the dark middles of rings; return the windows with one."""
+    # Half of a region's box, at places that a dark middle is not between.
+    sides = np.stack(_sides(regions), axis=1)
+    insets = sides.max(axis=1, keepdims=True) // 4
+    spans = sides - 2 * insets
+    first = np.minimum(regions[:, :2] + insets, regions[:, 2:] - 1)[..., None]
+    there = first + (np.maximum(spans, 0)[..., None] * SHARES).astype(np.intp)
+    columns, rows = there[:, 0], there[:, 1]
+    each = np.arange(len(soft))[:, None, None]
+    middles = soft[each, rows[:, :, None], columns[:, None]]
+    are_dark = (middles.min(axis=(1, 2)) < FULLY) & (spans.min(axis=1) > 0)
+    return [k for k in np.flatnonzero(are_dark).tolist() if _is_filled(soft[k])]
+
+
+def _is_filled(soft: Reals) -> bool:
     """Fill the dark middle of a ring in a window; return whether there was one."""
-    _, crest = cv2.threshold(soft, FULLY, 255, cv2.THRESH_BINARY)
+    crest = (soft > FULLY).view(np.uint8)
     contours, _ = cv2.findContours(crest, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     cv2.drawContours(crest, contours, -1, 255, cv2.FILLED)
-    filled = cv2.max(soft, crest)
+    filled = np.maximum(soft, crest)
     if filled.sum() < HOLE * soft.sum():
         return False
-    soft[:] = filled
+    soft[...] = filled
     return True
+
+
+def _sides(boxes: IntArray) -> tuple[IntArray, IntArray]:
+    """Return widths and heights of boxes (N, 4)."""
+    return boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
 
 
 def _of_each(values: FloatArray) -> Reals:
     return values.astype(np.float32)[:, None, None]
 
 
-def _sums(layers: Reals) -> list[dict[str, FloatArray]]:
-    """Return the sums over windows (4, N, H, W), (N,); of the first central moments."""
+def _sums(layers: Reals) -> FloatArray:
+    """Return sums over layers (K, N, H, W) by powers of y and x, (4, 4, K, N)."""
     height, width = layers.shape[2:]
-    middle = width // 2  # from where powers stay small
-    rows = (layers.reshape(-1, width) @ _powers(width, middle)).reshape(-1, height, 4)
-    m = (_powers(height, middle).T @ rows).astype(np.float64)
-    # Places are the power of y, and of x.
-    m = m.reshape(*layers.shape[:2], 4, 4).transpose(2, 3, 0, 1)
-    m00 = np.maximum(m[0, 0], 1.0)
-    m10, m01 = m[0, 1] + middle * m00, m[1, 0] + middle * m00
-    sums = [
-        {"m00": area, "m10": along_x, "m01": along_y}
-        for area, along_x, along_y in zip(m00, m10, m01, strict=True)
-    ]
-    m, area = m[:, :, 0], m00[0]
-    u, v = m[0, 1] / area, m[1, 0] / area
-    m20, m11, m02 = m[0, 2], m[1, 1], m[2, 0]
-    sums[0] |= {
-        "mu20": m20 - u * u * area,
-        "mu11": m11 - u * v * area,
-        "mu02": m02 - v * v * area,
-        "mu30": m[0, 3] - 3 * u * m20 + 2 * u * u * u * area,
-        "mu21": m[1, 2] - 2 * u * m11 - v * m20 + 2 * u * u * v * area,
-        "mu12": m[2, 1] - 2 * v * m11 - u * m02 + 2 * v * v * u * area,
-        "mu03": m[3, 0] - 3 * v * m02 + 2 * v * v * v * area,
-    }
-    return sums
+    rows = layers.reshape(-1, width) @ _powers(width)
+    sums = _powers(height).T @ rows.reshape(-1, height, 4)
+    return sums.transpose(1, 2, 0).reshape(4, 4, *layers.shape[:2]).astype(np.float64)
 
 
 @lru_cache(maxsize=64)
-def _powers(n: int, middle: int) -> Reals:
+def _powers(n: int) -> Reals:
     """Return the powers of n places from the middle, (n, 4)."""
-    places = (np.arange(n)[:, None] - middle) ** np.arange(4)
+    places = (np.arange(n)[:, None] - n // 2) ** np.arange(4)
     return places.astype(np.float32)

@@ -23,7 +23,6 @@ References
    edge of an even plateau.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from math import ceil, log, pi, sqrt
 from typing import Any, NamedTuple
@@ -32,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import as_strided
 
-from lightpen.arrays import BoolArray, FloatArray, Image
+from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.model.quantiles import normal_quantile
 
 STEP = 0.5  # px between samples of a ray
@@ -42,7 +41,7 @@ BESIDE = 0.5  # px from a ray to the lines that are read for it
 MIN_RAYS, MAX_RAYS = 32, 128
 # The unknowns of a ray are b, p0, p1, p0 d, p0 dsigma and p2. From afar p2 would lead
 # astray; in the end the blur is held.
-SHARPNESS = 4
+SHARPNESS, BEND = 4, 5
 ROUNDS = 3 * [[0, 1, 2, 3, 4]] + 2 * [[0, 1, 2, 3, 4, 5]] + 2 * [[0, 1, 2, 3, 5]]
 # From the image before, whose shape and blur a disc still has nearly; the last is left
 # out where the rim is at rest.
@@ -81,15 +80,24 @@ class EdgeFit(NamedTuple):
     is_whole: bool  # whether no part of the rim lies off the ellipse, nor is missing
 
 
-class EdgeStart(NamedTuple):
-    """Start values of an edge fit."""
+class EdgeFits(NamedTuple):
+    """The outlines of N discs, as `EdgeFit`; NaN without a sharp enough edge."""
 
-    center: FloatArray  # (2,), of the region, px
-    shape: FloatArray  # (2, 2), covariance of its area, px^2
-    # Blur of this disc in the previous image, which has this shape, px; None: new.
-    sigma: float | None = None
-    # (2,), from the disc's centre to the region's in the previous image, px.
-    offset: FloatArray = np.zeros(2)
+    centers: FloatArray  # (N, 2)
+    shapes: FloatArray  # (N, 2, 2)
+    sigmas: FloatArray  # (N,)
+    are_whole: BoolArray  # (N,)
+
+
+class EdgeStarts(NamedTuple):
+    """Start values of N edge fits."""
+
+    centers: FloatArray  # (N, 2), of the regions, px
+    shapes: FloatArray  # (N, 2, 2), covariances of their areas, px^2
+    # (N,), blur of discs in the previous image, which have these shapes, px; NaN: new.
+    sigmas: FloatArray
+    # (N, 2), from the disc's centre to the region's in the previous image, px.
+    offsets: FloatArray
 
 
 class _Ellipses(NamedTuple):
@@ -133,49 +141,53 @@ class _Edges(NamedTuple):
 
 def fit_edge(image: Image, center: FloatArray, shape: FloatArray) -> EdgeFit | None:
     """Fit the rim of one disc, see `fit_edges`."""
-    return fit_edges(image, [EdgeStart(center, shape)])[0]
+    nowhere = np.full((1, 2), np.nan)
+    starts = EdgeStarts(center[None], shape[None], nowhere[:, 0], nowhere)
+    centers, shapes, sigmas, are_whole = fit_edges(image, starts)
+    if np.isnan(sigmas[0]):
+        return None
+    return EdgeFit(centers[0], shapes[0], float(sigmas[0]), bool(are_whole[0]))
 
 
-def fit_edges(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
+def fit_edges(image: Image, starts: EdgeStarts) -> EdgeFits:
     """Fit ellipses to the edges of discs in a whole image (H, W), all at once.
 
-    None without a sharp enough edge. The area is that within the edge, not reduced by
-    blur. A disc that is not found from its fit in the previous image is searched
-    without it.
+    The area is that within the edge, not reduced by blur. A disc that is not found from
+    its fit in the previous image is searched without it.
     """
     if image.strides[1] != image.itemsize or image.strides[0] < 0:
         image = image.copy()
-    found: list[EdgeFit | None] = [None] * len(starts)
-    known = [i for i, start in enumerate(starts) if start.sigma is not None]
-    if known:
-        for i, fit in zip(
-            known, _fitted(image, [starts[i] for i in known]), strict=True
-        ):
-            found[i] = fit if fit is not None and fit.is_whole else None
-    anew = [i for i, fit in enumerate(found) if fit is None]
-    if anew:
-        cold = [starts[i]._replace(sigma=None) for i in anew]
-        for i, fit in zip(anew, _fitted(image, cold), strict=True):
-            found[i] = fit
-    return found
+    n = len(starts.centers)
+    fits = EdgeFits(
+        np.full((n, 2), np.nan),
+        np.full((n, 2, 2), np.nan),
+        np.full(n, np.nan),
+        np.zeros(n, dtype=bool),
+    )
+    known = np.flatnonzero(np.isfinite(starts.sigmas))
+    if len(known):
+        _fit(image, starts, fits, known, is_known=True)
+    anew = np.flatnonzero(~fits.are_whole)
+    if len(anew):
+        for column in fits[:3]:
+            column[anew] = np.nan
+        _fit(image, starts, fits, anew, is_known=False)
+    return fits
 
 
-def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
-    """Return the fits of discs that are all new, or all known."""
-    found: list[EdgeFit | None] = [None] * len(starts)
-    centers = np.array([start.center for start in starts])
-    shapes = np.array([start.shape for start in starts])
-    left = np.flatnonzero(np.linalg.eigvalsh(4 * shapes)[:, 0] >= MIN_SEMI_AXIS**2)
+def _fit(
+    image: Image, starts: EdgeStarts, fits: EdgeFits, discs: IntArray, *, is_known: bool
+) -> None:
+    """Add the fits of some discs that are all new, or all known."""
+    wide = np.linalg.eigvalsh(4 * starts.shapes[discs])[:, 0] >= MIN_SEMI_AXIS**2
+    left = discs[wide]
     if not len(left):
-        return found
-    ellipses = _Ellipses(centers[left], np.linalg.cholesky(4 * shapes[left]))
-    is_known = starts[0].sigma is not None
-    if is_known:
-        rounds = KNOWN_ROUNDS
-        sigmas = np.array([starts[i].sigma for i in left.tolist()], dtype=np.float64)
-    else:
-        rounds = ROUNDS
+        return
+    roots = np.asarray(np.linalg.cholesky(4 * starts.shapes[left]), dtype=np.float64)
+    ellipses, sigmas = _Ellipses(starts.centers[left], roots), starts.sigmas[left]
+    if not is_known:
         ellipses, sigmas = _onto_steepest(image, ellipses)
+    rounds = KNOWN_ROUNDS if is_known else ROUNDS
     for n, unknowns in enumerate(rounds, start=1):
         shorter = ellipses.semi_axes[1]
         sigmas = np.minimum(np.maximum(sigmas, MIN_SIGMA), MAX_SIGMA * shorter)
@@ -183,7 +195,7 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
         rays = _rays(ellipses, spacing)
         edges = _edges(image, rays, sigmas, shorter, unknowns)
         steps = _steps(rays, edges.places, edges.weights)
-        moves = np.einsum("dnk,dk->dn", rays.moves, steps)
+        moves = (rays.moves @ steps[..., None])[..., 0]
         longest = np.abs(moves).max(axis=1)
         alive = edges.are_lit & (shorter > MIN_SEMI_AXIS) & np.isfinite(longest)
         shares = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-9))
@@ -193,25 +205,26 @@ def _fitted(image: Image, starts: Sequence[EdgeStart]) -> list[EdgeFit | None]:
         ended = alive & ((at_rest & ends) | (n == len(rounds)))
         if ended.any():
             are_even = _are_even(edges.places - moves, shorter) & ~edges.are_dark
-            are_whole = are_even & at_rest
-            for d in np.flatnonzero(ended & (sigmas < MAX_SIGMA * shorter)).tolist():
-                found[left[d]] = _rim(ellipses, sigmas, d, bool(are_whole[d]))
+            sharp = ended & (sigmas < MAX_SIGMA * shorter)
+            found = left[sharp]
+            fits.centers[found] = ellipses.centers[sharp]
+            fits.shapes[found] = _shapes(ellipses.roots[sharp], sigmas[sharp])
+            fits.sigmas[found] = sigmas[sharp]
+            fits.are_whole[found] = (are_even & at_rest)[sharp]
             alive &= ~ended
         sigmas = sigmas + edges.blurs
         if not alive.all():
             left, ellipses, sigmas = left[alive], ellipses.of(alive), sigmas[alive]
             if not len(left):
                 break
-    return found
 
 
-def _rim(ellipses: _Ellipses, sigmas: FloatArray, disc: int, is_whole: bool) -> EdgeFit:
-    root, sigma = ellipses.roots[disc], float(sigmas[disc])
-    shape = root @ root.T / 4
+def _shapes(roots: FloatArray, sigmas: FloatArray) -> FloatArray:
+    """Return the covariances of the areas within edges, (N, 2, 2), px^2."""
     # Blur pulls the half level of a convex rim inwards, by sigma^2 over its diameter.
-    (a, b), (c, d) = root.tolist()
-    growth = sigma**2 / abs(a * d - b * c)
-    return EdgeFit(ellipses.centers[disc], shape * (1 + growth), sigma, is_whole)
+    growth = sigmas**2 / np.abs(np.linalg.det(roots))
+    scale = (1 + growth)[:, None, None] / 4
+    return np.asarray(scale * (roots @ roots.transpose(0, 2, 1)))
 
 
 def _rays(ellipses: _Ellipses, spacing: float) -> _Rays:
@@ -221,7 +234,7 @@ def _rays(ellipses: _Ellipses, spacing: float) -> _Rays:
     spokes = arms @ np.swapaxes(ellipses.roots, 1, 2)
     normals = arms @ np.linalg.inv(ellipses.roots)
     normals /= np.hypot(normals[..., 0], normals[..., 1])[..., None]
-    lengths = np.einsum("dni,dni->dn", spokes, normals)
+    lengths = (spokes * normals).sum(axis=2)
     moves = np.empty((*lengths.shape, 5))
     moves[..., :2] = normals
     moves[..., 2:] = lengths[..., None] * stretching
@@ -271,7 +284,7 @@ def _edges(
     functions *= (s < (reach - inside)[:, None])[..., None]
     squares = np.swapaxes(functions, 1, 2) @ functions
     inverse = functions @ np.linalg.inv(squares)
-    fitted = _profiles(image, rays, s) @ inverse
+    fitted = _profiles(image, rays, s, is_coarse=BEND not in unknowns) @ inverse
     brightness = _smooth(fitted[..., 1], SMOOTHED)
     usual = brightness.mean(axis=1, keepdims=True)
     are_lit = usual[:, 0] > 0
@@ -279,7 +292,8 @@ def _edges(
     lit = brightness > DARK * usual
     divisor = np.where(lit, brightness, usual)
     bound = inside[:, None]
-    places = np.clip(np.where(lit, fitted[..., 3] / divisor, 0.0), -bound, bound)
+    places = np.where(lit, fitted[..., 3] / divisor, 0.0)
+    places = np.minimum(np.maximum(places, -bound), bound)
     weights = np.minimum(np.maximum(brightness / usual, DARK), BRIGHTEST) ** 2
     blurs = np.zeros(len(s))
     if SHARPNESS in unknowns:
@@ -299,34 +313,53 @@ def _smooth(values: FloatArray, n_rays: int) -> FloatArray:
     return np.asarray(sum(wrapped[:, k : k + n] for k in range(n_rays)) / n_rays)
 
 
-def _profiles(image: Image, rays: _Rays, s: FloatArray) -> FloatArray:
+def _profiles(
+    image: Image, rays: _Rays, s: FloatArray, *, is_coarse: bool
+) -> FloatArray:
     """Return the light along the rays at distances s (D, S) from their feet, (D, N, S).
 
-    It is the mean of two lines, so that hardly a pixel is passed over.
+    It is the mean of two lines, so that hardly a pixel is passed over, or of one line
+    where ``is_coarse``.
     """
     height, width = image.shape
-    beside = BESIDE * rays.normals[..., ::-1] * np.array([-1.0, 1.0])
-    feet = np.stack([rays.feet - beside, rays.feet + beside]).astype(np.float32)
-    away = s[:, None].astype(np.float32)
-    normals = rays.normals.astype(np.float32)
-    x, y = (feet[..., k, None] + normals[..., k, None] * away for k in range(2))
-    np.clip(x, 0.0, width - 1.001, out=x)
-    np.clip(y, 0.0, height - 1.001, out=y)
-    column, row = x.astype(np.int32), y.astype(np.int32)
+    feet = rays.feet[None]
+    if not is_coarse:
+        beside = BESIDE * rays.normals[..., ::-1] * np.array([-1.0, 1.0])
+        feet = np.stack([rays.feet - beside, rays.feet + beside])
+    away, normals = s[:, None].astype(np.float32), rays.normals.astype(np.float32)
+    x, y = (
+        normals[..., k, None] * away + feet[..., k, None].astype(np.float32)
+        for k in range(2)
+    )
+    for places, end in ((x, width), (y, height)):
+        np.maximum(places, 0.0, out=places)
+        np.minimum(places, end - 1.001, out=places)
+    column, row = np.floor(x), np.floor(y)
     x -= column
     y -= row
     # A window of an image is not one piece of memory; to copy it takes as long as this.
     pitch = image.strides[0] // image.itemsize
     size = (height - 1) * pitch + width
     flat: npt.NDArray[Any] = as_strided(image, (size,), (image.itemsize,))
-    at = row.astype(np.intp) * pitch + column
-    above, right = flat.take(at).astype(np.float32), flat.take(at + 1)
-    above += (right - above) * x
-    at += pitch
-    below, right = flat.take(at).astype(np.float32), flat.take(at + 1)
-    below += (right - below) * x
-    above += (below - above) * y
-    return np.asarray(0.5 * (above[0] + above[1]))
+    at = row.astype(np.intp)
+    at *= pitch
+    at += column.astype(np.intp)
+    above, below = (
+        _between(flat.take(at), flat.take(at + 1), x),
+        _between(flat.take(at + pitch), flat.take(at + (pitch + 1)), x),
+    )
+    light = _between(above, below, y)
+    return light[0] if is_coarse else np.asarray(0.5 * (light[0] + light[1]))
+
+
+def _between(
+    first: npt.NDArray[Any], second: npt.NDArray[Any], share: npt.NDArray[np.float32]
+) -> npt.NDArray[np.float32]:
+    """Return values at a share of the way from the first to the second."""
+    between: npt.NDArray[np.float32] = np.subtract(second, first, dtype=np.float32)
+    between *= share
+    between += first
+    return between
 
 
 def _functions(
@@ -354,7 +387,7 @@ def _onto_steepest(image: Image, ellipses: _Ellipses) -> tuple[_Ellipses, FloatA
     spans = 2 * depths + MORE_OUTSIDE
     s = -depths[:, None] + STEP * np.arange(ceil(float(spans.max()) / STEP))
     rays = _rays(ellipses, COARSE_SPACING)
-    falls = -np.diff(_profiles(image, rays, s).mean(axis=1))
+    falls = -np.diff(_profiles(image, rays, s, is_coarse=True).mean(axis=1))
     falls[s[:, 1:] >= (spans - depths)[:, None]] = -np.inf
     discs = np.arange(len(s))
     steepest = falls.argmax(axis=1)

@@ -2,17 +2,24 @@
 
 Live images and files share `detections_of`: `detect_pen` calls it for single images and
 fits the pose, `lightpen.detection.observations` for many at once.
+
+The pen is followed from image to image by the spots nearest to where its LEDs were.
+Where every LED moved by less than half the way to its neighbour, each spot is of the
+LED it is nearest to; the fit of the pose then checks all of them at once. Anything
+else, a fast hand, a stray light near an LED, two LEDs in one spot, is left to the
+search of `lightpen.detection.labelling.labels.track_spots`.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
-from math import ceil, floor
+from math import ceil, cos, floor
+from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.following import follow_spots
+from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.hypotheses import MAX_SHIFT
 from lightpen.detection.labelling.labels import (
     Labels,
@@ -20,6 +27,7 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
+from lightpen.detection.labelling.spot_arrays import UNWHOLE
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS, ImagePose, fit_pose
 from lightpen.detection.reasons import UNFORESEEN, Reason
@@ -30,6 +38,13 @@ from lightpen.model.pen import Pen
 
 ROOM = 3.0  # radii of a disc from its centre to the border of what is read
 
+UNAMBIGUOUS = 0.4  # of the distance of two LEDs, that one may have moved
+MAX_TURN = 0.25  # rad, from image to image
+MAX_SIGMA = 0.3  # px
+LEAST_WEIGHT = 0.5  # of an LED: residuals of four standard deviations
+MAX_GROWTH = 1.5  # of an area from image to image
+MAX_OFF_CENTER = 0.5  # radii, of a merged or cut spot from its LED
+
 _REASONS = {  # of sharp spots without a pose
     LabelStatus.LABELLED: Reason.TOO_FEW_LEDS,  # that are whole
     LabelStatus.NO_SPOTS: Reason.EMPTY,
@@ -37,6 +52,14 @@ _REASONS = {  # of sharp spots without a pose
     LabelStatus.NO_FIT: Reason.NOT_THE_PEN,
     LabelStatus.AMBIGUOUS: Reason.AMBIGUOUS,
 }
+
+
+class Followed(NamedTuple):
+    """Labels and pose of one image."""
+
+    labels: Labels
+    seen: FloatArray  # (L, 2), ellipse centres of all labelled LEDs, px; NaN elsewhere
+    pose: ImagePose
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,10 +279,76 @@ def _followed(
     if found is None:
         return None
     pixels = np.where(found.labels.whole[:, None], found.seen, np.nan)
-    detection = PenDetection(
-        pixels, found.seen, Reason.NONE, spots=spots, labels=found.labels
+    return PenDetection(
+        *(pixels, found.seen, Reason.NONE, *found.pose[:4]), *(spots, found.labels)
     )
-    return _posed(detection, found.pose)
+
+
+def follow_spots(
+    spots: Spots,
+    camera: Camera,
+    pen: Pen,
+    rotation: FloatArray,
+    translation: FloatArray,
+    there: FloatArray,
+    areas: FloatArray,
+) -> Followed | None:
+    """Return labels and pose of an image, given those of the image before.
+
+    None where anything but small motion is seen.
+
+    Parameters
+    ----------
+    rotation, translation : (3, 3) and (3,) array
+        cam_from_pen of the image before, mm.
+    there : (L, 2) array
+        LEDs of that pose, px.
+    areas : (L,) array
+        Of the spots there, px^2; NaN where an LED was not seen.
+    """
+    if not len(spots) or np.isfinite(spots.tiny_width):
+        return None
+    x, y = there.T
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    np.fill_diagonal(apart, np.inf)
+    gaps = np.hypot(x[:, None] - spots.centers[:, 0], y[:, None] - spots.centers[:, 1])
+    spot = gaps.argmin(axis=1)
+    leds = np.arange(pen.n_leds)
+    mutual = gaps.argmin(axis=0)[spot] == leds
+    labelled = mutual & (gaps[leds, spot] < UNAMBIGUOUS * apart.min(axis=1))
+    whole = labelled & (spots.flaws[spot] & UNWHOLE == 0)
+    if np.count_nonzero(whole) < certain_leds(pen):
+        return None
+    growth = spots.areas[spot] / areas  # NaN where an LED was not seen
+    if np.any(whole & ((growth > MAX_GROWTH) | (growth < 1 / MAX_GROWTH))):
+        return None
+    seen, own = np.full((pen.n_leds, 2), np.nan), spot[labelled]
+    seen[labelled] = centers_from_centroids(
+        camera, spots.centers[own], spots.shapes[own]
+    )
+    pixels = np.where(whole[:, None], seen, np.nan)
+    sigmas = np.where(whole, spots.sigmas[spot], np.nan)
+    pose = fit_pose(camera, pen, pixels, rotation, translation, sigmas)
+    turned = np.vdot(pose.rotation, rotation) < 1 + 2 * cos(MAX_TURN)
+    is_poor = pose.sigma > MAX_SIGMA or (pose.weights[whole] < LEAST_WEIGHT).any()
+    if turned or is_poor:
+        return None
+    # A merged or cut spot is of an LED if it is on its disc.
+    if np.any(labelled & ~whole):
+        placed = camera.project(pen.leds @ pose.rotation.T + pose.translation)
+        off = np.linalg.norm(seen - placed, axis=1)
+        radii = np.sqrt(np.nanmedian(areas) / np.pi)
+        labelled &= whole | (off < MAX_OFF_CENTER * radii)
+        seen = np.where(labelled[:, None], seen, np.nan)
+    labels = Labels(
+        spot=np.where(labelled, spot, -1),
+        whole=whole,
+        R=pose.rotation,
+        t=pose.translation,
+        rms_px=float(pose.sigma),
+        reason=LabelStatus.LABELLED,
+    )
+    return Followed(labels, seen, pose)
 
 
 def _window(camera: Camera, there: FloatArray, radius: float) -> PixelBox:
@@ -304,14 +393,7 @@ def _fitted(detection: PenDetection, camera: Camera, pen: Pen) -> PenDetection:
         *(camera, pen, detection.pixels),
         *(detection.rotation, detection.translation, detection.sigmas),
     )
-    return _posed(detection, pose)
-
-
-def _posed(detection: PenDetection, pose: ImagePose) -> PenDetection:
-    return replace(
-        detection,
-        rotation=pose.rotation,
-        translation=pose.translation,
-        cofactors=pose.cofactors,
-        sigma=pose.sigma,
+    return PenDetection(
+        *(detection.pixels, detection.seen_pixels, Reason.NONE, *pose[:4]),
+        *(detection.spots, detection.labels),
     )

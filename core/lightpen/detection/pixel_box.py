@@ -1,16 +1,16 @@
 """Rectangles of pixels."""
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 from cv2.typing import MatLike
 
-from lightpen.arrays import Image
+from lightpen.arrays import Image, IntArray
 
 Reals: TypeAlias = npt.NDArray[np.float32]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class PixelBox(NamedTuple):
@@ -31,7 +31,7 @@ class PixelBox(NamedTuple):
         """Number of pixels."""
         return (self.right - self.left) * (self.bottom - self.top)
 
-    def of(self, image: Image) -> Image:
+    def of(self, image: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
         """Return this part of an image."""
         return image[self.top : self.bottom, self.left : self.right]
 
@@ -42,12 +42,6 @@ class PixelBox(NamedTuple):
             max(self.top - margin, 0),
             min(self.right + margin, shape[1]),
             min(self.bottom + margin, shape[0]),
-        )
-
-    def moved(self, right: int, down: int) -> "PixelBox":
-        """Return the box at another place."""
-        return PixelBox(
-            self.left + right, self.top + down, self.right + right, self.bottom + down
         )
 
     def holds_center_of(self, other: "PixelBox") -> bool:
@@ -77,11 +71,10 @@ def bounding_box(contour: MatLike, step: int = 1) -> PixelBox:
     )
 
 
-def stacked(windows: Sequence[Image]) -> Reals:
-    """Return windows as one array, dark beside and below each, which parts them."""
-    height = 1 + max(window.shape[0] for window in windows)
-    width = 1 + max(window.shape[1] for window in windows)
-    stack = np.zeros((len(windows), height, width), np.float32)
-    for slot, window in zip(stack, windows, strict=True):
-        slot[: window.shape[0], : window.shape[1]] = window
+def stacked(image: Image, frames: IntArray) -> Reals:
+    """Return windows (N, 4) of an image, dark below and beside each, to part them."""
+    width, height = 1 + (frames[:, 2:] - frames[:, :2]).max(axis=0)
+    stack = np.zeros((len(frames), height, width), np.float32)
+    for slot, (left, top, right, bottom) in zip(stack, frames.tolist(), strict=True):
+        slot[: bottom - top, : right - left] = image[top:bottom, left:right]
     return stack

@@ -42,8 +42,8 @@ MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 # Of an angle in rad and of a translation over its length:
 LINEAR = 3e-5  # leaves its square: the weights of LEDs are all that changes
-NEAR_STEPS = 3  # by projected centres, from a start near the solution
-SETTLED = 1e-7  # leaves a sixteenth
+NEAR_STEPS = 2  # by projected centres, from a start near the solution
+SETTLED = 5e-8  # leaves a sixteenth
 MAX_STEP = 0.2  # keeps an image of wrong LEDs from flying away
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
 TINY = 1e-12
@@ -92,8 +92,8 @@ class ImagePose(NamedTuple):
     rotation: FloatArray  # (3, 3)
     translation: FloatArray  # (3,), mm
     cofactors: FloatArray  # (6, 6), covariance over ``sigma`` squared, as of `Poses`
-    weights: FloatArray  # (L,), weight of each LED, as of `Poses`
     sigma: float  # standard deviation of one image coordinate, px, as of `Poses`
+    weights: FloatArray  # (L,), weight of each LED, as of `Poses`
 
 
 class Reprojection(Protocol):
@@ -116,7 +116,6 @@ def fit_poses(
     rotations: FloatArray,
     translations: FloatArray,
     *,
-    sigmas: FloatArray | None = None,
     is_near: bool = False,
 ) -> Poses:
     """Fit poses by maximum likelihood on ellipse centres.
@@ -131,21 +130,13 @@ def fit_poses(
         needs four LEDs.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Start, cam_from_pen, mm.
-    sigmas : (N, L) array, optional
-        How exact the centres are compared with each other, px; all alike if not given.
     is_near : bool
         Whether that is by least squares on most of these LEDs already.
     """
-    problem: Reprojection = CameraReprojection(
+    problem = CameraReprojection(
         camera, pen.leds, pen.normals, pen.diameter / 2, pixels
     )
-    scales = None if sigmas is None else relative_sigmas(sigmas)
-    if scales is not None:
-        problem = _Scaled(problem, scales)
-    poses = fit_reprojection(problem, rotations, translations, is_near=is_near)
-    if scales is None:
-        return poses
-    return replace(poses, residuals=poses.residuals * scales[..., None])
+    return fit_reprojection(problem, rotations, translations, is_near=is_near)
 
 
 def fit_pose(
@@ -156,7 +147,10 @@ def fit_pose(
     translation: FloatArray,
     sigmas: FloatArray,
 ) -> ImagePose:
-    """Fit the pose of one image, (L, 2), from one near it; see `fit_poses`."""
+    """Fit the pose of one image, (L, 2), from one near it, as `fit_poses`.
+
+    ``sigmas`` (L,) are how exact the centres are compared with each other, px.
+    """
     seen = np.isfinite(pixels[:, 0])
     leds, normals, there = pen.leds[seen], pen.normals[seen], pixels[seen]
     shares = sigmas[seen].min() / sigmas[seen]
@@ -174,23 +168,31 @@ def fit_pose(
         distance = math.hypot(*t.tolist())
         for _ in range(MAX_STEPS):
             H, right, _, _ = _normal(rows, left)
-            change = cv2.solve(H, right, flags=cv2.DECOMP_CHOLESKY)[1][:, 0]
+            solved = cv2.solve(H, right, flags=cv2.DECOMP_CHOLESKY)[1]
+            change = np.asarray(solved, dtype=np.float64)[:, 0]
             step = step + change
             left = errors.ravel() - rows @ step
-            turn, move = change[:3].tolist(), change[3:].tolist()
-            size = max(math.hypot(*turn), math.hypot(*move) / distance)
-            if not SETTLED < size < LINEAR:
+            if not SETTLED < _size(change, distance) < LINEAR:
                 break
+        size = _size(step, distance)
         step = step * (MAX_STEP / max(size, MAX_STEP))
         R, t = cv2.Rodrigues(step[:3])[0] @ R, t + step[3:]
         if size < LINEAR:
             break
     H, _, weights, sigma = _normal(rows, left)
     own = (left * left) @ np.repeat(weights, 2) / max(2 * weights.sum() - 6, 1)
-    cofactors = np.linalg.inv(H) * (own / sigma**2 if own > (WORSE * sigma) ** 2 else 1)
+    worse = own / sigma**2 if own > (WORSE * sigma) ** 2 else 1.0
+    inverse = cv2.invert(H, flags=cv2.DECOMP_CHOLESKY)[1]
+    cofactors = worse * np.asarray(inverse, dtype=np.float64)
     every = np.zeros(len(pixels))
     every[seen] = weights
-    return ImagePose(R, t, cofactors, every, sigma)
+    return ImagePose(R, t, cofactors, sigma, every)
+
+
+def _size(step: FloatArray, distance: float) -> float:
+    """Return the size of a step (6,), rad."""
+    a, b, c, x, y, z = step.tolist()
+    return max(math.hypot(a, b, c), math.hypot(x, y, z) / distance)
 
 
 def _by_projected_centers(
@@ -215,35 +217,6 @@ def _normal(
     weights = 1 / (1 + (lengths / (CAUCHY_WIDTH * sigma)) ** 2)
     weighted = rows.T * np.repeat(weights, 2)
     return weighted @ rows * DAMPING + RIDGE, weighted @ errors, weights, sigma
-
-
-def relative_sigmas(sigmas: FloatArray) -> FloatArray | None:
-    """Return standard deviations (N, L) over the least of all, 1 or more.
-
-    That is 1 where an LED was not seen, NaN. None if all are alike.
-    """
-    seen = sigmas[np.isfinite(sigmas)]
-    if not len(seen) or seen.max() == seen.min():
-        return None
-    return np.where(np.isfinite(sigmas), sigmas / seen.min(), 1.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _Scaled:
-    """Reprojection errors in units of how exact each centre is, (N, L)."""
-
-    of: Reprojection
-    scales: FloatArray
-
-    @property
-    def pixels(self) -> FloatArray:
-        return self.of.pixels
-
-    def residuals_with_jacobian(
-        self, R: FloatArray, t: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        residuals, J = self.of.residuals_with_jacobian(R, t)
-        return residuals / self.scales[..., None], J / self.scales[..., None, None]
 
 
 def fit_reprojection(

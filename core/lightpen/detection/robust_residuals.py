@@ -92,8 +92,6 @@ def image_sigmas(residuals: FloatArray) -> FloatArray:
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     common = _sigma_of(lengths, 6)
-    if len(lengths) == 1:
-        return np.array([common])
     n_seen = np.isfinite(lengths).sum(axis=1)
     middle = np.sort(lengths, axis=1)[np.arange(len(lengths)), n_seen // 2]
     return np.asarray(np.maximum(middle / MEDIAN_LENGTH, common))

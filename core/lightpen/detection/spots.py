@@ -10,7 +10,17 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
-from lightpen.detection.disc_moments import FLAT, MIN_SIZE, Disc, Starts
+from lightpen.detection.disc_moments import (
+    FLAT,
+    GAUSSIAN_RISE,
+    HIGH,
+    LOW,
+    MIN_SIZE,
+    Discs,
+    Starts,
+    ellipse_misfits,
+    rows_of,
+)
 from lightpen.detection.disc_search import (
     LEVEL_OF_PEAK,
     LEVEL_SIGMAS,
@@ -21,16 +31,9 @@ from lightpen.detection.disc_search import (
     flattened,
     survey,
 )
-from lightpen.detection.edge_fit import EdgeStart
+from lightpen.detection.edge_fit import EdgeStarts
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS
-from lightpen.detection.region_moments import (
-    GAUSSIAN_RISE,
-    HIGH,
-    LOW,
-    DiscMoments,
-    ellipse_misfit,
-)
 from lightpen.detection.small_spots import LARGEST_RADIUS, measure_small, widths_of_tiny
 from lightpen.formats.decoding import full_scale_of
 
@@ -73,6 +76,9 @@ class SpotFlaw(IntFlag):
     DIM = 16  # hardly above the noise
 
 
+FLAWS = np.array([*SpotFlaw])
+
+
 @dataclass(frozen=True, eq=False)
 class Spots:
     """The candidate spots of an image, brightest first."""
@@ -108,21 +114,19 @@ class Spots:
     def __len__(self) -> int:
         return len(self.centers)
 
-    def rims(self, corner: FloatArray) -> list[EdgeStart]:
+    def rims(self, corner: FloatArray) -> EdgeStarts:
         """Return the search regions of these spots in the next image.
 
         Merged spots, and those that the border cuts, are left out. ``corner`` (2,) is
         the pixel of this image where the next one, a part of the sensor, begins, px.
         """
-        return [
-            EdgeStart(center - corner, shape, width / GAUSSIAN_RISE, offset)
-            for center, shape, width, offset, flaws in zip(
-                *(self.centers, self.shapes, self.edge_widths.tolist()),
-                *(self.offsets, self.flaws.tolist()),
-                strict=True,
-            )
-            if not flaws & (SpotFlaw.MERGED | SpotFlaw.CUT)
-        ]
+        whole = self.flaws & (SpotFlaw.MERGED | SpotFlaw.CUT) == 0
+        return EdgeStarts(
+            self.centers[whole] - corner,
+            self.shapes[whole],
+            self.edge_widths[whole] / GAUSSIAN_RISE,
+            self.offsets[whole],
+        )
 
     @property
     def are_small(self) -> BoolArray:
@@ -201,30 +205,35 @@ def detect_spots(
         image = image[window.top : window.bottom, window.left : window.right]
         if mask is not None:
             mask = np.asarray(mask) - np.append(corner, 0)
-    starts: Starts = list if before is None else partial(before.rims, corner)
+    starts = None if before is None else partial(before.rims, corner)
     spots = _spots_of(image, mask, stride, full_scale, starts)
-    return replace(spots, centers=spots.centers + corner)
+    spots.centers[...] += corner
+    return spots
 
 
 def _spots_of(
-    image: Image, mask: FloatArray | None, stride: int, full_scale: int, before: Starts
+    image: Image,
+    mask: FloatArray | None,
+    stride: int,
+    full_scale: int,
+    before: Starts | None,
 ) -> Spots:
     budget = iter(range(MAX_REGIONS))
     scene = survey(image, mask, stride)
     discs = find_discs(scene, budget, before)
     # Too few for a pose are worth a closer look.
-    if len(discs) < MIN_POSE_LEDS and stride > 1:
+    if len(discs.boxes) < MIN_POSE_LEDS and stride > 1:
         scene = survey(image, mask, stride // 2)
         discs = find_discs(scene, budget)
     has_smears = False
-    if len(discs) < MIN_POSE_LEDS or next(budget, None) is None:
+    if len(discs.boxes) < MIN_POSE_LEDS or next(budget, None) is None:
         flat = survey(flattened(image, full_scale), mask, stride)
         flat_discs = find_discs(flat, iter(range(MAX_REGIONS)))
-        if len(flat_discs) > len(discs):
+        if len(flat_discs.boxes) > len(discs.boxes):
             scene, discs = flat, flat_discs
-        has_smears = not discs and _has_smears(flat)
-    discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
-    discs = discs[:MAX_SPOTS]
+        has_smears = not len(discs.boxes) and _has_smears(flat)
+    order = np.argsort(-discs.levels.contrast, kind="stable")
+    discs = rows_of(discs, order[:MAX_SPOTS])
     spots = _as_spots(discs, full_scale, scene.noise, has_smears)
     usual_area = median(spots.areas.tolist()) if len(spots) else 0.0
     if len(spots) < MIN_POSE_LEDS or usual_area < HARDLY_AREA:
@@ -257,32 +266,22 @@ def _has_smears(scene: Survey) -> bool:
     return low < lit / scene.thinned.size < high
 
 
-def _as_spots(
-    discs: list[Disc], full_scale: float, noise: float, has_smears: bool
-) -> Spots:
-    moments = DiscMoments(*np.array([disc.moments for disc in discs]).reshape(-1, 9).T)
-    levels = np.array([disc.levels for disc in discs]).reshape(-1, 3)
-    heights = np.array([disc.cut_height for disc in discs])
-    contrasts = levels[:, 1] - levels[:, 0]
-    are_whole = np.array([disc.is_whole for disc in discs], dtype=bool)
-    leave = np.array([disc.leaves_image for disc in discs], dtype=bool)
+def _as_spots(discs: Discs, full_scale: float, noise: float, has_smears: bool) -> Spots:
+    moments, are_whole, leave = discs.moments, discs.are_whole, discs.leave_image
+    contrasts = discs.levels.contrast
     # Merged is told from cut by size, if there is a whole disc to compare with.
     whole = moments.area[are_whole].tolist()
-    larger = moments.area > (median(whole) if whole else 0.0)
-    smaller = moments.area <= (median(whole) if whole else np.inf)
+    usual = median(whole) if whole else np.nan
     unwhole = ~are_whole & ~leave
     have_flaws = (  # in the order of `SpotFlaw`
-        (heights > MERGED_LEVEL) | (unwhole & larger),
-        leave | (unwhole & smaller),
-        levels[:, 2] >= SATURATED_LEVEL * full_scale,
+        (discs.cut_heights > MERGED_LEVEL) | (unwhole & ~(moments.area <= usual)),
+        leave | (unwhole & ~(moments.area > usual)),
+        discs.levels.top >= SATURATED_LEVEL * full_scale,
         moments.edge_width > BLURRED_EDGE,
         contrasts < DIM_SIGMAS * noise,
     )
     centers = np.stack([moments.x, moments.y], axis=1)
-    regions = centers.copy()
-    for i, disc in enumerate(discs):
-        if disc.rim is not None:
-            regions[i] = disc.rim.center
+    rims = discs.rims.centers
     shapes = (moments.var_x, moments.cov_xy, moments.cov_xy, moments.var_y)
     return Spots(
         centers=centers,
@@ -290,21 +289,21 @@ def _as_spots(
         areas=moments.area,
         contrasts=contrasts / full_scale,
         edge_widths=moments.edge_width,
-        flaws=np.array([*SpotFlaw]) @ np.stack(have_flaws),
-        sigmas=np.full(len(discs), EXACT_SIGMA),
-        offsets=regions - centers,
+        flaws=FLAWS @ np.stack(have_flaws),
+        sigmas=np.full(len(centers), EXACT_SIGMA),
+        offsets=np.where(np.isnan(rims), 0.0, rims - centers),
         has_smears=has_smears,
     )
 
 
 def _with_small(
-    spots: Spots, discs: list[Disc], image: Image, noise: float, full_scale: float
+    spots: Spots, discs: Discs, image: Image, noise: float, full_scale: float
 ) -> Spots:
     """Return spots with the small ones measured again.
 
     Blur leaves these without a plateau, or foreign light without a foot.
     """
-    raised = np.array([not disc.is_whole or disc.cut_height > RAISED for disc in discs])
+    raised = ~discs.are_whole | (discs.cut_heights > RAISED)
     rough_radii = np.sqrt(spots.areas / np.pi)
     fits = rough_radii < LARGEST_RADIUS
     raised &= fits
@@ -313,7 +312,7 @@ def _with_small(
     clipped = fits & ((spots.flaws & SpotFlaw.SATURATED) > 0)
     # A halo may be taken for the disc, wide and dim, of the LED in its middle.
     x, y = np.rint(spots.centers).astype(np.int64).T
-    tops = (image[y, x] - [disc.levels.background for disc in discs]) / full_scale
+    tops = (image[y, x] - discs.levels.background) / full_scale
     is_halo = tops > CORE * spots.contrasts
     chosen = spots.are_small | raised | clipped | is_halo
     if chosen.sum() > LIT * fits.sum():
@@ -329,9 +328,7 @@ def _with_small(
     reach = found.radii[:, None]
     height, width = image.shape
     inside = (found.centers > reach - 0.5) & (found.centers < [width, height] - reach)
-    misfits = np.array(
-        [ellipse_misfit(disc.moments, noise / disc.levels.contrast) for disc in discs]
-    )
+    misfits = ellipse_misfits(discs.moments, noise / discs.levels.contrast)
     # LEDs that are no even discs all miss the ellipse; hidden ones miss it by more.
     usual = np.median(misfits[fits]) if fits.sum() >= MIN_POSE_LEDS else 0.0
     is_usual = misfits[small] < max(MANY_MISFITS * usual, 1.0)

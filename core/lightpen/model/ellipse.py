@@ -118,7 +118,7 @@ def centers_from_centroids(
     term of second order, some 0.003 px for a disc of 40 px near the image border.
     ``shapes`` (..., 2, 2) are the covariances of the areas, px^2; NaN passes through.
     """
-    known = np.isfinite(centroids).all(axis=-1) & np.isfinite(shapes).all(axis=(-1, -2))
+    known = np.isfinite(centroids[..., 0]) & np.isfinite(shapes[..., 0, 0])
     is_smooth = camera.lens is LensModel.BROWN and camera.folded_share == 0
     offsets_of = _tabulated_offsets if is_smooth else _centroid_offsets
     centers = centroids.copy()

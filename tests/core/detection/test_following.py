@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from tests.simulated_plans import live_plan
 
-from lightpen.detection.following import Followed, follow_spots
-from lightpen.detection.pen_detection import PenDetection, detect_pen
+from lightpen.detection.pen_detection import (
+    Followed,
+    PenDetection,
+    detect_pen,
+    follow_spots,
+)
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen_extensions.simulator.image_plans import render_plan
 from lightpen_extensions.simulator.scenes import LEDS, Scene
