@@ -364,11 +364,13 @@ def test_a_pen_is_examined_and_its_file_improved_only_where_it_helps(
     ]
 
     examined = lightpen("verify", "pen", *results, *inputs)
+    by_results = lightpen("verify", "pen", *results)
     improved = lightpen(
         *("improve-pen", *results, *inputs, "--out", tmp_path / "new.json")
     )
     over_old = lightpen("improve-pen", *results, *inputs, "--out", folder / "leds.csv")
 
+    assert by_results.stdout == examined.stdout, by_results.stderr
     assert "No LED moved relative to the others in 4 swings." in examined.stdout
     assert improved.returncode == 0, improved.stderr
     assert "swing_4.json confirms it" in improved.stdout

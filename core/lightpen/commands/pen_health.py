@@ -39,7 +39,7 @@ from lightpen.local_time import local_now
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.recomputing import recompute
+from lightpen.record.calibrations.recomputing import recompute, recorded_camera_and_pen
 from lightpen.record.calibrations.tip_bending import keep_bending
 from lightpen.record.library.library_changes import Author
 from lightpen.record.results.opening import data_folder_of
@@ -48,7 +48,7 @@ from lightpen.record.results.opening import data_folder_of
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
     """Add ``lightpen verify pen``."""
     parser.set_defaults(run=_verify_pen)
-    _add_swings(parser)
+    _add_swings(parser, is_required=False)
     add_exit_by_verdict(parser)
     add_json(parser)
     add_entering(parser)
@@ -79,7 +79,7 @@ def add_improve_pen(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_swings(parser: argparse.ArgumentParser) -> None:
+def _add_swings(parser: argparse.ArgumentParser, *, is_required: bool = True) -> None:
     parser.add_argument(
         "results",
         nargs="+",
@@ -87,16 +87,22 @@ def _add_swings(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT.json",
         help="calibrations with this pen, in any order",
     )
-    add_camera_and_pen(parser, states_pen=False)
+    add_camera_and_pen(parser, states_pen=False, is_required=is_required)
 
 
 @printing
 def _verify_pen(options: argparse.Namespace) -> int:
-    files = [*options.results, options.camera, options.pen]
+    given = options.camera, options.pen
+    files = [*options.results, *filter(None, given)]
     require_other_file(options.json, *files)
     swings = _swings(options)
-    pen = _pen(options, swings[0])
-    found = examine_pen(swings, read_camera(options.camera), pen.leds)
+    if None in given:  # the results contain both files
+        camera, pen = recorded_camera_and_pen(swings[0])
+    if options.camera is not None:
+        camera = read_camera(options.camera)
+    if options.pen is not None:
+        pen = _pen(options, swings[0])
+    found = examine_pen(swings, camera, pen.leds)
     print(shown(pen_health_text(found)))
     record = verification_record(
         "pen",
@@ -136,16 +142,18 @@ def _pen(options: argparse.Namespace, swing: CalibrationFile) -> Pen:
 
 
 def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
-    """Read the calibrations, the oldest first; all must be with the given pen file."""
+    """Read the calibrations, the oldest first; all must be with the same pen file."""
     swings = sorted(map(read_calibration, options.results), key=lambda one: one.when)
-    pen_sha256 = sha256(options.pen)
+    pen, pen_sha256 = swings[0].calibration.inputs.pen.file, swings[0].pen_sha256
+    if options.pen is not None:
+        pen, pen_sha256 = options.pen, sha256(options.pen)
     for each in swings:
         if each.pen_sha256 != pen_sha256:
             raise UsageError(
                 "cli.swing-of-another-pen",
                 result=each.path,
                 its_pen=each.calibration.inputs.pen.file,
-                pen=options.pen,
+                pen=pen,
             )
     return swings
 

@@ -38,6 +38,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
 from lightpen.record.calibrations.calibrations import (
+    CalibrationFile,
     floats,
     read_calibration,
     shown_images,
@@ -105,6 +106,23 @@ def recompute(path: Path) -> Recomputed:
             requires_temperature=limits.requires_temperature,
         ),
     )
+
+
+def recorded_camera_and_pen(calibration: CalibrationFile) -> tuple[Camera, Pen]:
+    """Return camera and pen of the files that a result contains.
+
+    Raises `UsageError` if it contains no files.
+    """
+    found = calibration.calibration.inputs
+    try:
+        camera, pen = _kept(found.camera), _kept(found.pen)
+    except DamagedError as error:
+        raise UsageError("recompute.not-enough", path=calibration.path) from error
+    with TemporaryDirectory(prefix="lightpen-record-") as folder:
+        camera_file = _written(camera, Path(folder, "camera"))
+        pen_file = _written(pen, Path(folder, "pen"))
+        stated = found.units, found.led_diameter_mm
+        return read_camera(camera_file), read_pen(pen_file, *stated)
 
 
 def _kept(file: FileRecord) -> InputFile:
