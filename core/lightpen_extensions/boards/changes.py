@@ -34,7 +34,7 @@ MAX_ROUNDS = 10
 N_WAYS = 3  # zoom and shift of the principal point along x and y
 RIDGE = 1e-10  # of a normal matrix scaled to ones
 WORSE = 1.3  # ratio of the residuals of first groups that are turned to those before
-BETTER, NEARLY = 1.12, 0.9  # ratio of the errors, and its share of that by a change
+BETTER, NEARLY = 1.25, 0.9  # ratio of the errors, and its share of that by a change
 MOSTLY = 0.5  # mean of the gains over their root mean square
 
 
