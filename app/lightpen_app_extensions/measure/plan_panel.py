@@ -198,7 +198,7 @@ class PlanPanel(Translated, QWidget):
         return str(self._workbench.save_place.folder())
 
     def _on_teach_clicked(self) -> None:
-        self.choose(free_plan(self.tr("Part")))
+        self.choose(free_plan(str(self.tr("Part"))))
 
     def _leaving(self) -> Question:
         return Question(

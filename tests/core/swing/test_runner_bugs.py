@@ -11,6 +11,7 @@ import pytest
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.resuming import read_resumable
+from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.status import Activity
 
 if TYPE_CHECKING:
@@ -190,7 +191,7 @@ def test_a_bug_in_a_command_lets_what_is_computed_go_on(
 ) -> None:
     station.go_on(interrupted)
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen.swing.operator_presence.replace", fail)
+        broken.setattr(OperatorPresence, "arrived", fail)
         station.runner.ask(lambda workflow: workflow.finish())
         station.runner.ask(lambda workflow: workflow.note_arrival())
         station.wait_until(lambda: len(station.witness.faults) == 1)
