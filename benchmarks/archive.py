@@ -21,14 +21,20 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.archive.chains.entries import ChainHead, Event, Kind, chained, text_sha256
-from lightpen.archive.chains.growth import append, copy_entries, own_chain
-from lightpen.archive.chains.signatures import entry_signature
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
-from lightpen.archive.store.database import Database, open_file
+from lightpen.archive.chains import (
+    ChainHead,
+    Event,
+    Kind,
+    chained,
+    entry_signature,
+    text_sha256,
+)
+from lightpen.archive.checks import check_archive
+from lightpen.archive.growth import append, copy_entries, own_chain
+from lightpen.archive.history import EntryFilter, last_accepted, newest
+from lightpen.archive.store import Database, open_file
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 N_ENTRIES, N_TIPS = 100_000, 40
 RECORD = "{" + " " * 280_000 + "}"  # as long as that of 300 images

@@ -30,7 +30,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
 from lightpen_extensions.boards.adjustment import BoardFit, board_points
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import (
@@ -41,6 +41,7 @@ from lightpen_extensions.boards.calibration import (
 from lightpen_extensions.boards.changes import find_change
 from lightpen_extensions.boards.distortion import FEW, fit_camera
 from lightpen_extensions.boards.effects import MixedFit, fit_effects
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.sightings import find_points
 from lightpen_extensions.boards.simulated_boards import (
     expose_board,
@@ -48,8 +49,7 @@ from lightpen_extensions.boards.simulated_boards import (
     simulate_board_poses,
 )
 from lightpen_extensions.boards.start import BoardPoses, start_camera
-from lightpen_extensions.boards.views import Views
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 
 STREAM = 27  # of the seeds
 BOARD = "chessboard:9x6:20"

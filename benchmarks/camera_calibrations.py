@@ -21,18 +21,17 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
+from lightpen.model.limits import Assumptions
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
-from lightpen_extensions.boards.observing import observe_board
+from lightpen_extensions.boards.observing import Views, observe_board
 from lightpen_extensions.boards.simulated_boards import (
     expose_board,
     render_board,
     simulate_board_poses,
 )
-from lightpen_extensions.boards.views import Views
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

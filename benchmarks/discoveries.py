@@ -24,16 +24,15 @@ from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import USUAL
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
+from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.numbering import number_by_sketch
-from lightpen_extensions.discover.request import Request
-from lightpen_extensions.discover.scale import MeasuredLength
-from lightpen_extensions.discover.sightings import find_spots
+from lightpen_extensions.discover.hypotheses import number_by_sketch
+from lightpen_extensions.discover.scale import MeasuredLength, Request
+from lightpen_extensions.discover.tracks import find_spots
 from lightpen_extensions.simulator.image_plans import plan_scene
 from lightpen_extensions.simulator.scenes import CLEAN, HARD, LEDS, Scene
 

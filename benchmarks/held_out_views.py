@@ -33,9 +33,8 @@ from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
 from lightpen_extensions.boards.distortion import FEW
 from lightpen_extensions.boards.effects import rms_together
-from lightpen_extensions.boards.observing import observe_board
+from lightpen_extensions.boards.observing import Views, observe_board
 from lightpen_extensions.boards.start import start_board_poses, start_camera
-from lightpen_extensions.boards.views import Views
 
 N_PARTS = 5
 N_SETS = 6  # as photographed

@@ -33,7 +33,7 @@ def main(data: Path) -> int:
     from lightpen_app.work.settings import Settings
     from lightpen_app.work.workbench import Workbench
 
-    import_module("lightpen_app.wizard_pages")  # all pages are loaded by then
+    import_module("lightpen_app.application")  # all pages are loaded by then
     application = make_application(sys.argv[:1])
     load_fonts()
     apply_theme(application, DARK)

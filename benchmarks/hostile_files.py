@@ -29,12 +29,15 @@ from benchmarks.mutations import mutated
 from benchmarks.rows import Row
 
 from lightpen.errors import FileError, LightpenError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import read_image
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
-from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
+from lightpen.formats.rig_files import write_camera
+from lightpen.formats.video_process import (
+    count_frames_in_process,
+    frame_loaders_in_process,
+)
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 N_FILES = 20_000

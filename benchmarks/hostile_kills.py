@@ -30,15 +30,15 @@ from benchmarks.hostile_records import NAMES, make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.checks import check_file
+from lightpen.archive.logbook import Logbook
 from lightpen.formats.files import write_whole
-from lightpen.record.folder.data_folder import OLDEST, sweep_leftovers
+from lightpen.record.folder import OLDEST, sweep_leftovers
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import Record, open_record
-from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.solving import source
 from lightpen_app.work.settings_store import load
 
 SEED = 5

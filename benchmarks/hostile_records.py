@@ -28,22 +28,18 @@ from benchmarks.small_records import small_record
 
 from lightpen.errors import LightpenError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.origin import Origin
-from lightpen.record.library.signing.keys import KEYS
+from lightpen.model.names import Origin
+from lightpen.record.library.signing import KEYS
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.header import HEADER
+from lightpen.record.swings.header import HEADER, Names
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.names import Names
-from lightpen.record.swings.reading import OPENER, open_record, record_files
-from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.reading import JOURNAL, OPENER, open_record, record_files
+from lightpen.record.swings.solving import source
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import read_resumable
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen.swing.swing_recorder import read_resumable, record_header
+from lightpen_app.work.settings import Settings, Station
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import (

@@ -22,11 +22,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program does
 from PySide6.QtCore import QEventLoop, QTimer
 
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_app.work.settings import Settings, Station, StoredCamera
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_program.extensions import faces
 

@@ -24,15 +24,13 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtCore import QEventLoop, QTimer
 
-from lightpen.cameras.protocol import CameraSettings, Region
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import CameraSettings, Connection, Region
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.application import Wizard, ended, make_application
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import FilePaths, Station, StoredCamera
+from lightpen_app.work.settings import FilePaths, Settings, Station, StoredCamera
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_program.extensions import faces

@@ -9,9 +9,14 @@ from benchmarks.labelling import CAMERA, PEN
 from tests.simulated_plans import live_plan
 
 from lightpen.arrays import Image
-from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
-from lightpen.cameras.worker_events import WorkerEvent
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    Frame,
+    FrameTimeout,
+    WorkerEvent,
+    sealed,
+)
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.live.pipeline import Live, LiveImage
 from lightpen.messages import Message
 from lightpen.record.results.result_folder import FolderArchive

@@ -25,10 +25,10 @@ from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen_extensions.boards.boards import parse_board
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.pair import calibrate_pair
 from lightpen_extensions.boards.simulated_boards import simulate_board_poses
 from lightpen_extensions.boards.start import BoardPoses
-from lightpen_extensions.boards.views import Views
 
 OTHER = Camera(
     *(400, 300, 575.0, 574.2, 197.3, 152.1),

@@ -21,16 +21,15 @@ from skspatial.objects import Cylinder, Line, Plane, Sphere
 
 from lightpen.arrays import FloatArray
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.measure.measuring.features import fit_feature
+from lightpen_extensions.measure.measuring.features import fit_feature, frame_about
 from lightpen_extensions.measure.measuring.part import measure_part
 from lightpen_extensions.measure.measuring.plan import (
     CharacteristicKind,
     PlannedCharacteristic,
 )
 from lightpen_extensions.measure.measuring.plan import Plan as MeasuringPlan
-from lightpen_extensions.measure.measuring.starts import frame_about
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
-from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.probed_point import measure_touches
 from lightpen_extensions.measure.tasks.task import Conditions, VerificationChoices

@@ -89,7 +89,7 @@ class Postgres:
         """
         import psycopg
 
-        from lightpen_extensions.plant.server_setup import server_sql
+        from lightpen_extensions.plant.server import server_sql
 
         name = f"plant_{secrets.token_hex(4)}"
         admin = self.address("postgres")

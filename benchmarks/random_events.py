@@ -42,7 +42,7 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.formats.decoding import keep_freed_memory
-from lightpen.swing.image_sources import N_CAMERAS, SourceChoice
+from lightpen.swing.preparation import N_CAMERAS, SourceChoice
 from lightpen_app.application import SETTLED_MS, Wizard, make_application
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_program.extensions import faces

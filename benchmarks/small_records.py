@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.formats.json_records import json_bytes
-from lightpen.formats.own_json import in_shape
+from lightpen.formats.own_json import in_shape, json_bytes
 
 ZERO = [0.0, 0.0, 0.0]
 FILE = {"file": "file.csv", "sha256": 64 * "0"}

@@ -28,7 +28,7 @@ from typing_extensions import override
 
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.capture.state import Phase, SwingState
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.work.settings import Preferences, Settings

@@ -34,12 +34,10 @@ from lightpen.detection.pen_detection import (
 from lightpen.detection.pose import fit_paper_poses, fit_poses
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
-from lightpen.estimation.pivot.pivot import fit_pivot
-from lightpen.estimation.pivot.two_stage import fit_two_stage
+from lightpen.estimation.pivot.pivot import fit_pivot, fit_two_stage
 from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import ellipse_centers
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
 from lightpen.swing.capture.kept_images import AcceptedImages, keep, kept_before
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
 from lightpen_extensions.simulator.scenes import LEDS, Scene

@@ -19,13 +19,17 @@ from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
-from lightpen.model.effective_tip import effective_tip
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.limits import SwingLimits
-from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen.model.rigid import fit_rigid, rotation_from_vector
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.pen import Pen, effective_tip
+from lightpen.model.rigid import (
+    Rig,
+    fit_rigid,
+    from_first,
+    rig_of,
+    rotation_from_vector,
+)
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Swing,

@@ -18,10 +18,10 @@ from PySide6.QtCore import QCoreApplication
 
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.names import Names
 from lightpen.swing.capture.state import SwingEvent, SwingEventKind
-from lightpen.swing.resuming import read_resumable
+from lightpen.swing.swing_recorder import read_resumable
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.simulator import SceneSimulator

@@ -16,12 +16,11 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.artefacts import Artefact, ArtefactKind
-from lightpen_extensions.measure.probing.image_locations import touch_place
 from lightpen_extensions.measure.probing.probing import ProbingRules
-from lightpen_extensions.measure.probing.sources import touch_run
-from lightpen_extensions.measure.tasks.artefact import measure_artefacts
+from lightpen_extensions.measure.probing.sources import touch_place, touch_run
 from lightpen_extensions.measure.tasks.fixed_point import measure_fixed_point
 from lightpen_extensions.measure.tasks.part import sizes_of
+from lightpen_extensions.measure.tasks.registry import measure_artefacts
 from lightpen_extensions.measure.tasks.task import Conditions
 
 UM = 1000.0  # in a millimetre

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen.model.artefacts import Artefact, ArtefactKind
-from lightpen_extensions.measure.measuring.artefacts import artefact_plan
+from lightpen_extensions.measure.measuring.plan import artefact_plan
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.session import (
     SessionSetup,
     SessionState,
     advance_session,

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.hostile_records import IMAGE, NAMES
 from msgspec import structs
 
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.logbook import Logbook
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import write_whole
 from lightpen.formats.pen_files import PEN_FILE
@@ -29,7 +29,7 @@ from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.header import FileCopy
 from lightpen.record.swings.reading import open_record
-from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.solving import source
 from lightpen.record.swings.writing import (
     RecordWriter,
     make_record_folder,

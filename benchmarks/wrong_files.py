@@ -16,8 +16,8 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import fit_poses
+from lightpen.estimation.bundle.image_fields import tilt_modes
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
@@ -25,15 +25,17 @@ from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.estimation.uncertainty.budget import POSTURES, ContributionName
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
-from lightpen.model.effective_tip import effective_tip
-from lightpen.model.limits import SwingLimits
-from lightpen.model.pen import Pen
-from lightpen.model.posture import directions_of
-from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.limits import USUAL, SwingLimits
+from lightpen.model.pen import Pen, effective_tip
+from lightpen.model.rigid import (
+    Rig,
+    directions_of,
+    from_first,
+    rig_of,
+    rotation_from_vector,
+)
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     Swing,

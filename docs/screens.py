@@ -39,36 +39,34 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
-from lightpen.archive.chains.entries import Event, Kind
-from lightpen.archive.chains.growth import append
-from lightpen.cameras.clock import SkippingClock
+from lightpen.archive.chains import Event, Kind
+from lightpen.archive.growth import append
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, Stats, sealed
 from lightpen.detection.pen_detection import detect_from_centers, detect_pen
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.pipeline import LiveImage
 from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import message
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.results.result_folder import RECORDS, SIMULATED, FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.capture.rules import advance_swing
 from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
-from lightpen.swing.image_sources import SourceChoice
-from lightpen.swing.preparation import Preparation
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import read_resumable
+from lightpen.swing.preparation import Preparation, SourceChoice
+from lightpen.swing.swing_recorder import read_resumable, record_header
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.look.pooling import pooled
+from lightpen_app.look.figures import pooled
 from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.steps.history.history_table import HistoryTable
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.verification_run import VerificationRun
-from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.probing_operator import plate_plan
+from lightpen_extensions.measure.session import (
     SessionSetup,
     SessionState,
     advance_session,
@@ -76,11 +74,9 @@ from lightpen_extensions.measure.session.session import (
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import HandGoal, VerificationChoices
-from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.follower import GuidedOperator
-from lightpen_extensions.simulator.hand import Operator
+from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
+from lightpen_extensions.simulator.hand import Operator, lean_vectors, postures_of
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
-from lightpen_extensions.simulator.motion import lean_vectors, postures_of
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator
 from lightpen_extensions.simulator.swings import simulate_centers

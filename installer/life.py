@@ -19,8 +19,7 @@ from installer.trial import (
 
 from lightpen.record.swings.reading import OPENER, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen_program.self_test.desk import NAMES, record_swing
-from lightpen_program.self_test.run import FILE_LIST, damaged_files
+from lightpen_program.self_test import FILE_LIST, NAMES, damaged_files, record_swing
 
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
 USUAL_PLATFORM = "offscreen"  # on which windows are seen nowhere

@@ -40,7 +40,7 @@ DROPPED = (
     "PySide6/plugins/imageformats/qgif.dll", "PySide6/plugins/imageformats/qicns.dll",
     "PySide6/plugins/imageformats/qtga.dll", "PySide6/plugins/imageformats/qwbmp.dll",
     "PySide6/plugins/imageformats/qwebp.dll",
-    # Without FFmpeg OpenCV reads videos of Motion JPEG; see lightpen.formats.videos.
+    # Without FFmpeg OpenCV reads videos of Motion JPEG: lightpen.formats.video_process.
     "cv2/opencv_videoio_ffmpeg*.dll",
     "cv2/data/*.xml",  # to find faces
     "cv2/LICENSE*",  # a copy of that beside the metadata

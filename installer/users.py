@@ -5,7 +5,7 @@ from pathlib import Path
 from installer.places import IS_WINDOWS
 from installer.trial import UNINSTALL, UNINSTALL_ALL, Trial
 
-from lightpen_program.self_test.run import FILE_LIST, damaged_files
+from lightpen_program.self_test import FILE_LIST, damaged_files
 
 TOO_OLD = 4  # exit status of the installer
 VERSION_KEY = r"HKLM\Software\Microsoft\Windows NT\CurrentVersion"

@@ -16,14 +16,13 @@ from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, with_content
 from lightpen.formats.observation_files import Centers
+from lightpen.formats.opened_files import Inputs, RigInputs, with_content
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.model.posture import rotations_of
-from lightpen.model.rig import Rig, rig_of
+from lightpen.model.rigid import Rig, rig_of, rotations_of
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.swing.preparation import Preparation

@@ -450,10 +450,10 @@ def stated() -> dict[str, Any]:
     from lightpen.detection.observations import observe_centers
     from lightpen.estimation.calibrate import calibrate
     from lightpen.estimation.reports.report import calibration_record
-    from lightpen.formats.hashes import InputFile, Inputs
     from lightpen.formats.observation_files import Centers
+    from lightpen.formats.opened_files import InputFile, Inputs
     from lightpen.model.limits import SwingLimits
-    from lightpen.model.origin import Origin
+    from lightpen.model.names import Origin
     from lightpen_extensions.simulator import swings
 
     camera, pen = swings.paper_camera(), swings.paper_pen()
@@ -550,22 +550,19 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     """Record a guided swing of the simulated pen, seen with a quarter of the pixels."""
     from dataclasses import replace
 
-    from lightpen.cameras.clock import SkippingClock
+    from lightpen.cameras.pairing import SkippingClock
     from lightpen.cameras.protocol import CameraSettings
     from lightpen.detection.pen_detection import PenDetection, detect_pen
     from lightpen.formats.opened_files import CameraFile, PenFile
     from lightpen.formats.rig_files import read_rig
     from lightpen.live.sources import SourceEnvironment, cameras_of
     from lightpen.model.limits import SwingLimits
-    from lightpen.record.swings.names import Names
+    from lightpen.record.swings.header import Names
     from lightpen.record.swings.writing import RecordWriter, SecondaryView
     from lightpen.swing.capture.state import start_swing
-    from lightpen.swing.image_sources import SecondCamera
-    from lightpen.swing.preparation import Preparation
-    from lightpen.swing.record_header import record_header
-    from lightpen.swing.swing_recorder import capture_image
-    from lightpen_extensions.simulator.camera import SimulatedCamera
-    from lightpen_extensions.simulator.follower import GuidedOperator
+    from lightpen.swing.preparation import Preparation, SecondCamera
+    from lightpen.swing.swing_recorder import capture_image, record_header
+    from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
     from lightpen_extensions.simulator.scene_files import write_sample_files
     from lightpen_extensions.simulator.scenes import Scene
     from lightpen_extensions.simulator.simulator import SceneSimulator

@@ -4,14 +4,14 @@ from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
 
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.record.library.signing.account import (
+from lightpen.archive.logbook import Logbook
+from lightpen.record.library.signing import (
     OwedFile,
     forget_owed,
     owe,
     owed_files,
+    station_name,
 )
-from lightpen.record.library.signing.station import station_name
 
 
 def enter_in(data: Path) -> None:

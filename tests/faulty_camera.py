@@ -6,7 +6,7 @@ from typing import Any
 
 from typing_extensions import override
 
-from lightpen.cameras.device_errors import busy, lost, not_found
+from lightpen.cameras.device_camera import busy, lost, not_found
 from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import message

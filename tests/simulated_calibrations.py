@@ -14,20 +14,17 @@ from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
-from lightpen.formats.observation_files import Centers
-from lightpen.formats.pairing import pair_images
+from lightpen.formats.observation_files import Centers, pair_images
 from lightpen.model.camera import Camera
-from lightpen.model.effective_tip import effective_tip
 from lightpen.model.ellipse import disc_images
-from lightpen.model.lens_field import LensField
-from lightpen.model.pen import Pen, grown
-from lightpen.model.rig import from_first
-from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.postures import Postures
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.fisheye import LensField
+from lightpen.model.pen import Pen, effective_tip, grown
+from lightpen.model.rigid import from_first, rotation_from_vector
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
+    Postures,
     Swing,
     leds_in_camera,
     paper_camera,

@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
+from lightpen.model.rigid import Rig
 from lightpen_extensions.simulator.swings import Swing, seen_from, simulate_centers
 
 

@@ -19,15 +19,14 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.formats.json_records import record_bytes
 from lightpen.formats.observation_files import Centers
+from lightpen.formats.opened_files import InputFile, Inputs
+from lightpen.formats.own_json import record_bytes
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen_extensions.measure.tasks.artefact import measure_artefacts
+from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen_extensions.measure.tasks.drift import measure_drift
 from lightpen_extensions.measure.tasks.fixed_point import (
     FIXED_POINT,
@@ -39,15 +38,16 @@ from lightpen_extensions.measure.tasks.probed_point import (
     StillFrames,
     measure_touches,
 )
+from lightpen_extensions.measure.tasks.registry import measure_artefacts
 from lightpen_extensions.measure.tasks.task import (
     Conditions,
     Found,
     VerificationChoices,
 )
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
+    Postures,
     paper_camera,
     paper_pen,
     perturbed_pen,

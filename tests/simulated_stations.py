@@ -10,17 +10,14 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.numbering import number_by_sketch
-from lightpen_extensions.discover.request import Request
-from lightpen_extensions.discover.scale import MeasuredLength
-from lightpen_extensions.discover.sightings import Sightings, sightings_of_centers
-from lightpen_extensions.simulator.postures import (
+from lightpen_extensions.discover.hypotheses import number_by_sketch
+from lightpen_extensions.discover.scale import MeasuredLength, Request
+from lightpen_extensions.discover.tracks import Sightings, sightings_of_centers
+from lightpen_extensions.simulator.swings import (
     FRAME_RATE,
     Postures,
-    operator_postures,
-)
-from lightpen_extensions.simulator.swings import (
     Swing,
+    operator_postures,
     simulate_centers,
     swing_from_postures,
 )

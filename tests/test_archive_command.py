@@ -11,16 +11,19 @@ from subprocess import CompletedProcess
 import pytest
 from tests.core.archive.conftest import accepted
 
-from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import open_file
-from lightpen.commands.supervisor import PASSWORD
+from lightpen.archive.growth import append, own_chain
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import open_file
+from lightpen.commands.arguments import PASSWORD
 from lightpen.local_time import local_now
 from lightpen.record.library.entered_files import ARCHIVE, entered_files
-from lightpen.record.library.signing.keys import key_folder
-from lightpen.record.library.supervision import Signature, read_supervision
-from lightpen.record.library.supervision_changes import set_password
-from lightpen_extensions.plant.address import SERVER
+from lightpen.record.library.signing import key_folder
+from lightpen.record.library.supervision import (
+    Signature,
+    read_supervision,
+    set_password,
+)
+from lightpen_extensions.plant.server import SERVER
 
 Run = Callable[..., CompletedProcess[str]]
 

@@ -22,18 +22,20 @@ from tests.core.archive.test_logbook import result
 from tests.core.archive.test_station_events import keep
 from tests.entering import enter_in
 
-from lightpen.archive.chains.chains import chain_at_home, chain_head, entries_of
-from lightpen.archive.chains.entries import (
+from lightpen.archive.chains import (
     ChainHead,
     FileHash,
     Kind,
     StoredEntry,
+    chain_at_home,
+    chain_head,
     chained,
+    columns_of,
+    entries_of,
 )
-from lightpen.archive.chains.rows import columns_of
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import look_into
+from lightpen.archive.checks import check_file
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import look_into
 from lightpen.errors import ArchiveError, FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import sha256
@@ -42,11 +44,19 @@ from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.library import entered_files
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item, retire_item
-from lightpen.record.library.signing.chain_keys import entry_text
-from lightpen.record.library.signing.keys import KEYS, key_folder, make_station_key
-from lightpen.record.library.signing.station import STATION_FILE
-from lightpen.record.library.supervision import Signature, read_supervision
-from lightpen.record.library.supervision_changes import save_limits, set_limits
+from lightpen.record.library.signing import (
+    KEYS,
+    STATION_FILE,
+    entry_text,
+    key_folder,
+    make_station_key,
+)
+from lightpen.record.library.supervision import (
+    Signature,
+    read_supervision,
+    save_limits,
+    set_limits,
+)
 from lightpen.record.library.tip_library import ItemKind, ListedTip, read_library
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 

@@ -19,7 +19,7 @@ from lightpen_extensions.boards.simulated_boards import (
     render_board,
     simulate_board_poses,
 )
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_program.extensions import main
 
 BOARD = "chessboard:7x5:20"

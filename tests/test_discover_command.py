@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tests.simulated_stations import leaning, random_station, seen_station
 
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.formats.rig_files import write_camera
 from lightpen_extensions.simulator.swings import swing_from_postures
 from lightpen_program.extensions import main
 

@@ -36,8 +36,8 @@ from lightpen_extensions.simulator.hand import Operator
 from lightpen.cameras.protocol import CameraSettings
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen.record.swings.interrupted import (find_unfinished,)
-from lightpen.swing.resuming import read_resumable
-from lightpen.record.swings.names import Names
+from lightpen.swing.swing_recorder import read_resumable
+from lightpen.record.swings.header import Names
 from lightpen.live.sources import SourceEnvironment
 from lightpen.swing.capture.state import (SwingEventKind,)
 from lightpen.model.limits import SwingLimits

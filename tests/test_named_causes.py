@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.pen_files import write_pen
+from lightpen.formats.rig_files import write_camera
 from lightpen.model.pen import Pen
 from lightpen_extensions.simulator.swings import (
     paper_camera,

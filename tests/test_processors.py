@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.pen_files import write_pen
-from lightpen.model.posture import rotations_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.formats.rig_files import write_camera
+from lightpen.model.rigid import rotation_from_vector, rotations_of
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,

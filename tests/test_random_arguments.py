@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from lightpen.cli import _parser
-from lightpen_extensions.plant.address import SERVER
+from lightpen_extensions.plant.server import SERVER
 from lightpen_program.extensions import EXTENSIONS
 
 _, COMMANDS = _parser([], None, EXTENSIONS)
@@ -120,8 +120,8 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with an archive of one entry."""
     from tests.core.archive.conftest import accepted
 
-    from lightpen.archive.chains.growth import append, own_chain
-    from lightpen.archive.store.database import open_file
+    from lightpen.archive.growth import append, own_chain
+    from lightpen.archive.store import open_file
 
     folder = tmp_path_factory.mktemp("archive") / "data"
     database = open_file(folder / "archive.sqlite")

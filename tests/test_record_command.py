@@ -14,10 +14,8 @@ from lightpen.detection.observations import observe_images
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.files import sha256
 from lightpen.record.swings.header import HEADER
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.reading import image_name, open_record
-from lightpen.record.swings.recorded_source import source
-from lightpen.record.swings.solving import solve_record
+from lightpen.record.swings.reading import JOURNAL, image_name, open_record
+from lightpen.record.swings.solving import solve_record, source
 from lightpen.record.swings.writing import note_excluded
 
 Run = Callable[..., CompletedProcess[str]]

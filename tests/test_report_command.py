@@ -15,10 +15,10 @@ from lightpen.comparisons.assessment import (
 from lightpen.comparisons.records import verification_record
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import record_bytes, record_heading
+from lightpen.formats.opened_files import InputFile
+from lightpen.formats.own_json import record_bytes, record_heading
 from lightpen.local_time import local_now
-from lightpen.record.folder.verifications import read_verification
+from lightpen.record.folder import read_verification
 from lightpen_app.print_report.verification import verification_print_report
 from lightpen_app.reporting import write_report
 

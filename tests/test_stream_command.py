@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pyigtl import OpenIGTLinkClient
 
-from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.record.calibrations import read_calibration
 
 Run = Callable[..., CompletedProcess[str]]
 LONGEST = 60.0  # s until a test gives up

@@ -8,15 +8,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 
-from lightpen.archive.chains.chains import entries_of
-from lightpen.archive.chains.entries import Kind
-from lightpen.archive.chains.growth import own_chain
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import open_file
+from lightpen.archive.chains import Kind, entries_of
+from lightpen.archive.growth import own_chain
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import open_file
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.guard_files import LIMITS_FOLDER
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_password
+from lightpen.record.library.supervision import LIMITS_FOLDER, Signature, set_password
 
 Run = Callable[..., CompletedProcess[str]]
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

@@ -13,17 +13,15 @@ import numpy as np
 import pytest
 from tests.accepted_tip import accept_tip
 
-from lightpen.archive.chains.chains import chain_at_home, entries_of
-from lightpen.archive.chains.entries import Event
-from lightpen.archive.store.database import look_into
+from lightpen.archive.chains import Event, chain_at_home, entries_of
+from lightpen.archive.store import look_into
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import StationLimits, VerificationLimits
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import save_limits
-from lightpen.record.swings.names import Names
+from lightpen.record.library.supervision import Signature, save_limits
+from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,

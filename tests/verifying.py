@@ -14,21 +14,21 @@ from tests.accepted_tip import Hold, Holder
 
 from lightpen.cameras.protocol import Frame, sealed
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.messages import Message
 from lightpen.model.artefacts import Artefact, ArtefactKind
-from lightpen.model.rig import rig_of
-from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.model.rigid import rig_of
+from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
-from lightpen_extensions.measure.measuring.artefacts import artefact_plan
+from lightpen_extensions.measure.measuring.plan import artefact_plan
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 from lightpen_extensions.measure.probing.probing import ProbingPhase
 from lightpen_extensions.measure.runner import VerificationRunner
-from lightpen_extensions.measure.session.session import SessionState
-from lightpen_extensions.measure.session.status import (
+from lightpen_extensions.measure.session import (
     ReadingState,
     SessionEventKind,
+    SessionState,
     VerificationStatus,
 )
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT

@@ -3,11 +3,14 @@
 import gc
 import logging
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import FrameType, TracebackType
+from typing import Self
 
 from PySide6.QtCore import (
     QMessageLogContext,
@@ -20,28 +23,112 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from lightpen.cameras.clock import MachineClock, SkippingClock
+from lightpen.cameras.pairing import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
 from lightpen.live.sources import Simulator, SourceEnvironment
 from lightpen.logs import end_log, log_file, write_log_to
 from lightpen.messages import printable
-from lightpen.record.library.signing.keys import KEYS
+from lightpen.record.library.signing import KEYS
 from lightpen_app.crash import CrashHook, versions
-from lightpen_app.end_signals import EndSignals
+from lightpen_app.face import Service
 from lightpen_app.faced import Face
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sounds import MutedSounds, find_sounds
+from lightpen_app.look.sounds import MutedSounds, Sounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.shell.sidebar import subject_of
-from lightpen_app.widgets.opened_folder import open_folder
-from lightpen_app.wizard_pages import make_pages, page_titles
-from lightpen_app.work.garbage import GarbageCollector
-from lightpen_app.work.job import Job
+from lightpen_app.steps.start.page import StartPage
+from lightpen_app.widgets.controls import open_folder
+from lightpen_app.widgets.page import Page, step_titles
+from lightpen_app.work.job import GarbageCollector, Job
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
+
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+TICK_MS = 100
+
+
+class EndSignals(QObject):
+    """Handles these signals within a context.
+
+    Python runs signal handlers between its own instructions; as there are none while Qt
+    waits, a timer provides some.
+    """
+
+    # The number of the first signal, emitted from the event loop, so that nothing is
+    # cut off in its midst.
+    came = Signal(int)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.number = 0  # of the first signal; 0 before
+        self._timer = QTimer(self, interval=TICK_MS)
+
+        # Connections
+        self._timer.timeout.connect(self._on_tick)
+
+    def __enter__(self) -> Self:
+        heard = [n for n in END_SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
+        self._before = {number: signal.getsignal(number) for number in heard}
+        for number in heard:
+            signal.signal(number, self._note)
+        self._timer.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._timer.stop()
+        for number, handler in self._before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.number = self.number or number
+
+    def _on_tick(self) -> None:
+        if self.number:
+            self._timer.stop()
+            self.came.emit(self.number)
+
+
+def make_pages(
+    workbench: Workbench, sounds: Sounds, services: Sequence[Service] = ()
+) -> Iterator[Page]:
+    """Make one page after the other, and import its modules only then.
+
+    The first is painted before the others are made; those of extensions stand before
+    the last.
+    """
+    yield StartPage(workbench, services)
+    from lightpen_app.steps.camera.page import CameraPage
+
+    yield CameraPage(workbench, sounds, services)
+    from lightpen_app.steps.leds.page import LedsPage
+
+    yield LedsPage(workbench, services)
+    from lightpen_app.steps.swing.page import SwingPage
+
+    yield SwingPage(workbench, sounds, services)
+    from lightpen_app.steps.review.page import ReviewPage
+
+    yield ReviewPage(workbench, services)
+    for each in services:
+        yield from each.pages(sounds)
+    from lightpen_app.steps.history.page import HistoryPage
+
+    yield HistoryPage(workbench, services)
+
+
+def page_titles(services: Sequence[Service] = ()) -> tuple[str, ...]:
+    """Return the titles of all pages, in their order."""
+    *own, last = step_titles().values()
+    return (*own, *(title for each in services for title in each.titles()), last)
+
 
 # s after which a thread that computes lets the window continue. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
@@ -181,8 +268,8 @@ def run(
 ) -> int:
     """Show the wizard until its window closes, and return the exit status.
 
-    The swing is shown, see `lightpen.record.results.opening`. Raises `UsageError` if
-    there is no display.
+    The swing is shown, see `lightpen.record.results.result_folder`. Raises `UsageError`
+    if there is no display.
     """
     if not has_display():
         raise UsageError("application.no-display")

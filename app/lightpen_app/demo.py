@@ -7,9 +7,9 @@ from dataclasses import replace
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.face import DemoStep, Service
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow

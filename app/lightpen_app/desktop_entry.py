@@ -12,8 +12,7 @@ import sys
 from pathlib import Path
 
 from lightpen.errors import FileError, UsageError
-from lightpen.formats.files import write_whole
-from lightpen.formats.system_reasons import strerror
+from lightpen.formats.files import strerror, write_whole
 from lightpen_resources import RESOURCES
 
 MIME_TYPE = "application/x-lightpen-swing"

@@ -8,16 +8,16 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.page import Page
-from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:  # they take long to be imported
-    from lightpen.archive.chains.entries import Event
-    from lightpen.record.exports.formats import ExportFormat
+    from lightpen.archive.chains import Event
+    from lightpen.record.exports import ExportFormat
 
 W = TypeVar("W", bound=QWidget)
 

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lightpen.formats.files import A_FILE, LARGEST_RECORD, read_bytes, write_whole
-from lightpen.model.laboratory import Laboratory
-from lightpen.record.exports.exports import save_new
-from lightpen.record.folder.verifications import is_verification
+from lightpen.model.names import Laboratory
+from lightpen.record.exports import save_new
+from lightpen.record.folder import is_verification
 from lightpen_app.application import has_display, make_application
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import load_fonts
@@ -17,7 +17,7 @@ from lightpen_app.print_report.control import (
     read_calibration_file,
     read_kept_verification,
 )
-from lightpen_app.print_report.printing import pdf_of, print_report_of, report_stem
+from lightpen_app.print_report.pages import pdf_of, print_report_of, report_stem
 from lightpen_app.work.settings import Settings, settings_file
 
 

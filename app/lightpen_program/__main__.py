@@ -34,7 +34,7 @@ class Launchers:
 
     def test_itself(self, report: Path) -> int:
         """Test the installation and write a report."""
-        from lightpen_program.self_test.run import test_program
+        from lightpen_program.self_test import test_program
 
         return test_program(report)
 

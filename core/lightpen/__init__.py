@@ -37,12 +37,12 @@ _PLACES = {
     "detect": "detection.observations",
     "find_images": "formats.images",
     "judge": "estimation.reports.verdict",
-    "read_calibration": "record.calibrations.calibrations",
+    "read_calibration": "record.calibrations",
     "read_camera": "formats.camera_files",
     "read_pen": "formats.pen_files",
     "read_poses": "formats.observation_files",
     "read_rig": "formats.rig_files",
-    "reported": "estimation.reports.methods",
+    "reported": "estimation.reports.report_warnings",
 }
 _OTHERWISE = {"detect": "observe_images"}  # names in their modules
 __all__ = list(_PLACES)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
-    from lightpen.archive.logbook.logbook import Replicate
+    from lightpen.archive.logbook import Replicate
     from lightpen.live.sources import Simulator
 
 SubParsers: TypeAlias = "_SubParsersAction[ArgumentParser]"

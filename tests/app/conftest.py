@@ -48,18 +48,17 @@ from tests.app.disk import disk_watch
 from tests.app.patience import PATIENCE_MS
 from typing_extensions import override
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import SourceEnvironment
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import Record
 from lightpen.record.swings.solving import solve_record
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
-from lightpen_app.work.garbage import collect_if_due
-from lightpen_app.work.job import Report
+from lightpen_app.work.job import Report, collect_if_due
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.hand import Operator
@@ -141,7 +140,7 @@ def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lightpen_extensions.simulator.camera.USUAL_FRAME_RATE", 7.0)
     monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 1000)
     # Nobody in a test presses a key twice by accident, unless it says so.
-    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 0)
+    monkeypatch.setattr("lightpen_app.shell.page_area.GUARD_MS", 0)
     monkeypatch.setattr("lightpen_app.steps.review.page.READING_MS", 0)
 
 

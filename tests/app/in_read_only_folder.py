@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QLabel
 
 from lightpen.live.sources import SourceEnvironment
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen_app.look.theme import TextSize
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import FilePaths, Station
+from lightpen_app.work.settings import FilePaths, Settings, Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -7,10 +7,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QImage
 
 from lightpen.arrays import Image
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.work.settings import Settings, Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QAbstractButton, QLabel, QScrollArea, QTabBar, QWi
 
 from lightpen_app.look.theme import TextSize
 from lightpen_app.shell.main_window import MainWindow
-from lightpen_app.steps.leds.led_table import LedTable
-from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.steps.leds.table_panel import LedTable
+from lightpen_app.widgets.fitting import FittedText
 from lightpen_app.widgets.plots import Plot
 
 

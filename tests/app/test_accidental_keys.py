@@ -19,7 +19,7 @@ Key = Qt.Key
 @pytest.fixture(autouse=True)
 def real_delays(unhurried: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """The delays that an operator has, far longer than this test presses keys."""
-    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 3000)
+    monkeypatch.setattr("lightpen_app.shell.page_area.GUARD_MS", 3000)
     monkeypatch.setattr("lightpen_app.steps.review.page.READING_MS", 1000)
 
 

@@ -63,7 +63,7 @@ sys.exit(application.run(faces()))
 """
 LATER = {
     *("pyqtgraph", "scipy", "sqlalchemy", "asyncio", "harvesters", "pypylon"),
-    *("lightpen_app.demo", "lightpen_app_extensions.discover.discovery_window"),
+    *("lightpen_app.demo", "lightpen_app_extensions.discover.window"),
     *(f"lightpen_app.steps.{step}.page" for step in ("camera", "leds", "swing")),
     *(f"lightpen_app.steps.{step}.page" for step in ("review", "history")),
     *("lightpen_app_extensions.measure.verify_page",),

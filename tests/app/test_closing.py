@@ -23,8 +23,8 @@ from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import Record, open_record
 from lightpen.record.swings.solving import Solution, solve_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.swing.resuming import read_resumable
-from lightpen_app.end_signals import END_SIGNALS, EndSignals
+from lightpen.swing.swing_recorder import read_resumable
+from lightpen_app.application import END_SIGNALS, EndSignals
 from lightpen_app.work.job import Report
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.camera import SimulatedCamera
@@ -74,7 +74,7 @@ SWINGING = """
 import shutil
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QMessageBox
-from lightpen.swing.resuming import read_resumable
+from lightpen.swing.swing_recorder import read_resumable
 from lightpen_app.application import run
 from lightpen_app.face import Service
 

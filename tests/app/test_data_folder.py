@@ -19,7 +19,7 @@ SHARED = "The program is open in other windows using the same data folder, "
 def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
     open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lightpen_app.work.folder_watch.LOOKING_MS", 100)
+    monkeypatch.setattr("lightpen_app.work.workbench.LOOKING_MS", 100)
     first = open_wizard()
     assert not first.tells(SHARED)
     second = open_wizard()

@@ -7,11 +7,10 @@ import pytest
 from PySide6.QtCore import Qt
 
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.steps.start.day_view import DayView
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_app.work.settings import Settings, Station, StoredCamera
 from lightpen_extensions.simulator.hand import Operator
 
 if TYPE_CHECKING:

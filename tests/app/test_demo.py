@@ -17,10 +17,9 @@ from tests.verifying import found_by
 from lightpen.model.limits import SwingLimits
 from lightpen_app import demo as demo_module
 from lightpen_app.demo import NAMES, Demo
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.work.settings import Settings, Station
 from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.simulator.scenes import Scene
 

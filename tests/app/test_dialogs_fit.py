@@ -9,20 +9,16 @@ from pytestqt.qtbot import QtBot
 from tests.app.room import clipped_words, scrolled_sideways
 
 from lightpen.record.library.tip_library import ItemKind
-from lightpen_app.shell.about import About
-from lightpen_app.shell.help_window import HelpWindow
-from lightpen_app.steps.camera.part_dialog import PartDialog
-from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
-from lightpen_app.steps.start.assumptions_panel import AssumptionsDialog
-from lightpen_app.steps.start.item_form import ItemForm
+from lightpen_app.shell.menus import About, HelpWindow
+from lightpen_app.steps.camera.intrinsics_panel import PartDialog
+from lightpen_app.steps.review.result_export import LaboratoryDialog
+from lightpen_app.steps.start.item_form import ItemForm, TipPicture
 from lightpen_app.steps.start.library_dialog import LibraryDialog
-from lightpen_app.steps.start.limits_dialog import LimitsDialog
-from lightpen_app.steps.start.tip_picture import TipPicture
-from lightpen_app.widgets.fitted_window import FRAME, fitted_place
-from lightpen_app.widgets.page_scroll import DialogScroll
+from lightpen_app.steps.start.limits_dialog import AssumptionsDialog, LimitsDialog
+from lightpen_app.widgets.fitting import FRAME, DialogScroll, fitted_place
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.boards.board_window import BoardWindow
-from lightpen_app_extensions.stream.stream_dialog import StreamDialog
+from lightpen_app_extensions.boards.window import BoardWindow
+from lightpen_app_extensions.stream.service import StreamDialog
 from lightpen_extensions.simulator.swings import paper_camera
 
 SMALL = QSize(853, 533)  # 1280 x 800 at 150 %

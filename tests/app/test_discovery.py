@@ -12,7 +12,7 @@ from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.discover.discovery_run import DiscoveryRun
-from lightpen_app_extensions.discover.discovery_window import DiscoveryWindow
+from lightpen_app_extensions.discover.window import DiscoveryWindow
 
 
 def test_both_panels_without_a_file_ask_for_the_swing(qtbot: QtBot) -> None:

@@ -12,13 +12,17 @@ from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 from tests.app.typed_numbers import type_number
 
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.stream.service import KEY, StreamChoice, StreamService
-from lightpen_app_extensions.stream.stream_dialog import StreamDialog
+from lightpen_app_extensions.stream.service import (
+    KEY,
+    StreamChoice,
+    StreamDialog,
+    StreamService,
+)
 from lightpen_extensions.stream.server import LOOPBACK, StreamPlace
 
 if TYPE_CHECKING:

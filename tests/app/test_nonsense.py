@@ -10,9 +10,8 @@ from pytestqt.qtbot import QtBot
 from tests.app.test_dialogs_fit import MADE
 
 from lightpen_app.look.theme import Tone
-from lightpen_app.widgets.date_field import DateField
+from lightpen_app.widgets.fields import DateField, PathField
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.path_field import PathField
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:

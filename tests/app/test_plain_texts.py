@@ -22,11 +22,10 @@ from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedCone, ListedPen, ListedTip
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
-from lightpen_app.look.tooltips import plain_tooltip
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station
+from lightpen_app.look.words import plain_tooltip
+from lightpen_app.work.settings import Settings, Station
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 

@@ -6,7 +6,7 @@ from pytestqt.qtbot import QtBot
 from tests.app.room import missing_input_of
 
 from lightpen_app.look.theme import TextSize, font, text_label
-from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.controls import PushButton
 
 
 def test_a_button_is_not_made_narrower_than_its_words(qtbot: QtBot) -> None:

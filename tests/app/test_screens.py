@@ -17,8 +17,8 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QLabel, QTabWidget
 from tests.app.room import SizeClass, room_of
 
-from lightpen.record.swings.names import Names
-from lightpen_app.widgets.fitted_window import FRAME
+from lightpen.record.swings.header import Names
+from lightpen_app.widgets.fitting import FRAME
 from lightpen_resources import languages
 
 ROOT = Path(__file__).parents[2]

@@ -32,12 +32,11 @@ from tests.app.walks import (
 
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.wizard_pages import page_titles
-from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen.model.names import Origin
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.application import page_titles
+from lightpen_app.work.settings import Preferences, Settings, Station, StoredCamera
 from lightpen_extensions.simulator.simulator import SceneSimulator
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QWidget
 from tests.app.walks import NAMES, page_text, read_out, result_on_disk, set_up
 from tests.faulty_camera import scene_of
 
-from lightpen.record.swings.recordings import files_beside
+from lightpen.record.swings.solving import files_beside
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.pen_view import PenView
 from lightpen_app_extensions.discover.discovery_run import DISCOVERIES
-from lightpen_app_extensions.discover.discovery_window import DiscoveryWindow
+from lightpen_app_extensions.discover.window import DiscoveryWindow
 
 if TYPE_CHECKING:
     from tests.app.conftest import Walker

@@ -9,10 +9,9 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.work.settings import Settings, Station, StoredCamera
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

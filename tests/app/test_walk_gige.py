@@ -11,18 +11,16 @@ from tests.gige_simulator import ADDRESS, GigeSimulator
 from typing_extensions import override
 
 from lightpen.arrays import Image
-from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import CameraSettings, Region
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
-from lightpen.record.swings.names import Names
+from lightpen.model.names import Origin
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import open_record
-from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import FilePaths, Station, StoredCamera
-from lightpen_extensions.simulator.camera import SimulatedCamera
-from lightpen_extensions.simulator.follower import GuidedOperator
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.work.settings import FilePaths, Settings, Station, StoredCamera
+from lightpen_extensions.simulator.camera import GuidedOperator, SimulatedCamera
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.simulator import SceneSimulator

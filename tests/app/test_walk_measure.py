@@ -10,15 +10,14 @@ from msgspec import structs
 from PySide6.QtWidgets import QListWidget
 from tests.accepted_tip import accept_tip
 
-from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.record.results.result_folder import RESULTS, SIMULATED
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.print_report.preview import PrintReportWindow
-from lightpen_app.work.settings import Settings, stored_group
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.print_report.control import PrintReportWindow
+from lightpen_app.work.settings import Settings, Station, StoredCamera, stored_group
 from lightpen_extensions.measure.measuring.plan_checks import write_plan
-from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.probing_operator import plate_plan
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 from lightpen_program.extensions import main

@@ -7,10 +7,9 @@ from PySide6.QtCore import Qt
 from tests.accepted_tip import accept_tip
 
 from lightpen.record.library.supervision import read_supervision
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
-from lightpen_app.work.settings import Settings, stored_group
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
+from lightpen_app.work.settings import Settings, Station, StoredCamera, stored_group
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 
 if TYPE_CHECKING:

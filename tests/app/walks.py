@@ -12,7 +12,7 @@ import numpy as np
 from PySide6.QtCore import Qt
 
 from lightpen.arrays import FloatArray
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.results.results import Result
 
 if TYPE_CHECKING:

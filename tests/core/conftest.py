@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.faulty_camera import FaultyCamera
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -18,18 +18,17 @@ from lightpen.messages import Message
 from lightpen.model.limits import SwingLimits
 from lightpen.record.results.result_folder import RESULTS, SIMULATED, FolderArchive
 from lightpen.record.results.results import Result
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.capture.state import Phase, SwingEvent, SwingEventKind, SwingState
-from lightpen.swing.image_sources import SecondCamera
-from lightpen.swing.preparation import Preparation
-from lightpen.swing.resuming import read_resumable
+from lightpen.swing.preparation import Preparation, SecondCamera
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import SwingStatus
-from lightpen_extensions.simulator.follower import GuidedOperator
+from lightpen.swing.swing_recorder import read_resumable
+from lightpen_extensions.simulator.camera import GuidedOperator
 from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene

@@ -20,8 +20,7 @@ import lightpen_extensions
 from lightpen.catalogue import command_line
 from lightpen.cli import ADVICE
 from lightpen.errors import FileError, LightpenError
-from lightpen.messages import CATALOGUE, TRANSLATED, Message, message
-from lightpen.swing_messages import Code
+from lightpen.messages import CATALOGUE, TRANSLATED, Code, Message, message
 
 CORE, CORE_EXTENSIONS = (
     Path(each.__path__[0]) for each in (lightpen, lightpen_extensions)

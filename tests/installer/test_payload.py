@@ -9,7 +9,7 @@ from installer import runtime
 from installer.launchers import ICON_SIZES, icon, numbers_of, order_of
 from installer.payload import all_files, set_times, write_file_list
 
-from lightpen_program.self_test.run import FILE_LIST, damaged_files
+from lightpen_program.self_test import FILE_LIST, damaged_files
 
 
 def test_the_list_of_files_is_the_one_that_the_self_test_reads(tmp_path: Path) -> None:

@@ -1,7 +1,10 @@
 """The languages of the program, changeable at run time."""
 
+from collections.abc import Iterable
+
 from PySide6.QtCore import (
     QT_TRANSLATE_NOOP,
+    QCoreApplication,
     QLibraryInfo,
     QLocale,
     QObject,
@@ -9,6 +12,8 @@ from PySide6.QtCore import (
 )
 from PySide6.QtWidgets import QApplication
 
+from lightpen.formats.own_json import StoredMessage
+from lightpen.messages import COMMA, Message
 from lightpen_resources import SOURCE_LANGUAGE, TRANSLATIONS, languages
 
 # Each language is named in itself, for users who cannot read the others.
@@ -67,3 +72,23 @@ class LanguageSwitch(QObject):
         if translator.load(name, folder):
             self._application.installTranslator(translator)
         self._translators.append(translator)
+
+
+CONTEXT = "core"
+
+
+def worded(message: Message | StoredMessage | None) -> str:
+    """Return the words of a message of the core; empty if there is none."""
+    if isinstance(message, StoredMessage):
+        return message.worded(translated)
+    return "" if message is None else message.text(translated)
+
+
+def listed(words: Iterable[str]) -> str:
+    """Return words with the comma of the language between them."""
+    return worded(COMMA).join(words)
+
+
+def translated(template: str) -> str:
+    """Return a template of the core in the language that is chosen."""
+    return QCoreApplication.translate(CONTEXT, template)

@@ -9,6 +9,7 @@ segmentation fault in `BindingManager::releaseWrapper` (PySide 6.11).
 from typing import TypeAlias, TypeVar
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QGridLayout,
@@ -125,3 +126,9 @@ def _attached(
     elif margins is not None:
         layout.setContentsMargins(*margins)
     return layout
+
+
+def announce(widget: QWidget, text: str) -> None:
+    """Announce a text of a widget, if a screen reader is active."""
+    if text and QAccessible.isActive():
+        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, text))

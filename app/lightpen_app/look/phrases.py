@@ -10,14 +10,15 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.messages import Message
-from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen.model.origin import Origin
-from lightpen.model.posture import Posture
+from lightpen.messages import MOST_SIDES, SIDES, Code, Message
+from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS, Decision
+from lightpen.model.names import Origin
+from lightpen.model.rigid import Posture
 from lightpen.swing.capture.state import Pause, Phase
 from lightpen.swing.preparation import MissingInput
-from lightpen.swing_messages import MOST_SIDES, SIDES, Code
-from lightpen_app.look.sentences import listed, worded
+from lightpen_app.look.languages import listed, worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
 from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
 
 CONTEXT = "phrases"
@@ -194,7 +195,7 @@ _SIDES = (
 
 
 def phrase(message: Message, heading: float | None = None) -> Instruction:
-    """Return the words of a message of `lightpen.swing_messages`.
+    """Return the words of a message of `lightpen.messages`.
 
     ``heading`` is the operator's right as the camera sees it, rad; without it sides are
     reported as the camera sees them.
@@ -343,3 +344,18 @@ def _by_own_sides(message: Message, heading: float) -> Message:
 
 def _translated(text: str) -> str:
     return QCoreApplication.translate(CONTEXT, text) if text else ""
+
+
+GRADE_MARKS: dict[Grade, tuple[Sign, Tone]] = {
+    Grade.PASS: (Sign.CHECK, Tone.GOOD),
+    Grade.SCALE: (Sign.CHECK, Tone.ACTIVE),
+    Grade.STEADY: (Sign.CHECK, Tone.ACTIVE),
+    Grade.CHECK: (Sign.WARNING, Tone.WARN),
+    Grade.REPEAT: (Sign.CROSS, Tone.BAD),
+}
+DECISION_MARKS: dict[Decision | None, tuple[Sign, Tone]] = {
+    Decision.ACCEPTED: (Sign.CHECK, Tone.GOOD),
+    Decision.OPEN: (Sign.WARNING, Tone.WARN),
+    Decision.REJECTED: (Sign.CROSS, Tone.BAD),
+    None: (Sign.CHECK, Tone.PLAIN),
+}

@@ -14,8 +14,7 @@ from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.look.words import with_short_words
+from lightpen_app.look.words import set_tooltip, with_short_words
 from lightpen_resources import RESOURCES
 
 FAMILIES = ("Lightpen Sans", "Lightpen Sans SC")

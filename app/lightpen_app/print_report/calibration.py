@@ -9,25 +9,27 @@ from PySide6.QtGui import QPainter
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord, Pair
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.model.laboratory import Laboratory
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import CalibrationFile
-from lightpen.record.calibrations.decision_rule import decision_rule
-from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
-from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
+from lightpen.model.coverage import COVERAGE_FACTOR
+from lightpen.model.names import Laboratory, Origin
+from lightpen.record.calibrations import (
+    OVERDUE,
+    RETIRED,
+    CalibrationFile,
+    decision_rule,
+)
 from lightpen.record.library.entered_files import EntryPlace
+from lightpen.record.recomputing import ReestimatedPoses
 from lightpen.record.results.results import TipChange
+from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.phrases import grade_text, origin_text, reason_text, share_text
-from lightpen_app.look.quantities import (
+from lightpen_app.look.theme import LIGHT
+from lightpen_app.look.words import (
     AXES,
     MAX_DECIMALS,
     MICROMETRES,
     decimals_for,
     number_text,
 )
-from lightpen_app.look.sentences import listed, worded
-from lightpen_app.look.theme import LIGHT
 from lightpen_app.print_report.blocks import (
     WIDTH,
     Block,
@@ -39,14 +41,6 @@ from lightpen_app.print_report.blocks import (
     text_height,
 )
 from lightpen_app.print_report.charts import Chart
-from lightpen_app.print_report.common import (
-    environment_texts,
-    laboratory_texts,
-    proof_texts,
-    signatures,
-    traced_rows,
-    zoned_moment_text,
-)
 from lightpen_app.print_report.figures import (
     budget_chart,
     certainty_chart,
@@ -59,7 +53,18 @@ from lightpen_app.print_report.figures import (
     running_chart,
     tips_chart,
 )
-from lightpen_app.print_report.template import Content, cells, condition, fill
+from lightpen_app.print_report.template import (
+    Content,
+    cells,
+    condition,
+    environment_texts,
+    fill,
+    laboratory_texts,
+    proof_texts,
+    signatures,
+    traced_rows,
+    zoned_moment_text,
+)
 
 translate = QCoreApplication.translate
 

@@ -14,8 +14,8 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
 from lightpen.arrays import FloatArray
-from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import LIGHT
+from lightpen_app.look.words import number_text
 from lightpen_app.print_report.blocks import (
     CENTER,
     HAIRLINE,

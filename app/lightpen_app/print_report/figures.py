@@ -9,11 +9,18 @@ from PySide6.QtGui import QColor, QPainter
 from lightpen.arrays import FloatArray
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen.record.calibrations.reestimated_poses import ReestimatedPoses
-from lightpen_app.look.arrows import MANY, arrow_lines, arrow_scale, cell_means
-from lightpen_app.look.budget_figure import Drawing, budget_figure, paint_budget
-from lightpen_app.look.quantities import AXES, MICROMETRES, micrometres_text
+from lightpen.record.recomputing import ReestimatedPoses
+from lightpen_app.look.figures import (
+    MANY,
+    Drawing,
+    arrow_lines,
+    arrow_scale,
+    budget_figure,
+    cell_means,
+    paint_budget,
+)
 from lightpen_app.look.theme import LIGHT
+from lightpen_app.look.words import AXES, MICROMETRES, micrometres_text
 from lightpen_app.print_report.blocks import (
     CENTER,
     HAIRLINE,

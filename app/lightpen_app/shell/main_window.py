@@ -28,23 +28,24 @@ from lightpen_app.crash import versions
 from lightpen_app.face import Service
 from lightpen_app.look.layouts import grid_layout
 from lightpen_app.look.theme import GRID, Tone
-from lightpen_app.shell.about import About
-from lightpen_app.shell.action_bar import ActionBar
-from lightpen_app.shell.help_window import HelpWindow
-from lightpen_app.shell.last_input import LastInput
-from lightpen_app.shell.options_menu import OptionsMenu
-from lightpen_app.shell.page_area import PageArea
-from lightpen_app.shell.sidebar import Sidebar, Subject
-from lightpen_app.shell.step_list import Status, Step, StepButton, list_steps
-from lightpen_app.widgets.fitted_window import FRAME, fit_screen
-from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
+from lightpen_app.shell.menus import About, HelpWindow, OptionsMenu
+from lightpen_app.shell.page_area import ActionBar, LastInput, PageArea
+from lightpen_app.shell.sidebar import (
+    Sidebar,
+    Status,
+    Step,
+    StepButton,
+    Subject,
+    list_steps,
+)
+from lightpen_app.widgets.bars import AskingBar
+from lightpen_app.widgets.controls import ENTER_KEYS, PAGE_KEYS
+from lightpen_app.widgets.fitting import FRAME, ResponsiveLayout, fit_screen
 from lightpen_app.widgets.number_field import is_refusing
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.page import MainAction, Page, step_titles
-from lightpen_app.widgets.prompt_bar import AskingBar
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.work.notifications import Notifications
+from lightpen_app.widgets.state_banner import StatusMessage
+from lightpen_app.work.job import Notifications
 from lightpen_app.work.settings import Preferences, Settings, data_folder
 from lightpen_resources import RESOURCES
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from PySide6.QtWidgets import QAbstractButton, QFrame, QWidget
 
 from lightpen.live.sources import Operator
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import set_tooltip
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.work.live_view import LiveView
 
 

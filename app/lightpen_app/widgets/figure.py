@@ -20,9 +20,9 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.csv_cells import csv_table
+from lightpen.formats.tables import csv_table
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
-from lightpen_app.widgets.translated import anew
+from lightpen_app.widgets.fields import anew
 
 PNG_SCALE = 2
 MARK_HEIGHT = 3 * GRID  # px, below a saved plot

@@ -19,9 +19,9 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import Image
-from lightpen_app.look.pooling import pooled
+from lightpen_app.look.figures import pooled
 from lightpen_app.look.theme import DARK, GRID, TextSize, Tone, font
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.fields import Translated
 
 MAX_ZOOM = 16.0
 ZOOM_STEP = 1.25

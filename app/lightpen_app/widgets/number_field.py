@@ -7,10 +7,9 @@ from PySide6.QtGui import QFocusEvent, QHideEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QScrollArea, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.look.units import TYPED, unit_size
-from lightpen_app.widgets.keys import ENTER_KEYS, LeavesPageKeys
+from lightpen_app.look.words import TYPED, number_text, unit_size
+from lightpen_app.widgets.controls import ENTER_KEYS, LeavesPageKeys
 
 ARROWS = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
 WHEEL_STEP = 120  # eighths of a degree

@@ -10,10 +10,10 @@ from typing_extensions import override
 from lightpen_app.look.layouts import grid_layout, vertical_layout
 from lightpen_app.look.theme import GRID, Tone, letters_for
 from lightpen_app.look.words import PARTED
-from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import FittedText
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.state_banner import State, StateBanner
-from lightpen_app.widgets.translated import Translated
 
 DISTANCES_M = (1, 2, 3, 4, 6)
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width

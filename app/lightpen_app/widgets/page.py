@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen_app.look.theme import Tone
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.fields import Translated
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
-from lightpen.model.posture import Posture, rotations_of
+from lightpen.model.rigid import Posture, rotations_of
 from lightpen_app.look.signs import draw_arrow
 from lightpen_app.look.theme import Colors, colors_of
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import set_tooltip
+from lightpen_app.widgets.fields import Translated
 
 RAISED = math.radians(24)  # of the eye above the plane of the cone
 WIDTH, HEIGHT = 1.15, 1.3  # of the drawing, in lengths of the pen

@@ -21,8 +21,8 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import MAX_COORDINATE, Pen
 from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, font
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import set_tooltip
+from lightpen_app.widgets.fields import Translated
 
 START_YAW, START_PITCH = math.radians(-20), math.radians(16)
 MAX_PITCH = math.radians(88)

@@ -21,12 +21,12 @@ from typing_extensions import override
 
 from lightpen.arrays import IntArray
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen.model.posture import Posture
+from lightpen.model.rigid import Posture
 from lightpen_app.look.signs import Sign, draw_arrow, draw_sign
 from lightpen_app.look.theme import Colors, TextSize, colors_of, font
-from lightpen_app.widgets.camera_mark import CameraPosition, draw_camera
-from lightpen_app.widgets.fitted_text import fitted_size
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import fitted_size
+from lightpen_app.widgets.live_markers import CameraPosition, draw_camera
 
 MAX_TILT = math.radians(36)  # drawn at the rim
 TILTS = (0.0, *TILT_RINGS, MAX_TILT)

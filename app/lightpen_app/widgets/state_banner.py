@@ -1,25 +1,41 @@
-"""A state as word, symbol and colour, legible from a distance."""
+"""The state of the current task and of an item: banner, marks and signs."""
 
 from dataclasses import dataclass
 from math import ceil
+from typing import Self
 
-from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QCoreApplication, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QFontMetricsF,
+    QIcon,
     QPainter,
     QPaintEvent,
+    QPixmap,
     QResizeEvent,
     QShowEvent,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.announcements import announce
+from lightpen.model.names import Origin
+from lightpen.record.library.tip_library import ItemKind, StationStatus, TipStatus
+from lightpen.record.swings.header import Names
+from lightpen_app.look.layouts import announce, horizontal_layout
+from lightpen_app.look.phrases import origin_text
 from lightpen_app.look.signs import Sign, draw_sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
-from lightpen_app.look.words import phrases_whole
-from lightpen_app.widgets.fitted_text import WRAPPED, fitted_size
+from lightpen_app.look.theme import (
+    GRID,
+    TextSize,
+    Tone,
+    colors_of,
+    font,
+    set_tone,
+    text_label,
+)
+from lightpen_app.look.translatable import QT_TRANSLATE_NOOP
+from lightpen_app.look.words import PARTED, breakable, phrases_whole
+from lightpen_app.widgets.fitting import WRAPPED, fitted_size
 
 
 @dataclass(frozen=True)
@@ -209,3 +225,173 @@ class StateBanner(QWidget):
             self._detail_px = size
             painter.setFont(font(size))
             painter.drawText(detail_box, wrapped, detail)
+
+
+SIDE = 2 * GRID
+
+
+@dataclass(frozen=True)
+class StatusMessage:
+    """Message with its sign and tone."""
+
+    text: str = ""  # empty for nothing to remark
+    sign: Sign = Sign.NONE
+    tone: Tone = Tone.PLAIN
+
+    @classmethod
+    def good(cls, text: str) -> Self:
+        """Return a message on what is as it should be."""
+        return cls(text, Sign.CHECK, Tone.GOOD)
+
+    @classmethod
+    def warning(cls, text: str) -> Self:
+        """Return a message on what needs attention."""
+        return cls(text, Sign.WARNING, Tone.WARN)
+
+    @classmethod
+    def fault(cls, text: str) -> Self:
+        """Return a message on what failed."""
+        return cls(text, Sign.CROSS, Tone.BAD)
+
+
+class SignLabel(QWidget):
+    """Shows a status message, in several lines if it wraps; hidden without one."""
+
+    def __init__(self, *, wraps: bool = True) -> None:
+        super().__init__()
+        self._value = StatusMessage()
+
+        # Widgets
+        self._mark = _SignMark()
+        self._words = text_label(TextSize.BODY)
+        self._words.setWordWrap(wraps)
+
+        # Layout
+        horizontal_layout(
+            self, (self._mark, 0, Qt.AlignmentFlag.AlignTop), (self._words, 1)
+        )
+
+        self.hide()
+
+    def value(self) -> StatusMessage:
+        """Return the value."""
+        return self._value
+
+    def set_value(self, value: StatusMessage) -> None:
+        """Show another remark."""
+        if value == self._value:
+            return
+        self._value = value
+        self._mark.set_value(value)
+        self._words.setText(breakable(value.text))
+        set_tone(self._words, value.tone)
+        self.setAccessibleName(value.text)
+        self.setVisible(bool(value.text))
+
+
+class _SignMark(QWidget):
+    """The sign alone, as high as the first line of the words."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value = StatusMessage()
+        fixed = QSizePolicy.Policy.Fixed
+        self.setSizePolicy(fixed, fixed)
+
+    def set_value(self, value: StatusMessage) -> None:
+        self._value = value
+        self.update()
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(SIDE, self.fontMetrics().height())
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        color = colors_of(self.palette()).tone(self._value.tone)
+        painter = QPainter(self)
+        draw_sign(painter, QRectF(self.rect()), self._value.sign, color)
+
+
+CONTEXT = "standing"
+
+
+_WORDS: dict[TipStatus, str] = {
+    TipStatus.VALID: QT_TRANSLATE_NOOP("standing", "valid"),
+    TipStatus.OVERDUE: QT_TRANSLATE_NOOP("standing", "OVERDUE"),
+    TipStatus.UNCALIBRATED: QT_TRANSLATE_NOOP("standing", "NOT CALIBRATED"),
+    TipStatus.RETIRED: QT_TRANSLATE_NOOP("standing", "RETIRED"),
+}
+_MARKS: dict[TipStatus, tuple[Sign, Tone]] = {
+    TipStatus.VALID: (Sign.CHECK, Tone.GOOD),
+    TipStatus.OVERDUE: (Sign.WARNING, Tone.WARN),
+    TipStatus.UNCALIBRATED: (Sign.WARNING, Tone.WARN),
+    TipStatus.RETIRED: (Sign.CROSS, Tone.BAD),
+}
+_OF_KIND: dict[ItemKind, str] = {
+    ItemKind.PEN: QT_TRANSLATE_NOOP("standing", "Pen {0}"),
+    ItemKind.TIP: QT_TRANSLATE_NOOP("standing", "Tip {0}"),
+    ItemKind.CONE: QT_TRANSLATE_NOOP("standing", "Cone {0}"),
+}
+WORST_FIRST = (TipStatus.RETIRED, TipStatus.OVERDUE, TipStatus.UNCALIBRATED)
+
+
+def status_text(status: TipStatus) -> str:
+    """Return the name of a status."""
+    return QCoreApplication.translate(CONTEXT, _WORDS[status])
+
+
+def status_message(status: TipStatus | None) -> StatusMessage:
+    """Return a remark on a status; None if unknown."""
+    if status is None:
+        return StatusMessage()
+    return StatusMessage(status_text(status), *_MARKS[status])
+
+
+def message_icon(remark: StatusMessage, widget: QWidget) -> QIcon:
+    """Return the sign of a remark as an icon in the colours of a widget."""
+    scale = widget.devicePixelRatioF()
+    picture = QPixmap(round(SIDE * scale), round(SIDE * scale))
+    picture.setDevicePixelRatio(scale)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    color = colors_of(widget.palette()).tone(remark.tone)
+    draw_sign(painter, QRectF(0, 0, SIDE, SIDE), remark.sign, color)
+    painter.end()
+    return QIcon(picture)
+
+
+def subject_message(
+    names: Names, origin: Origin | None, statuses: StationStatus
+) -> StatusMessage:
+    """Return which of pen, tip and cone are blocked for measuring, and why.
+
+    Simulated ones are never used for measuring.
+    """
+    if origin is Origin.SIMULATED:
+        return StatusMessage()
+    of = statuses.of_item
+    found = {
+        ItemKind.TIP: statuses.of_tip(names.pen, names.tip),
+        ItemKind.PEN: of(ItemKind.PEN, names.pen),
+        ItemKind.CONE: of(ItemKind.CONE, names.cone),
+    }
+    marked = {
+        kind: each for kind, each in found.items() if each in WORST_FIRST and each
+    }
+    if not marked:
+        return StatusMessage()
+    words = PARTED.join(
+        QCoreApplication.translate(CONTEXT, _OF_KIND[kind]).format(status_text(each))
+        for kind, each in marked.items()
+    )
+    worst = min(marked.values(), key=WORST_FIRST.index)
+    return StatusMessage(words, *_MARKS[worst])
+
+
+def origin_message(origin: Origin | None) -> StatusMessage:
+    """Return the remark on images that are not live; empty otherwise."""
+    if origin is Origin.LIVE:
+        return StatusMessage()
+    tone = Tone.ACTIVE if origin is Origin.RECORDED else Tone.WARN
+    return StatusMessage(origin_text(origin), Sign.RING, tone)

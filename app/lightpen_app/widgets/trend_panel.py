@@ -7,15 +7,14 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.trend import Trend
+from lightpen.comparisons.repeatability import Trend
 from lightpen_app.look.layouts import grid_layout, vertical_layout
-from lightpen_app.look.quantities import AXES
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
-from lightpen_app.look.words import day_text, shortened
+from lightpen_app.look.words import AXES, day_text, shortened
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.fitting import ResponsiveLayout
 from lightpen_app.widgets.plots import Plot
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.widgets.translated import Translated
 
 DOT, RING = 6, 13  # px
 N_LINES = 3

@@ -1,21 +1,24 @@
 """The selected files, read in the background, with reasons for failures."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, QStandardPaths
 
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import SourceEnvironment
-from lightpen.record.swings.recordings import FilesBeside
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.preparation import Preparation
-from lightpen_app.look.sentences import worded
-from lightpen_app.work.job import Job, Report
-from lightpen_app.work.notifications import Notifications
+from lightpen.model.names import Origin
+from lightpen.record.exports import export_stem
+from lightpen.record.swings.solving import FilesBeside
+from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
+from lightpen_app.look.languages import worded
+from lightpen_app.look.phrases import origin_text
+from lightpen_app.work.job import Job, Notifications, Report
 from lightpen_app.work.selection import Selection, trial_of
-from lightpen_app.work.stations import FilePaths
+from lightpen_app.work.settings import FilePaths, Settings
+from lightpen_app.work.swing_run import SwingRun
 
 
 class ChosenFiles(QObject):
@@ -186,3 +189,37 @@ def _of_source(
         now, source=source, camera_file=opened.camera_file, pen_file=opened.pen_file
     ).with_source(now.source)
     return replace(opened, camera_file=held.camera_file, pen_file=held.pen_file)
+
+
+@dataclass(frozen=True)
+class SavePlace:
+    """The folder that was chosen last, and names by pen, tip and date."""
+
+    # Remembers the folder, and the laboratory that a certificate names.
+    settings: Settings
+    run: SwingRun
+    # Returns the date and time of a result that is not accepted yet.
+    now: Callable[[], datetime]
+
+    def folder(self) -> Path:
+        """Return the last folder; at first the user's documents."""
+        chosen = self.settings.export_folder()
+        if chosen:
+            return Path(chosen)
+        documents = QStandardPaths.StandardLocation.DocumentsLocation
+        return Path(QStandardPaths.writableLocation(documents))
+
+    def remember(self, folder: Path) -> None:
+        """Offer this folder from now on."""
+        self.settings.set_export_folder(str(folder))
+
+    def mark(self) -> str:
+        """Return the mark on pictures; empty for a live camera."""
+        origin = self.run.status.origin
+        return "" if origin in (None, Origin.LIVE) else origin_text(origin)
+
+    def stem(self) -> str:
+        """Return the beginning of a file name."""
+        status = self.run.status
+        moment = self.now() if status.result is None else status.result.accepted
+        return export_stem(status.names, moment, status.origin)

@@ -1,16 +1,19 @@
 """Run one computation of the core off the GUI thread."""
 
+import gc
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import partial
 from threading import Event
 from typing import TypeAlias
 
-from PySide6.QtCore import QObject, QThreadPool, Signal, SignalInstance
+from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal, SignalInstance
 
 from lightpen.errors import Cancelled, LightpenError
+from lightpen.formats.decoding import release_freed_memory
 from lightpen.messages import Message
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.languages import worded
+from lightpen_app.look.theme import Tone
 
 Report: TypeAlias = Callable[[float], None]
 Slot: TypeAlias = Callable[..., object] | SignalInstance
@@ -172,3 +175,74 @@ class LatestJob(QObject):
 
 def _emit_nothing() -> None:
     """No-op for a cancelled job."""
+
+
+# Python's garbage collector, restricted to the GUI thread; freed memory.
+#
+# The collector runs in whatever thread happens to allocate. It may free a Qt object
+# there whose thread is another one, and Qt ends the program (PYSIDE-810).
+#
+# Freed memory is returned to the system now and then, see `release_freed_memory`.
+
+
+PERIOD_MS, RELEASE_PERIOD_MS = 500, 2_000
+LIMITS = (700, 10, 10)  # of the generations: objects, and collections of the younger
+
+
+class GarbageCollector(QObject):
+    """Collects garbage in the thread that makes it, and in no other."""
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        gc.disable()
+        gc.freeze()  # present objects stay: no search delays the window
+        for period_ms, action in (
+            (PERIOD_MS, collect_if_due),
+            (RELEASE_PERIOD_MS, release_freed_memory),
+        ):
+            timer = QTimer(self, interval=period_ms)
+            timer.timeout.connect(action)
+            timer.start()
+
+
+def collect_if_due() -> None:
+    """Collect the oldest generation that has grown beyond its threshold."""
+    for generation in (2, 1, 0):
+        if gc.get_count()[generation] > LIMITS[generation]:
+            gc.collect(generation)
+            return
+
+
+class Notifications(QObject):
+    """The active notifications, each until its cause has ended."""
+
+    raised = Signal(str, object)  # str, Tone: text for the user
+    # A sentence of `raised` whose cause is gone, in the language it was raised in.
+    withdrawn = Signal(str)
+    status_changed = Signal(str)  # a sentence for the status line
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._texts: dict[Hashable, str] = {}
+
+    def text(self, cause: Hashable) -> str:
+        """Return the text of a cause; empty without one."""
+        return self._texts.get(cause, "")
+
+    def notify(self, cause: Hashable, text: str, tone: Tone = Tone.BAD) -> None:
+        """Publish a sentence, instead of an earlier one of its cause."""
+        if self.text(cause) != text:
+            self.withdraw(cause)
+        self._texts[cause] = text
+        self.raised.emit(text, tone)
+
+    def show_status(self, text: str) -> None:
+        """Publish a sentence for the status line; an empty one clears it."""
+        self.status_changed.emit(text)
+
+    def withdraw(self, *causes: Hashable) -> None:
+        """Withdraw the notifications of causes that have ended."""
+        for cause in causes:
+            text = self._texts.pop(cause, "")
+            if text:
+                self.withdrawn.emit(text)

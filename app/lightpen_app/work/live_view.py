@@ -3,37 +3,127 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from threading import Thread
+from threading import Lock, Thread
 from time import monotonic
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QSize, Qt, Signal
 
-from lightpen.cameras.clock import Clock
+from lightpen.arrays import Image
+from lightpen.cameras.pairing import Clock
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
-    DeviceLost,
-    FramesSkipped,
-    ImageCamera,
-    Stats,
-)
-from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
+    DeviceLost,
     Failed,
     FaultRaised,
+    FramesSkipped,
+    ImageCamera,
     ProcessingKeepsUp,
     SettingsApplied,
+    Stats,
     WorkerEvent,
+    WorkerStopped,
 )
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.errors import LightpenError
-from lightpen.live.pipeline import ImageCapture, ImageListener, Live, Sink
+from lightpen.live.pipeline import ImageCapture, ImageListener, Live, LiveImage, Sink
 from lightpen.live.sources import OperatedCamera, Operator
-from lightpen_app.look.sentences import worded
-from lightpen_app.work.live_images import QueuedListener
-from lightpen_app.work.notifications import Notifications
+from lightpen_app.look.figures import pooled
+from lightpen_app.look.languages import worded
+from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import SwingRun
+
+
+@dataclass(frozen=True, eq=False)
+class DisplayedImage:
+    """A live image, ready to be shown."""
+
+    # (H // 2, W // 2), the image at half its size, see
+    # `lightpen_app.look.figures.pooled`
+    half: Image
+    size: QSize  # of the whole image, px
+    seen: LiveImage
+
+
+class Mailbox(QObject):
+    """One slot between a producing thread and the GUI.
+
+    A queued signal with every image would fill the memory whenever the GUI is busy;
+    here only the newest waits, with one pending `ready`.
+    """
+
+    ready = Signal()  # a value waits; emitted once until it is taken
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._lock = Lock()
+        self._value: object | None = None
+
+    def put(self, value: object) -> None:
+        """Put a value, from any thread, in place of the one waiting."""
+        with self._lock:
+            waited = self._value is not None
+            self._value = value
+        if not waited:
+            self.ready.emit()
+
+    def take(self) -> object | None:
+        """Return the newest value, or None if it was taken already."""
+        with self._lock:
+            value, self._value = self._value, None
+        return value
+
+
+class QueuedListener(QObject):
+    """Forwards events from camera threads to the GUI thread.
+
+    Its public signals are emitted on the thread of the GUI, so that blocking them
+    there is enough to receive none.
+    """
+
+    image_shown = Signal(object)
+    event_received = Signal(object, int)
+    _event_posted = Signal(object, int)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self.camera = 0  # whose images are shown
+        self._images = Mailbox(self)
+
+        # Connections
+        queued = Qt.ConnectionType.QueuedConnection
+        self._images.ready.connect(self._on_image_ready, queued)
+        self._event_posted.connect(self.event_received, queued)
+
+    def discard(self) -> None:
+        """Free the image that waits."""
+        self._images.take()
+
+    # On the threads of the camera
+
+    def on_image(self, image: LiveImage) -> None:
+        """Put an image into the mailbox of the GUI."""
+        if image.camera != self.camera:
+            return
+        pixels = image.frame.image
+        height, width = pixels.shape
+        half = pooled(pixels, image.frame.bits)
+        self._images.put(DisplayedImage(half, QSize(width, height), image))
+
+    def on_camera(self, event: WorkerEvent, camera: int) -> None:
+        """Forward an event of a camera."""
+        if not isinstance(event, WorkerStopped):  # the connection closes besides
+            self._event_posted.emit(event, camera)
+
+    # On the thread of the GUI
+
+    def _on_image_ready(self) -> None:
+        shown = self._images.take()
+        if isinstance(shown, DisplayedImage) and shown.seen.camera == self.camera:
+            self.image_shown.emit(shown)
+
 
 WITHOUT_IMAGES = "without-images"  # cause of a notification
 CLOSING_TIME = 10.0  # s for everything in progress; a dead camera may take 8

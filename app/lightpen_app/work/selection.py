@@ -7,14 +7,19 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from lightpen.model.assumptions import USUAL
-from lightpen.model.limits import DueRule, StationLimits, SwingLimits
+from lightpen.model.limits import USUAL, DueRule, StationLimits, SwingLimits
 from lightpen.record.library.supervision import Supervision
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice
-from lightpen.swing.preparation import Preparation
-from lightpen_app.work.settings import Group, Settings, read_group, stored_group
-from lightpen_app.work.stations import FilePaths, preparation_of, station_of
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import NO_SOURCE, Preparation, SourceChoice
+from lightpen_app.work.settings import (
+    FilePaths,
+    Group,
+    Settings,
+    preparation_of,
+    read_group,
+    station_of,
+    stored_group,
+)
 
 # Nothing that is chosen for a trial is remembered.
 TRIAL = Names("Trial", "Trainee", "SIM-1", "T-1", "C-1", 10.0)

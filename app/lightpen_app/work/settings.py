@@ -6,22 +6,38 @@ window.
 """
 
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeAlias, TypeVar, get_type_hints
 
+import numpy as np
 import platformdirs
 from msgspec import json
 from PySide6.QtCore import QByteArray, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
+from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.sources import source_named
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.messages import Message
-from lightpen.model.laboratory import Laboratory
-from lightpen.model.limits import DueRule, StationLimits
+from lightpen.model.limits import (
+    USUAL,
+    Assumptions,
+    DueRule,
+    StationLimits,
+    SwingLimits,
+)
+from lightpen.model.names import Laboratory, Method
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import (
+    NO_SOURCE,
+    Preparation,
+    SecondCamera,
+    SourceChoice,
+)
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import (
@@ -32,8 +48,122 @@ from lightpen_app.work.settings_store import (
     save,
     with_changes,
 )
-from lightpen_app.work.stations import CameraFiles, Station
 from lightpen_resources import SOURCE_LANGUAGE, languages
+
+Triple: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class StoredCamera:
+    """Stored source of a camera's images, and its mask."""
+
+    source: SourceChoice = NO_SOURCE
+    mask: tuple[Triple, ...] = ()  # circles of stray light: centre x, y and radius, px
+
+
+@dataclass(frozen=True)
+class CameraFiles:
+    """Settings of a camera, independent of the station."""
+
+    file: str = ""  # path of the intrinsics file; for a pair, of the rig file
+    sha256: str = ""  # hash of the intrinsics file
+    mask: tuple[Triple, ...] = ()  # circles of stray light: centre x, y and radius, px
+
+
+@dataclass(frozen=True)
+class FilePaths:
+    """Paths of the files in use, empty for none; units if the pen file states none."""
+
+    camera: str = ""
+    pen: str = ""
+    pen_units: str = ""
+    rig: str = ""
+
+
+@dataclass(frozen=True)
+class Station:
+    """Last choices at a station."""
+
+    names: Names = field(default_factory=Names)
+    # Nominal tip centre, mm, pen frame; None: the LED file's.
+    nominal_tip: Triple | None = None
+    camera: StoredCamera = field(default_factory=StoredCamera)
+    second: StoredCamera | None = None  # None for a single camera
+    files: FilePaths = field(default_factory=FilePaths)
+    limits: SwingLimits = field(default_factory=SwingLimits)
+    assumptions: Assumptions = USUAL
+    method: Method = "joint"  # of the reported tip
+    # Choices for extensions by their keys, each as it stores them.
+    extensions: dict[str, dict[str, Any]] = field(default_factory=dict)
+    heading: float | None = None  # the operator's right as the camera sees it, rad
+    temperature_day: str = ""  # see `Preparation`
+
+
+def preparation_of(name: str, station: Station, before: Preparation) -> Preparation:
+    """Return the last selection at a station; its files are read later.
+
+    A source of a later version is passed over.
+    """
+    camera, second, tip = station.camera, station.second, station.nominal_tip
+    return replace(
+        before,
+        names=replace(station.names, station=name),
+        nominal_tip=None if tip is None else np.array(tip),
+        source=camera.source if _is_known(camera) else NO_SOURCE,
+        second=SecondCamera(second.source, mask=_mask(second))
+        if second is not None and _is_known(second)
+        else None,
+        camera_file=None,
+        pen_file=None,
+        mask=_mask(camera),
+        limits=station.limits,
+        assumptions=station.assumptions,
+        method=station.method,
+        heading=station.heading,
+        temperature_day=station.temperature_day,
+    )
+
+
+def station_of(
+    preparation: Preparation, extensions: dict[str, dict[str, Any]], unread: FilePaths
+) -> Station:
+    """Return the stored form of a station, with the paths of files still being read."""
+    second, tip = preparation.second, preparation.nominal_tip
+    camera_file, pen_file = preparation.camera_file, preparation.pen_file
+    rig_file = preparation.rig_file
+    return Station(
+        names=preparation.names,
+        nominal_tip=None if tip is None else tuple(tip.tolist()),
+        camera=StoredCamera(preparation.source, _circles(preparation.mask)),
+        second=None
+        if second is None
+        else StoredCamera(second.source, _circles(second.mask)),
+        files=FilePaths(
+            unread.camera if camera_file is None else str(camera_file.path),
+            unread.pen if pen_file is None else str(pen_file.path),
+            unread.pen_units if pen_file is None else pen_file.units or "",
+            unread.rig if rig_file is None else str(rig_file.path),
+        ),
+        limits=preparation.limits,
+        assumptions=preparation.assumptions,
+        method=preparation.method,
+        extensions=extensions,
+        heading=preparation.heading,
+        temperature_day=preparation.temperature_day,
+    )
+
+
+def _is_known(camera: StoredCamera) -> bool:
+    return source_named(camera.source.kind) is not None
+
+
+def _mask(camera: StoredCamera) -> FloatArray:
+    return np.array(camera.mask).reshape(-1, 3)
+
+
+def _circles(mask: FloatArray) -> tuple[Triple, ...]:
+    return tuple((x, y, radius) for x, y, radius in mask.tolist())
+
 
 AGAIN_MS = 5000  # delay before writing again after a failure
 

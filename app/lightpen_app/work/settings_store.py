@@ -12,12 +12,16 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from lightpen.errors import FileError
-from lightpen.formats.file_locks import folder_locked
-from lightpen.formats.files import MEGABYTE, read_bytes, sync_folder, write_whole
+from lightpen.formats.files import (
+    MEGABYTE,
+    read_bytes,
+    strerror,
+    sync_folder,
+    write_whole,
+)
 from lightpen.formats.machine_settings import MachineSettings, machine_settings
 from lightpen.formats.own_json import DamagedError, parse_own_json
-from lightpen.formats.part_files import sweep_parts
-from lightpen.formats.system_reasons import strerror
+from lightpen.formats.part_files import folder_locked, sweep_parts
 from lightpen.messages import Message, message, printable
 
 WHAT = message("file.settings")

@@ -1,35 +1,144 @@
 """Shared objects of the pages, created, started and ended together."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from PySide6.QtCore import QObject, QThreadPool
+from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
+from lightpen.archive.logbook import LazyLogbook
 from lightpen.formats.machine_settings import Update, read_update
 from lightpen.live.sources import SourceEnvironment
 from lightpen.messages import Message, message
-from lightpen.record.folder.data_folder import sweep_leftovers
+from lightpen.record.folder import Presence, check_writable, sweep_leftovers
 from lightpen.record.library.supervision import Supervision, read_supervision
 from lightpen.record.results.result_folder import SIMULATED
-from lightpen_app.look.sentences import worded
+from lightpen.record.swings.header import Names
+from lightpen_app.look.languages import worded
 from lightpen_app.look.theme import Tone
-from lightpen_app.work.archive_writer import ArchiveWriter
-from lightpen_app.work.camera_files import FilesOfCameras
-from lightpen_app.work.camera_setup import CameraSetup
-from lightpen_app.work.chosen_files import ChosenFiles
-from lightpen_app.work.folder_watch import FolderWatch
-from lightpen_app.work.job import Job
-from lightpen_app.work.library_watch import LibraryWatch
+from lightpen_app.work.camera_setup import CameraSetup, FilesOfCameras
+from lightpen_app.work.chosen_files import ChosenFiles, SavePlace
+from lightpen_app.work.job import Job, Notifications, Report
+from lightpen_app.work.library_watch import LibraryWatch, PenFiles
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView
-from lightpen_app.work.notifications import Notifications
-from lightpen_app.work.pen_files import PenFiles
-from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.selection import Selection
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.swing_run import SwingRun
+
+if TYPE_CHECKING:
+    from lightpen.record.folder import CameraTrial
+
+
+class ArchiveWriter(QObject):
+    """Enters the events of a data folder's files in the background."""
+
+    def __init__(
+        self,
+        folder: Path,
+        logbook: LazyLogbook,
+        now: Callable[[], datetime],
+        notifications: Notifications,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._logbook = logbook
+        self._now = now
+        self._notifications = notifications
+
+    def enter_owed(self) -> None:
+        """Enter events that the archive lacks."""
+        logbook = self._logbook
+        Job(lambda _: logbook.enter_owed(), self).start()
+
+    def keep_camera_trial(self, trial: "CameraTrial", names: Names) -> None:
+        """Keep the result of the calibration of a camera, and enter it."""
+        from lightpen.record.folder import keep_camera_trial
+
+        logbook, folder, now = self._logbook, self._folder, self._now
+
+        def keep(_: Report) -> None:
+            keep_camera_trial(folder, trial, names, now())
+            logbook.enter_owed()
+
+        job = Job(keep, self)
+        job.start(failed=self._on_failed)
+
+    def _on_failed(self, why: str) -> None:
+        self._notifications.notify(self, why)
+
+
+LOOKING_MS = 5000  # from one look to the next
+
+
+class FolderWatch(QObject):
+    """Checks the data folder periodically and announces this window."""
+
+    # Number of other windows of the program that use it, when it changes.
+    counted = Signal(int)
+    fault_changed = Signal(str)  # why the folder cannot be written; empty if it can
+
+    def __init__(self, folder: Path, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._presence = Presence(folder)
+        self._n_others = 0
+        self._fault = ""
+        self._counter: Job | None = None
+        self._timer = QTimer(self, interval=LOOKING_MS)
+
+        # Connections
+        self._timer.timeout.connect(self._look)
+
+    def start(self) -> None:
+        """Check now and periodically."""
+        self._check()
+        self._count()
+        self._timer.start()
+
+    def stop(self) -> None:
+        """Stop."""
+        self._timer.stop()
+
+    def leave(self) -> None:
+        """Remove the announcement of this window, on a thread of the pool."""
+        QThreadPool.globalInstance().start(self._presence.leave)
+
+    def _look(self) -> None:
+        if self._counter is not None:  # a disk that does not answer is asked once
+            return
+        if self._fault:
+            self._check()
+        self._count()
+
+    def _check(self) -> None:
+        folder = self._folder
+        job = Job(lambda _: check_writable(folder), self)
+        job.start(self._on_writable, self._set_fault)
+
+    def _on_writable(self, _: None) -> None:
+        self._set_fault("")
+
+    def _set_fault(self, fault: str) -> None:
+        if fault != self._fault:
+            self._fault = fault
+            self.fault_changed.emit(fault)
+
+    def _count(self) -> None:
+        presence = self._presence
+        self._counter = job = Job(lambda _: presence.count_others(), self)
+        job.start(self._on_counted)
+
+    def _on_counted(self, n_others: int) -> None:
+        self._counter = None
+        if n_others != self._n_others:
+            self._n_others = n_others
+            self.counted.emit(n_others)
+
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
 SETTINGS, UPDATE = "settings", "update"  # causes of notifications

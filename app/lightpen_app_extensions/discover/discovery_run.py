@@ -8,30 +8,28 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.detection.spots import Spots
 from lightpen.errors import FileError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.files import write_whole
+from lightpen.formats.files import mark_simulated, write_whole
 from lightpen.formats.images import IMAGE_FOLDER
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.formats.pen_files import write_pen
-from lightpen.formats.simulated_files import mark_simulated
+from lightpen.formats.rig_files import write_camera
 from lightpen.live.pipeline import LiveImage
 from lightpen.messages import Message
-from lightpen.model.posture import Posture, posture_of
+from lightpen.model.rigid import Posture, posture_of
 from lightpen.record.swings.writing import make_record_folder
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen_app.look.sentences import worded
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.languages import worded
 from lightpen_app.work.job import LatestJob, Report
-from lightpen_app.work.live_images import Mailbox
+from lightpen_app.work.live_view import Mailbox
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.discover.discover import discover
-from lightpen_extensions.discover.found import Discovery, with_frame
-from lightpen_extensions.discover.guiding import Guide, guide_of
-from lightpen_extensions.discover.request import Request
-from lightpen_extensions.discover.sightings import sightings_of_spots
+from lightpen_extensions.discover.found import Discovery, Guide, guide_of, with_frame
+from lightpen_extensions.discover.scale import Request
+from lightpen_extensions.discover.tracks import sightings_of_spots
 
 DISCOVERIES = "discoveries"  # in the data folder
 FIRST_TRIAL, LATER = 60, 1.5  # images at the first trial; times as many at the next

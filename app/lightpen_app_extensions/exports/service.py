@@ -7,7 +7,7 @@ from typing_extensions import override
 from lightpen_app.face import Service
 
 if TYPE_CHECKING:
-    from lightpen.record.exports.formats import ExportFormat
+    from lightpen.record.exports import ExportFormat
 
 
 class ExportsService(Service):

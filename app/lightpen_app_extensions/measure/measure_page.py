@@ -7,35 +7,26 @@ from typing_extensions import override
 
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
-from lightpen_app.look.grades import DECISION_MARKS
-from lightpen_app.look.phrases import Instruction
-from lightpen_app.look.quantities import number_text
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.languages import worded
+from lightpen_app.look.phrases import DECISION_MARKS, Instruction
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import PARTED
+from lightpen_app.look.words import PARTED, number_text
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.state_banner import State
-from lightpen_app_extensions.measure.band_chart import band_name, value_text
-from lightpen_app_extensions.measure.check_list import CheckRow
-from lightpen_app_extensions.measure.figure import FigureValue
-from lightpen_app_extensions.measure.part_view import part_value
+from lightpen_app_extensions.measure.check_list import CheckRow, band_name, value_text
+from lightpen_app_extensions.measure.part_view import FigureValue, part_value
 from lightpen_app_extensions.measure.plan_panel import PlanPanel
-from lightpen_app_extensions.measure.presenter import VerifyPresenter
+from lightpen_app_extensions.measure.presenter import VerifyPresenter, VerifyView
 from lightpen_app_extensions.measure.probing_page import ProbingPage
 from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_app_extensions.measure.view_state import VerifyView
 from lightpen_extensions.measure.measuring.report import DECISIONS
 from lightpen_extensions.measure.measuring.surfaces import NAMES
-from lightpen_extensions.measure.session.session import (
-    SessionSetup,
-    SessionState,
-    bands_so_far,
-)
-from lightpen_extensions.measure.tasks.part import PART
-from lightpen_extensions.measure.tasks.part_course import (
+from lightpen_extensions.measure.session import SessionSetup, SessionState, bands_so_far
+from lightpen_extensions.measure.tasks.part import (
+    PART,
     FeatureSoFar,
     feature_so_far,
     planned_at,

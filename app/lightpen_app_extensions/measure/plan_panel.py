@@ -10,30 +10,32 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QWidget
 from typing_extensions import override
 
-from lightpen.formats.file_format import FileFormat
+from lightpen.formats.files import FileFormat
 from lightpen.model.artefacts import Artefact
-from lightpen.record.exports.exports import save_new
+from lightpen.record.exports import save_new
 from lightpen.record.library.tip_library import Library
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import set_tooltip
+from lightpen_app.widgets.bars import Question, QuestionBar
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.work.job import Job, Report
 from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_extensions.measure.measuring.artefacts import artefact_plan
-from lightpen_extensions.measure.measuring.exports import EXPORTS
 from lightpen_extensions.measure.measuring.part import MeasuredPart, taught_plan
-from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature, free_plan
+from lightpen_extensions.measure.measuring.plan import (
+    Plan,
+    PlannedFeature,
+    artefact_plan,
+    free_plan,
+)
 from lightpen_extensions.measure.measuring.plan_checks import read_plan, write_plan
+from lightpen_extensions.measure.measuring.report import EXPORTS
 from lightpen_extensions.measure.measuring.surfaces import NAMES, FeatureKind
-from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.session.status import VerificationStatus
-from lightpen_extensions.measure.tasks.part import PART
-from lightpen_extensions.measure.tasks.part_course import planned_at
+from lightpen_extensions.measure.probing_operator import plate_plan
+from lightpen_extensions.measure.session import VerificationStatus
+from lightpen_extensions.measure.tasks.part import PART, planned_at
 
 SUFFIXES = "*.yaml *.yml"
 BUTTON_WIDTH, BUTTON_HEIGHT = 30 * GRID, 8 * GRID  # px, at least

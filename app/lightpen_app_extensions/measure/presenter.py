@@ -1,49 +1,85 @@
 """View state of the step Verify, computed from the status of the verification."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from PySide6.QtCore import QObject
 
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import Connection
 from lightpen.comparisons.assessment import CALIBRATE_AGAIN, VerificationAssessment
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.hashes import InputFile
-from lightpen.model.origin import Origin
-from lightpen.record.library.calibration_status import TipStatus
-from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import Instruction, grade_text
-from lightpen_app.look.sentences import worded
+from lightpen.formats.opened_files import InputFile
+from lightpen.model.names import Origin
+from lightpen.record.library.tip_library import TipStatus
+from lightpen_app.look.languages import worded
+from lightpen_app.look.phrases import GRADE_MARKS, Instruction, grade_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.state_banner import State
-from lightpen_app.widgets.status_mark import status_text
-from lightpen_app_extensions.measure.band_chart import value_text
-from lightpen_app_extensions.measure.check_list import CheckRow
-from lightpen_app_extensions.measure.figure import FigureValue, posture_value
+from lightpen_app.widgets.state_banner import State, StatusMessage, status_text
+from lightpen_app_extensions.measure.check_list import CheckRow, value_text
+from lightpen_app_extensions.measure.part_view import FigureValue, posture_value
 from lightpen_app_extensions.measure.service import MeasureService
 from lightpen_app_extensions.measure.verification_run import VerificationRun
-from lightpen_app_extensions.measure.view_state import (
-    Headline,
-    VerifyView,
-    is_held,
-    lamps_message,
-)
-from lightpen_extensions.measure.probing.probing import ProbingPhase
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.probing.probing import SETTLING, ProbingPhase
+from lightpen_extensions.measure.session import (
     BROKEN_OFF,
+    ReadingState,
     SessionSetup,
     SessionState,
+    VerificationStatus,
     bands_so_far,
     fraction_done,
     instruction,
     is_at_rest,
 )
-from lightpen_extensions.measure.session.status import ReadingState, VerificationStatus
 from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask
 from lightpen_extensions.measure.tasks.task import Band, rule_of
+
+
+@dataclass(frozen=True)
+class Headline:
+    """Status of the page for the window."""
+
+    lead: str = ""  # below its title
+    tone: Tone = Tone.QUIET
+    action: MainAction = field(default_factory=lambda: MainAction(""))
+    is_complete: bool = False
+    is_doubtful: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class VerifyView:
+    """Content of the page of a verification, except the results."""
+
+    headline: Headline = field(default_factory=Headline)
+    operator: OperatorValue = field(default_factory=OperatorValue)
+    # The drift of fixed lamps, unless it is the verdict.
+    lamps: StatusMessage = field(default_factory=StatusMessage)
+    rows: tuple[CheckRow, ...] = ()  # checks, or features of a part
+    current: int = 0  # row of what is probed now
+    task: AnyTask | None = None  # the current one
+    pause: str = ""
+    can_be_accepted: bool = False
+    can_start_over: bool = False
+    can_undo: bool = False
+    has_report: bool = False
+
+
+def is_held(state: SessionState) -> bool:
+    """Return whether the pen is held still on a point that is not recorded yet."""
+    touching = state.touching
+    is_holding = touching.phase is ProbingPhase.HOLDING
+    return is_holding and len(touching.held) >= SETTLING
+
+
+def lamps_message(status: VerificationStatus) -> StatusMessage:
+    """Return the drift of fixed lamps, unless it is the verdict."""
+    assessment = None if status.lamp_drift is None else status.lamp_drift.assessment
+    if assessment is None or (status.is_done and assessment is status.assessment):
+        return StatusMessage()
+    return StatusMessage(worded(assessment.reason), *GRADE_MARKS[assessment.grade])
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,22 +8,26 @@ from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.fitting import (
+    NO_ROOM,
+    PageScroll,
+    ResponsiveLayout,
+    ShrinkingScrollContent,
+)
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
-from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app_extensions.measure.check_list import CheckList
-from lightpen_app_extensions.measure.details import DetailsView
-from lightpen_app_extensions.measure.figure import FigurePanel
-from lightpen_app_extensions.measure.presenter import VerifyPresenter
-from lightpen_app_extensions.measure.progress_panel import ProgressPanel
-from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_app_extensions.measure.simulator_controls import ProbingSimulatorControls
+from lightpen_app_extensions.measure.part_view import FigurePanel
+from lightpen_app_extensions.measure.presenter import VerifyPresenter, VerifyView
+from lightpen_app_extensions.measure.progress_panel import DetailsView, ProgressPanel
+from lightpen_app_extensions.measure.service import (
+    MeasureService,
+    ProbingSimulatorControls,
+)
 from lightpen_app_extensions.measure.verification_run import VerificationRun
-from lightpen_app_extensions.measure.view_state import VerifyView
-from lightpen_extensions.measure.session.status import SessionEventKind
+from lightpen_extensions.measure.session import SessionEventKind
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped
 

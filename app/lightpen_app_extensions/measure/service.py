@@ -4,11 +4,12 @@ from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import QCoreApplication
+from PySide6.QtWidgets import QToolButton
 from typing_extensions import override
 
-from lightpen.archive.chains.entries import Event
+from lightpen.archive.chains import Event
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.folder.verifications import VERIFIED
+from lightpen.record.folder import VERIFIED
 from lightpen_app.face import (
     DemoStep,
     InterruptedWork,
@@ -16,15 +17,17 @@ from lightpen_app.face import (
     RowWords,
     Service,
 )
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.languages import worded
+from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import Tone
+from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened
-from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.steps.simulator_controls import SimulatorControls, set_words
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.verification_run import VerificationRun
-from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.probing_operator import ProbingOperator
+from lightpen_extensions.measure.probing_operator import ProbingOperator, plate_plan
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
 from lightpen_extensions.measure.storage.session_record import (
     InterruptedVerification,
@@ -242,3 +245,54 @@ class _Interrupted(InterruptedWork):
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
         task = worded(task_of(under_way.choices.kind).title)
         return PARTED.join(filter(None, (*called, task)))
+
+
+class ProbingSimulatorControls(SimulatorControls):
+    """Lets the simulated operator touch, or lift the pen; hidden with a real pen."""
+
+    def __init__(self, service: MeasureService) -> None:
+        super().__init__(service.workbench.live)
+        self._service = service
+        self.setProperty("area", "panel")
+
+        # Widgets
+        self._touch = PushButton(checkable=True)
+        self._touch.setProperty("inviting", True)
+        self._lift = QToolButton()
+
+        # Layout
+        margins = (GRID, GRID // 2, GRID, GRID // 2)
+        cells = self._touch, 1, self._lift
+        horizontal_layout(self, *cells, spacing=2 * GRID, margins=margins)
+
+        # Connections
+        self._touch.toggled.connect(service.set_touching)
+        self._lift.clicked.connect(self._on_lift_clicked)
+
+        self._retranslate()
+        self._follow_connection()
+
+    def stop(self) -> None:
+        """Release the simulated operator."""
+        self._touch.setChecked(False)
+
+    @override
+    def _retranslate(self) -> None:
+        self.setAccessibleName(self.tr("Simulated pen"))
+        set_words(
+            self._touch,
+            self.tr("Let the simulated operator probe"),
+            self.tr("Probes all tasks automatically."),
+        )
+        set_words(
+            self._lift, self.tr("Lift"), self.tr("Take the tip away for a moment.")
+        )
+
+    @override
+    def _follow_connection(self) -> None:
+        super()._follow_connection()
+        if self._touch.isChecked():  # of a camera opened again
+            self._service.set_touching(self._live.operator is not None)
+
+    def _on_lift_clicked(self) -> None:
+        self._command(lambda hand: hand.lift())

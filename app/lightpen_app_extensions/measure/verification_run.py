@@ -8,14 +8,11 @@ from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen_app.work.notifications import Notifications
-from lightpen_app.work.run_view import RunView
+from lightpen_app.work.job import Notifications
+from lightpen_app.work.swing_run import RunView
 from lightpen_extensions.measure.probing_operator import ProbingOperator
 from lightpen_extensions.measure.runner import VerificationRunner
-from lightpen_extensions.measure.session.status import (
-    SessionEventKind,
-    VerificationStatus,
-)
+from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 
 
 class VerificationRun(RunView[VerificationStatus, SessionEventKind]):

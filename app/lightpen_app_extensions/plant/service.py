@@ -9,8 +9,8 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.plant.extension import replicate
 
 if TYPE_CHECKING:
-    from lightpen.archive.store.database import Database
-    from lightpen_extensions.plant.replication import Replicator
+    from lightpen.archive.store import Database
+    from lightpen_extensions.plant.server import Replicator
 
 
 class PlantService(Service):

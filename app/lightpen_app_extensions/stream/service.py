@@ -1,22 +1,302 @@
-"""The live stream in the window: its dialog, its settings, and what is told of it."""
+"""The stream of positions in the window: its dialog and its server."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QCheckBox, QDialog, QDialogButtonBox, QFormLayout, QWidget
 from typing_extensions import override
 
+from lightpen.cameras.pairing import Clock
+from lightpen.errors import LightpenError
+from lightpen.local_time import local_now
+from lightpen.record.calibrations import with_status
+from lightpen.record.results.result_folder import FolderArchive
+from lightpen.swing.preparation import Preparation
 from lightpen_app.face import MenuEntry, Service
+from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import Tone
-from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.fields import ChoiceField, Translated
+from lightpen_app.widgets.fitting import FittedWindow
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.verification_run import VerificationRun
-from lightpen_app_extensions.stream.stream_dialog import StreamDialog, StreamState
-from lightpen_app_extensions.stream.streaming import Streaming
+from lightpen_extensions.measure.probing.current_tip import read_tip_in_force
 from lightpen_extensions.measure.tasks.part import PART
-from lightpen_extensions.stream.points import points_of
-from lightpen_extensions.stream.server import StreamPlace
+from lightpen_extensions.stream.messages import StreamedTip, tip_metadata
+from lightpen_extensions.stream.server import (
+    LAST_PORT,
+    LOOPBACK,
+    PoseStream,
+    StreamPlace,
+    StreamStatus,
+    points_of,
+)
+
+EVERYWHERE = "0.0.0.0"  # every network of the computer
+FIRST_PORT = 1024  # of those that take no administrator
+
+
+@dataclass(frozen=True)
+class StreamState:
+    """State of the stream."""
+
+    status: StreamStatus = field(default_factory=StreamStatus)
+    # Whether the place of a tip is streamed, and not the pose alone.
+    has_tip: bool = False
+    fault: str = ""  # why the enabled stream cannot listen
+
+
+class StreamDialog(FittedWindow, Translated, QDialog):
+    """Shows and changes the address of the stream."""
+
+    # bool, StreamPlace: the user chose otherwise: whether it is on, and where
+    value_changed = Signal(bool, object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.say(self, self.tr("Live stream"))
+        self._state = StreamState()
+
+        # Widgets
+        self._lead = self.say(
+            text_label(TextSize.BODY),
+            self.tr(
+                "Sends pose and tip live by OpenIGTLink to other programs such as "
+                "3D Slicer."
+            ),
+        )
+        self._on = self.say(QCheckBox(), self.tr("Stream pose and tip"))
+        self._address = self.say(
+            ChoiceField(),
+            self.tr("Address"),
+            tip=self.tr(
+                "{0} for this computer only, {1} for all networks, or an address of "
+                "this computer."
+            ).format(LOOPBACK, EVERYWHERE),
+        )
+        self._address.setEditable(True)
+        self._address.addItems([LOOPBACK, EVERYWHERE])
+        self._port = self.say(
+            NumberField("", (FIRST_PORT, LAST_PORT), 0), self.tr("Port")
+        )
+        self._address_label = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Address")
+        )
+        self._address_label.setBuddy(self._address)
+        self._port_label = self.say(
+            text_label(TextSize.SMALL, Tone.QUIET), self.tr("Port")
+        )
+        self._port_label.setBuddy(self._port)
+        self._reach = SignLabel()
+        self._state_label = SignLabel()
+        self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+
+        # Layout
+        layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
+        form = QFormLayout()
+        layout.addLayout(form)
+        form.setHorizontalSpacing(2 * GRID)
+        form.addRow(self._address_label, self._address)
+        form.addRow(self._port_label, self._port)
+        fill(layout, self._reach, self._on, self._state_label, self._buttons)
+        self.setMinimumWidth(72 * GRID)
+
+        # Connections
+        self._on.clicked.connect(self._on_toggled)
+        self._address.currentTextChanged.connect(self._refresh)
+        self._port.textEdited.connect(self._refresh)
+        self._buttons.rejected.connect(self.reject)
+
+        self._retranslate()
+
+    def place(self) -> StreamPlace:
+        """Return the address of the stream."""
+        return StreamPlace(
+            self._address.currentText().strip(), round(self._port.value())
+        )
+
+    def set_value(self, *, is_on: bool, place: StreamPlace) -> None:
+        """Show the settings."""
+        self._on.setChecked(is_on)
+        self._address.setCurrentText(place.address)
+        self._port.set_value(place.port)
+        self._refresh()
+
+    def set_state(self, state: StreamState) -> None:
+        """Show the state of the stream."""
+        self._state = state
+        self._refresh()
+
+    def _refresh(self) -> None:
+        is_on = self._on.isChecked()
+        for each in (self._address, self._port):
+            each.setEnabled(not is_on)
+        is_complete = (
+            bool(self._address.currentText().strip()) and not self._port.reason()
+        )
+        self._on.setEnabled(is_on or is_complete)
+        reach = StatusMessage()
+        if not self.place().is_local:
+            text = self.tr(
+                "Every computer in this network can receive the data without "
+                "signing in. A firewall may ask for permission."
+            )
+            reach = StatusMessage.warning(text)
+        self._reach.set_value(reach)
+        self._state_label.set_value(self._state_message() if is_on else StatusMessage())
+
+    def _state_message(self) -> StatusMessage:
+        state = self._state
+        if state.fault:
+            return StatusMessage.fault(state.fault)
+        if state.status.place is None:
+            return StatusMessage()
+        text = self.tr("Active at {0}. Clients: {1}").format(
+            state.status.place, state.status.n_clients
+        )
+        if not state.has_tip:
+            text += " " + self.tr("Only the pose is sent; there is no current tip.")
+        return StatusMessage.good(text)
+
+    def _on_toggled(self, is_on: bool) -> None:
+        self._refresh()
+        self.value_changed.emit(is_on, self.place())
+
+    @override
+    def _retranslate(self) -> None:
+        close = QDialogButtonBox.StandardButton.Close
+        self._buttons.button(close).setText(self.tr("Close"))
+        self._refresh()
+
+
+class Streaming(QObject):
+    """Opens and closes the stream and updates its tip.
+
+    ``clock`` is the clock of the cameras.
+    """
+
+    changed = Signal()  # `status`, `has_tip` or `fault` is different
+    _status_changed = Signal()
+
+    def __init__(
+        self, archive: FolderArchive, clock: Clock, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._archive = archive
+        self._preparation = Preparation()
+        self._wanted: StreamPlace | None = None
+        self._opened: StreamPlace | None = None  # that is open, or was tried
+        self._opening: Job | None = None
+        self._reading = LatestJob(self)
+        self._has_tip = False
+        self._fault = ""
+        # It takes every image, on the thread of the pipeline.
+        self.stream = PoseStream(clock, lambda status: self._status_changed.emit())
+
+        # Connections
+        self._status_changed.connect(self.changed, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def status(self) -> StreamStatus:
+        """Address and number of clients."""
+        return self.stream.status
+
+    @property
+    def has_tip(self) -> bool:
+        """Whether the place of a tip is streamed, and not the pose alone."""
+        return self._has_tip
+
+    @property
+    def fault(self) -> str:
+        """Why the stream is unavailable; empty if it runs or is off."""
+        return self._fault
+
+    def want(self, place: StreamPlace | None) -> None:
+        """Stream to an address; None stops the stream."""
+        self._wanted = place
+        self._follow()
+
+    def choose(self, preparation: Preparation) -> None:
+        """Set the selected pen and tip, and their files."""
+        is_same = _what_counts(preparation) == _what_counts(self._preparation)
+        self._preparation = preparation
+        if not is_same:
+            self.read_tip()
+
+    def read_tip(self) -> None:
+        """Read the current tip, which may have changed."""
+        self._reading.cancel()
+        if self._wanted is None:
+            return
+        archive, preparation = self._archive, self._preparation
+        self._reading.start(lambda _: _tip(archive, preparation), self._on_tip_read)
+
+    def shut_down(self) -> None:
+        """Stream to nobody more; what a job has still to tell begins nothing more."""
+        self._wanted = self._opened = None
+
+    def await_end(self, timeout_s: float) -> bool:
+        """Close the stream after all jobs have ended, and return whether it is."""
+        self.stream.close()
+        return True
+
+    def _follow(self) -> None:
+        """Open or close the stream in a job, since names are looked up."""
+        if self._opening is not None or self._wanted == self._opened:
+            return
+        self._opened = place = self._wanted
+        stream = self.stream
+
+        def follow(_: Report) -> None:
+            stream.close()
+            if place is not None:
+                stream.open(place)
+
+        self._set_fault("")
+        self._opening = job = Job(follow, self)
+        job.start(failed=self._set_fault, ended=self._on_opening_ended)
+
+    def _set_fault(self, fault: str) -> None:
+        self._fault = fault
+        self.changed.emit()
+
+    def _on_opening_ended(self) -> None:
+        self._opening = None
+        self._follow()
+        self.read_tip()
+        self.changed.emit()
+
+    def _on_tip_read(self, tip: StreamedTip | None) -> None:
+        self.stream.set_tip(tip)
+        self._has_tip = tip is not None
+        self.changed.emit()
+
+
+def _what_counts(preparation: Preparation) -> tuple[object, ...]:
+    return (
+        preparation.names,
+        preparation.origin,
+        preparation.second is None,
+        preparation.camera_file,
+        preparation.pen_file,
+    )
+
+
+def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None:
+    """Return the current tip; None if it is unknown or unusable."""
+    if preparation.camera_file is None or preparation.pen_file is None:
+        return None
+    try:
+        tip = read_tip_in_force(archive, preparation)
+    except LightpenError:  # the step Verify says why
+        return None
+    metadata = tip_metadata(with_status(tip.calibration, local_now()))
+    return StreamedTip(tip.names, tip.instrument, metadata)
+
 
 KEY = "stream"
 

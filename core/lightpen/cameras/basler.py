@@ -9,10 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
-from lightpen.cameras.device_errors import busy, in_sentences, lost, not_found
-from lightpen.cameras.genapi_features import GenapiFeatures, refusals
+from lightpen.cameras.device_camera import (
+    DeliveredFrame,
+    DeviceCamera,
+    busy,
+    in_sentences,
+    lost,
+    not_found,
+)
+from lightpen.cameras.genicam import GenapiFeatures, refusals
+from lightpen.cameras.pairing import Clock
 from lightpen.cameras.protocol import DeviceNotFound
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import Message, message

@@ -5,26 +5,34 @@ camera's features. What all cameras share is done here: settings, numbers and ti
 images, their counts, and grey values at full depth.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, Self
 
-from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.features import (
     EXPOSURES,
     GAINS,
+    Bytes,
     Features,
     apply_settings,
+    decoded,
+    pixel_format_named,
     read_capabilities,
     read_settings,
     set_nearest,
 )
-from lightpen.cameras.pixel_formats import Bytes, decoded, pixel_format_named
+from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import (
     EXPOSURE,
     GAIN,
     CameraCapabilities,
+    CameraFailure,
     CameraSettings,
     ConfigError,
+    DeviceBusy,
+    DeviceLost,
+    DeviceNotFound,
     Frame,
     FrameIncomplete,
     FrameTimeout,
@@ -285,3 +293,90 @@ class DeviceCamera:
             pixel_format=pixel_format.name,
             full_scale=pixel_format.full_scale,
         )
+
+
+def not_found(place: str, why: str = "") -> DeviceNotFound:
+    """Return the error of a camera that was not found."""
+    return DeviceNotFound("camera.not-found", place=place, why=why and f" ({why})")
+
+
+def busy(place: str) -> DeviceBusy:
+    """Return the error of a camera in use by another program."""
+    return DeviceBusy("camera.busy", place=place)
+
+
+def lost(serial: str, why: str) -> DeviceLost:
+    """Return the error of a camera that no longer responds."""
+    return DeviceLost("camera.lost", serial=serial, why=why)
+
+
+def setting_refused(serial: str, why: str) -> ConfigError:
+    """Return the error of a refused setting."""
+    return ConfigError("camera.refused", serial=serial, why=why)
+
+
+@contextmanager
+def in_sentences(
+    serial: str,
+    refusals: tuple[type[Exception], ...],
+    losses: tuple[type[Exception], ...],
+) -> Iterator[None]:
+    """Convert exceptions of a library to refused settings and lost cameras."""
+    try:
+        yield
+    except refusals as error:
+        raise setting_refused(serial, str(error)) from error
+    except losses as error:
+        raise lost(serial, str(error)) from error
+
+
+WATCHED = 3.0  # s, after which one window ends and the next begins
+LOST_SHARE = 0.05  # of the images; the odd one costs nothing
+LEAST_LOST = 3
+SLOW_SHARE = 0.8  # of the rate that is set
+
+
+@dataclass(frozen=True)
+class LinkWatch:
+    """Frame counters of a time window."""
+
+    since: Stats | None = None  # counts at the beginning of the window
+    began: float = 0.0  # s
+    is_reported: bool = False  # one fault for each set of settings
+
+    def after(
+        self, stats: Stats, now: float, settings: CameraSettings
+    ) -> tuple[Self, CameraFailure | None]:
+        """Return the state after an image, and a fault of the link or None.
+
+        ``now`` is the arrival time of the image, s.
+        """
+        if self.since is None:
+            return replace(self, since=stats, began=now), None
+        seconds = now - self.began
+        if self.is_reported or seconds < WATCHED:
+            return self, None
+        fault = _fault(stats.since(self.since), seconds, settings)
+        is_reported = fault is not None
+        return replace(self, since=stats, began=now, is_reported=is_reported), fault
+
+
+def _fault(
+    came: Stats, seconds: float, settings: CameraSettings
+) -> CameraFailure | None:
+    n_lost = came.incomplete + came.missed
+    n_sent = came.delivered + n_lost
+    if n_lost >= max(LEAST_LOST, LOST_SHARE * n_sent):
+        return FrameIncomplete(
+            "camera.link-loses",
+            n_sent=n_sent,
+            n_incomplete=came.incomplete,
+            n_missed=came.missed,
+        )
+    rate = settings.frame_rate
+    is_free = settings.trigger is not TriggerMode.SOFTWARE
+    if rate is not None and is_free and n_sent < SLOW_SHARE * rate * seconds:
+        return ConfigError(
+            "camera.rate-not-reached", sent=n_sent / seconds, wanted=rate
+        )
+    return None

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,13 +19,103 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
-from lightpen.cameras.device_errors import busy, in_sentences, not_found
-from lightpen.cameras.genapi_features import GenapiFeatures, refusals
-from lightpen.cameras.protocol import DeviceNotFound
+from lightpen.cameras.device_camera import (
+    DeliveredFrame,
+    DeviceCamera,
+    busy,
+    in_sentences,
+    not_found,
+)
+from lightpen.cameras.pairing import Clock
+from lightpen.cameras.protocol import DeviceNotFound, Range
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import Message, message
+
+WRITE_ONLY, READ_WRITE = 2, 4  # of EAccessMode; a command is write-only
+
+
+@dataclass(frozen=True)
+class GenapiFeatures:
+    """The features of an open camera.
+
+    Parameters
+    ----------
+    find : callable
+        Returns a node by name, or None.
+    spell : callable
+        Returns the name of an attribute of a node as this library spells it.
+    access : callable
+        Returns the access mode of a node.
+    converting_errors : callable
+        Returns a context that converts errors.
+    """
+
+    find: Callable[[str], Any]
+    spell: Callable[[str], str]
+    access: Callable[[Any], int]
+    converting_errors: Callable[[], AbstractContextManager[None]]
+
+    def has(self, name: str) -> bool:
+        """Return whether the camera has a feature that is available now."""
+        with self.converting_errors():
+            node = self.find(name)
+            return node is not None and self.access(node) in (WRITE_ONLY, READ_WRITE)
+
+    def number(self, name: str) -> float:
+        """Return the value of a number."""
+        return float(self._read(name, "value"))
+
+    def limits(self, name: str) -> Range:
+        """Return the present range of a number."""
+        low, high = self._read(name, "min"), self._read(name, "max")
+        # What a float is rounded to is seen when it is read back.
+        step = self._read(name, "inc") if isinstance(low, int) else 0.0
+        return Range(float(low), float(high), float(step))
+
+    def set_number(self, name: str, value: float) -> None:
+        """Set a number that is within its limits."""
+        is_integer = isinstance(self._read(name, "value"), int)
+        self._write(name, round(value) if is_integer else float(value))
+
+    def choice(self, name: str) -> str:
+        """Return the current entry of an enumeration."""
+        return str(self._read(name, "value"))
+
+    def choices(self, name: str) -> tuple[str, ...]:
+        """Return the entries of an enumeration that can be chosen now."""
+        return tuple(map(str, self._read(name, "symbolics")))
+
+    def choose(self, name: str, entry: str) -> None:
+        """Choose an entry of an enumeration."""
+        self._write(name, entry)
+
+    def switch_on(self, name: str) -> None:
+        """Set a truth value."""
+        self._write(name, True)
+
+    def execute(self, name: str) -> None:
+        """Execute a command."""
+        with self.converting_errors():
+            getattr(self.find(name), self.spell("execute"))()
+
+    def _read(self, name: str, what: str) -> Any:
+        with self.converting_errors():
+            return getattr(self.find(name), self.spell(what))
+
+    def _write(self, name: str, value: float | str | bool) -> None:
+        with self.converting_errors():
+            setattr(self.find(name), self.spell("value"), value)
+
+
+def refusals(genapi: Any) -> tuple[type[Exception], ...]:
+    """Return the exceptions of GenApi for refused requests."""
+    return (
+        genapi.AccessException,
+        genapi.InvalidArgumentException,
+        genapi.LogicalErrorException,
+        genapi.OutOfRangeException,
+    )
+
 
 PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
 SUFFIX = ".cti"

@@ -6,7 +6,7 @@ the thing that delivers images. One thread makes all calls of an open one, see
 """
 
 from dataclasses import dataclass, fields
-from enum import StrEnum
+from enum import Enum, StrEnum, auto
 from math import isnan
 from typing import Annotated, Protocol, TypeAlias
 
@@ -283,3 +283,67 @@ class ImageCamera(Protocol):
 
     def stats(self) -> Stats:
         """Return the frame counters; ``skipped`` stays 0."""
+
+
+class Connection(Enum):
+    """State of the connection to a camera."""
+
+    OPENING = auto()
+    STREAMING = auto()
+    SILENT = auto()
+    LOST = auto()
+    CLOSED = auto()
+
+
+@dataclass(frozen=True)
+class FrameReady:
+    """A new frame is in the box, which was empty."""
+
+
+@dataclass(frozen=True)
+class ConnectionChanged:
+    """The state of the connection changed."""
+
+    connection: Connection
+
+
+@dataclass(frozen=True)
+class SettingsApplied:
+    """The camera uses these settings."""
+
+    settings: CameraSettings
+
+
+@dataclass(frozen=True)
+class FaultRaised:
+    """A fault occurred; the worker continues."""
+
+    error: CameraFailure
+
+
+@dataclass(frozen=True)
+class ProcessingKeepsUp:
+    """Images are no longer skipped."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An error ended the worker."""
+
+    error: LightpenError
+
+
+@dataclass(frozen=True)
+class WorkerStopped:
+    """The worker ended, as the camera has no more images."""
+
+
+WorkerEvent: TypeAlias = (
+    FrameReady
+    | ConnectionChanged
+    | SettingsApplied
+    | FaultRaised
+    | ProcessingKeepsUp
+    | Failed
+    | WorkerStopped
+)

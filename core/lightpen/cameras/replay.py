@@ -7,7 +7,7 @@ from functools import partial
 from math import inf
 
 from lightpen.arrays import Image
-from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import (
     EXPOSURE,
     GAIN,

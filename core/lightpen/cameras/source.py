@@ -1,11 +1,13 @@
-"""Kinds of cameras, for choosing among them."""
+"""A source of images, and the region of its frames."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
+from threading import Condition, Lock
 
-from lightpen.cameras.clock import Clock
-from lightpen.cameras.protocol import ImageCamera
+from lightpen.cameras.pairing import Clock
+from lightpen.cameras.protocol import EndOfImages, Frame, FrameTimeout, ImageCamera
 from lightpen.messages import Message
 
 
@@ -49,3 +51,88 @@ class Source:
     find: Callable[[str], tuple[FoundDevice, ...]] = lambda producer: ()
     # Returns what must be installed first, or None.
     why_absent: Callable[[], Message | None] = lambda: None
+
+
+class FrameBox:
+    """Holds the newest frame only."""
+
+    def __init__(self) -> None:
+        self._frame: Frame | None = None
+        self._lock = Lock()
+
+    def put(self, frame: Frame) -> bool:
+        """Put a frame; return whether the box was empty."""
+        with self._lock:
+            was_empty = self._frame is None
+            self._frame = frame
+            return was_empty
+
+    def take(self) -> Frame | None:
+        """Take the frame out of the box; None if it is empty."""
+        with self._lock:
+            frame, self._frame = self._frame, None
+            return frame
+
+
+class FrameQueue:
+    """A queue of at most ``n_frames`` frames."""
+
+    def __init__(self, n_frames: int) -> None:
+        if n_frames < 1:
+            raise ValueError(f"`n_frames` must be at least 1, got {n_frames}.")
+        self._n_frames = n_frames
+        self._frames: deque[Frame] = deque()
+        self._changed = Condition()
+        self._is_ended = False
+
+    def offer(self, frame: Frame) -> bool:
+        """Append a frame if there is room; return whether there was."""
+        with self._changed:
+            if len(self._frames) >= self._n_frames or self._is_ended:
+                return False
+            self._frames.append(frame)
+            self._changed.notify_all()
+            return True
+
+    def hand_over(self, frame: Frame, is_wanted: Callable[[], bool]) -> None:
+        """Append a frame and wait until it is taken, or no longer wanted after `clear`.
+
+        No frame is made ahead of its reader, so a response to an image shows in the
+        next but one.
+        """
+        with self._changed:
+            if self._is_ended:
+                return
+            self._frames.append(frame)
+            self._changed.notify_all()
+            self._changed.wait_for(
+                lambda: not self._frames or self._is_ended or not is_wanted()
+            )
+
+    def take(self, timeout_s: float) -> Frame:
+        """Return the oldest frame.
+
+        Raises `FrameTimeout` without one within ``timeout_s``, and `EndOfImages` after
+        the last.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._frames or self._is_ended, timeout_s)
+            if self._frames:
+                frame = self._frames.popleft()
+                self._changed.notify_all()
+                return frame
+            if self._is_ended:
+                raise EndOfImages
+            raise FrameTimeout("camera.no-image-came", waited=timeout_s)
+
+    def clear(self) -> None:
+        """Discard the queued frames."""
+        with self._changed:
+            self._frames.clear()
+            self._changed.notify_all()
+
+    def end(self) -> None:
+        """Accept no more frames; queued ones can still be taken."""
+        with self._changed:
+            self._is_ended = True
+            self._changed.notify_all()

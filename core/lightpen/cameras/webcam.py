@@ -6,9 +6,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from lightpen.cameras.clock import Clock
-from lightpen.cameras.device_camera import DeliveredFrame, DeviceCamera
-from lightpen.cameras.device_errors import lost, not_found, setting_refused
+from lightpen.cameras.device_camera import (
+    DeliveredFrame,
+    DeviceCamera,
+    lost,
+    not_found,
+    setting_refused,
+)
+from lightpen.cameras.pairing import Clock
 from lightpen.cameras.protocol import Range
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds, SourcePlace
 from lightpen.messages import message

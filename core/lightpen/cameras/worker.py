@@ -10,35 +10,33 @@ from dataclasses import fields, replace
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
-from lightpen.cameras.clock import Clock, MachineClock
-from lightpen.cameras.frame_box import FrameBox, FrameQueue
-from lightpen.cameras.link_watch import LinkWatch
+from lightpen.cameras.device_camera import LinkWatch
+from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
     ConfigError,
+    Connection,
+    ConnectionChanged,
     DeviceBusy,
     DeviceLost,
     DeviceNotFound,
     EndOfImages,
+    Failed,
+    FaultRaised,
     Frame,
     FrameIncomplete,
+    FrameReady,
     FramesSkipped,
     FrameTimeout,
     ImageCamera,
-    Stats,
-)
-from lightpen.cameras.worker_events import (
-    Connection,
-    ConnectionChanged,
-    Failed,
-    FaultRaised,
-    FrameReady,
     ProcessingKeepsUp,
     SettingsApplied,
+    Stats,
     WorkerEvent,
     WorkerStopped,
 )
+from lightpen.cameras.source import FrameBox, FrameQueue
 from lightpen.errors import LightpenError
 
 N_QUEUED = 4  # frames of 5 MB

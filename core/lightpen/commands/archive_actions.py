@@ -5,20 +5,23 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from lightpen.archive.chains.entries import SHORT
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.history.entries_file import export_entries
-from lightpen.archive.history.history import Line, lines
-from lightpen.archive.history.listing import entries_csv
-from lightpen.archive.history.queries import EntryFilter, newest
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import Database, look_into
-from lightpen.commands.arguments import data_of
+from lightpen.archive.chains import SHORT
+from lightpen.archive.checks import check_file
+from lightpen.archive.history import (
+    EntryFilter,
+    Line,
+    entries_csv,
+    export_entries,
+    lines,
+    newest,
+)
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import Database, look_into
+from lightpen.commands.arguments import data_of, supervisor_signature
 from lightpen.commands.console import Command, printing, progress, shown
-from lightpen.commands.supervisor import supervisor_signature
 from lightpen.local_time import local_now, local_time
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.supervision_changes import renew_station_key
+from lightpen.record.library.supervision import renew_station_key
 
 CHANGED = 1  # exit status of a check that found something
 

@@ -1,19 +1,21 @@
 """Types of command-line arguments, and options that several commands share."""
 
 import argparse
+import getpass
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from lightpen.commands.console import note
 from lightpen.errors import UsageError
-from lightpen.formats.camera_file_writing import write_window
-from lightpen.formats.pen_content import UNITS
+from lightpen.formats.pen_tables import UNITS
+from lightpen.formats.rig_files import write_window
 from lightpen.messages import message
-from lightpen.model.assumptions import BALL_UNCERTAINTY, COLDEST, WARMEST
-from lightpen.model.decision_rules import DecisionRule
-from lightpen.model.limits import LIMITS
+from lightpen.model.coverage import DecisionRule
+from lightpen.model.limits import BALL_UNCERTAINTY, COLDEST, LIMITS, WARMEST
+from lightpen.record.library.supervision import Signature
 
 DataFolder: TypeAlias = Callable[[], Path]
 
@@ -286,3 +288,16 @@ def add_ball(parser: argparse.ArgumentParser, meaning: str) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add the option for the file of the record."""
     add_file(parser, "--json", "FILE", "write the record as JSON")
+
+
+PASSWORD = "LIGHTPEN_PASSWORD"  # names the variable with the password of a supervisor
+
+
+def supervisor_signature(name: str | None) -> Signature | None:
+    """Return the signature of a supervisor whose password is requested, or variable."""
+    if name is None:
+        return None
+    password = os.environ.get(PASSWORD)
+    if password is None:
+        password = getpass.getpass("Supervisor's password: ")
+    return Signature(name, password)

@@ -41,20 +41,19 @@ from lightpen.estimation.reports.summary import calibration_text, convergence_te
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
-from lightpen.formats.pairing import pair_images
+from lightpen.formats.files import is_simulated
+from lightpen.formats.observation_files import pair_images
+from lightpen.formats.opened_files import Inputs, RigInputs, all_hashed, with_content
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
-from lightpen.formats.simulated_files import is_simulated
 from lightpen.local_time import local_now
 from lightpen.messages import Message, message
-from lightpen.model.camera import Camera
-from lightpen.model.camera_validity import unmodelled_effects_of
+from lightpen.model.camera import Camera, unmodelled_effects_of
 from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.model.rig import of_camera
-from lightpen.record.calibrations.recomputing import recompute
+from lightpen.model.rigid import of_camera
+from lightpen.record.recomputing import recompute
 from lightpen.record.swings.reading import (
     is_record,
     missing_parts,

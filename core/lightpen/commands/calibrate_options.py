@@ -15,8 +15,8 @@ from lightpen.commands.arguments import (
 )
 from lightpen.errors import UsageError
 from lightpen.estimation.bundle.priors import ConeSeparation
-from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
-from lightpen.model.method import METHODS
+from lightpen.model.limits import USUAL, Assumptions, with_focal_length
+from lightpen.model.names import METHODS
 
 SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
 

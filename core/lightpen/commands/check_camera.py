@@ -23,11 +23,11 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import adjusted_intrinsics
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
-from lightpen.formats.json_records import plain
+from lightpen.formats.own_json import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.model.camera_validity import unmodelled_effects_of
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.camera import unmodelled_effects_of
+from lightpen.model.coverage import COVERAGE_FACTOR
 
 
 def add_check_camera(parser: argparse.ArgumentParser) -> None:

@@ -16,8 +16,8 @@ from lightpen.errors import UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import A_FILE, unreadable, write_whole
 from lightpen.formats.images import ImageSource, find_images
-from lightpen.formats.json_records import record_bytes
 from lightpen.formats.observation_files import Centers, read_centers
+from lightpen.formats.own_json import record_bytes
 from lightpen.messages import Message, printable
 from lightpen.model.pen import Pen
 

@@ -11,16 +11,15 @@ from lightpen.commands.arguments import chosen_limits
 from lightpen.commands.console import shown, write_record
 from lightpen.errors import UsageError
 from lightpen.local_time import local_now
-from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import StationLimits, VerificationLimits
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import CalibrationFile
-from lightpen.record.folder.verifications import attributed, keep_verification
+from lightpen.model.names import Origin
+from lightpen.record.calibrations import CalibrationFile
+from lightpen.record.folder import attributed, keep_verification
 from lightpen.record.library.supervision import read_supervision
 from lightpen.record.library.tip_library import read_library
-from lightpen.record.results.opening import data_folder_of
-from lightpen.record.results.result_folder import FolderArchive
-from lightpen.record.swings.names import Names
+from lightpen.record.results.result_folder import FolderArchive, data_folder_of
+from lightpen.record.swings.header import Names
 
 
 def add_entering(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +103,7 @@ def keep_record(
             _print_overdue(folder, names)
         return
     # Imported here: it takes 0.2 s.
-    from lightpen.archive.logbook.logbook import Logbook
+    from lightpen.archive.logbook import Logbook
 
     kept = keep_verification(data, record, is_simulated=is_simulated)
     with closing(Logbook(data, options.replicate)) as logbook:
@@ -125,7 +124,7 @@ def _data_of_entry(
 
 
 def _print_overdue(data: Path, names: Names) -> None:
-    from lightpen.archive.logbook.tip_status import folder_statuses
+    from lightpen.archive.logbook import folder_statuses
 
     rule = FolderArchive(data).supervision().limits_at(names.station, StationLimits())
     found = folder_statuses(data, rule.due, read_library(data), local_now())

@@ -8,6 +8,7 @@ from lightpen.commands.arguments import (
     add_exit_by_verdict,
     add_file,
     add_json,
+    supervisor_signature,
 )
 from lightpen.commands.console import (
     are_same,
@@ -17,32 +18,31 @@ from lightpen.commands.console import (
     verdict_status,
 )
 from lightpen.commands.entering import add_entering, keep_record
-from lightpen.commands.supervisor import supervisor_signature
+from lightpen.comparisons.assessment import read_scale
 from lightpen.comparisons.led_file import improve_pen
 from lightpen.comparisons.pen_health import GROWN, MOVED, examine_pen, require_one_pen
-from lightpen.comparisons.press_test import PRESS_TEST, PressTest, press_test
-from lightpen.comparisons.recorded_tasks import read_scale
-from lightpen.comparisons.records import pen_health_entries, verification_record
-from lightpen.comparisons.summaries import (
+from lightpen.comparisons.pen_over_time import PRESS_TEST, PressTest, press_test
+from lightpen.comparisons.records import (
     improved_pen_text,
+    pen_health_entries,
     pen_health_text,
     press_test_text,
+    verification_record,
 )
 from lightpen.errors import UsageError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
-from lightpen.formats.hashes import all_hashed
-from lightpen.formats.json_records import file_entry
+from lightpen.formats.opened_files import all_hashed
+from lightpen.formats.own_json import file_entry
 from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.formats.rig_files import write_camera
 from lightpen.local_time import local_now
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.recomputing import recompute, recorded_camera_and_pen
-from lightpen.record.calibrations.tip_bending import keep_bending
+from lightpen.record.calibrations import CalibrationFile, keep_bending, read_calibration
 from lightpen.record.library.library_changes import Author
-from lightpen.record.results.opening import data_folder_of
+from lightpen.record.recomputing import recompute, recorded_camera_and_pen
+from lightpen.record.results.result_folder import data_folder_of
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:

@@ -6,10 +6,9 @@ from pathlib import Path
 from lightpen.commands.arguments import add_json
 from lightpen.commands.console import note, printing, require_other_file, write_record
 from lightpen.estimation.pivot_calibration import calibrate_pivot
-from lightpen.estimation.reports.pivot_report import pivot_record
-from lightpen.estimation.reports.summary import pivot_text
-from lightpen.formats.hashes import hashed
+from lightpen.estimation.reports.summary import pivot_record, pivot_text
 from lightpen.formats.observation_files import read_poses
+from lightpen.formats.opened_files import hashed
 from lightpen.messages import message
 
 

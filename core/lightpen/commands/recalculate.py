@@ -25,11 +25,11 @@ from lightpen.estimation.monte_carlo import (
 )
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
-from lightpen.formats.json_records import plain
+from lightpen.formats.own_json import plain
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations import CalibrationFile, read_calibration
 
 TITLE, COLUMN = 30, 13  # characters
 

@@ -24,20 +24,23 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.entering import add_entering, keep_record, limits_in_force
 from lightpen.comparisons.pen_health import require_one_pen
-from lightpen.comparisons.records import repeatability_entries, verification_record
+from lightpen.comparisons.records import (
+    repeatability_entries,
+    repeatability_text,
+    verification_record,
+)
 from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
-from lightpen.comparisons.summaries import repeatability_text
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.reports.methods import result_of
+from lightpen.estimation.reports.report_warnings import result_of
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import all_hashed
-from lightpen.formats.json_records import file_entry
+from lightpen.formats.opened_files import all_hashed
+from lightpen.formats.own_json import file_entry
 from lightpen.formats.pen_files import read_pen
 from lightpen.messages import printable
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
+from lightpen.record.calibrations import CalibrationFile, read_calibration
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:

@@ -9,16 +9,13 @@ from typing import Any
 
 from msgspec import structs, to_builtins
 
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.logbook.tip_status import folder_statuses
-from lightpen.commands.arguments import FORGOTTEN, data_of
+from lightpen.archive.logbook import Logbook, folder_statuses
+from lightpen.commands.arguments import FORGOTTEN, data_of, supervisor_signature
 from lightpen.commands.console import Command, printing, shown
-from lightpen.commands.supervisor import supervisor_signature
 from lightpen.errors import ArchiveError, UsageError
 from lightpen.local_time import local_now
 from lightpen.model.artefacts import ArtefactKind, Side
 from lightpen.model.limits import DueRule
-from lightpen.record.library.calibration_status import StationStatus
 from lightpen.record.library.library_changes import (
     Author,
     add_item,
@@ -34,6 +31,7 @@ from lightpen.record.library.tip_library import (
     Library,
     ListedReference,
     ListedTip,
+    StationStatus,
     read_library,
 )
 

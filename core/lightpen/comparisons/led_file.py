@@ -19,23 +19,21 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
+from lightpen.comparisons.assessment import Scale
 from lightpen.comparisons.pen_health import MOVED, examine_pen, require_one_pen
-from lightpen.comparisons.recorded_tasks import Scale
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.contact.camera_motion import steadied
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
+from lightpen.estimation.contact.single_images import steadied
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.model.information import inverse
+from lightpen.model.coverage import COVERAGE_FACTOR, inverse, normal_quantile
 from lightpen.model.pen import Pen
-from lightpen.model.quantiles import normal_quantile
-from lightpen.model.rig import Rig, rig_of
+from lightpen.model.rigid import Rig, rig_of
 from lightpen.model.self_calibration import FoundCamera, FoundPen, marks_of
-from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
+from lightpen.record.calibrations import CalibrationFile, shown_images
 
 FoundT = TypeVar("FoundT", FoundPen, FoundCamera)
 

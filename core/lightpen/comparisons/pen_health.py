@@ -28,10 +28,9 @@ from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
 from lightpen.model.camera import Camera
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.model.quantiles import normal_quantile
+from lightpen.model.coverage import COVERAGE_FACTOR, normal_quantile
 from lightpen.model.rigid import skew
-from lightpen.record.calibrations.calibrations import CalibrationFile
+from lightpen.record.calibrations import CalibrationFile
 
 MIN_SWINGS = 2
 MOVED = 0.02  # mm, from which on an LED has moved

@@ -3,13 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
+from lightpen.comparisons.led_file import ImprovedPen
 from lightpen.comparisons.pen_health import Growth, PenHealth
+from lightpen.comparisons.pen_over_time import PressTest
 from lightpen.comparisons.repeatability import Repeatability
-from lightpen.formats.json_records import plain, record_heading
+from lightpen.formats.own_json import plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.messages import Message
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits, rule_in_words
 
 BY_SIMPLE_ACCEPTANCE = rule_in_words(VerificationLimits())
@@ -95,3 +100,108 @@ def pen_health_entries(found: PenHealth) -> dict[str, Any]:
 def _growth_entries(found: Growth | None) -> dict[str, float | None]:
     relative, uncertainty = found or (None, None)
     return {"growth": relative, "growth_expanded_uncertainty": uncertainty}
+
+
+# Comparisons of calibrations as text for the screen, in the tables of the paper.
+#
+# [1] S. Liu et al., "Portable light pen 3D vision coordinate measuring system - probe
+# tip center calibration", Measurement Science Review 13 (2013) 194-199, table 1.
+
+
+TITLE, COLUMN = 24, 10  # characters
+
+
+def repeatability_text(
+    found: Repeatability, rule: Message = BY_SIMPLE_ACCEPTANCE
+) -> str:
+    """Return calibrations of one tip as text: the paper's Table 1."""
+
+    def row(title: str, values: FloatArray, digits: int = 4) -> str:
+        return f"{title:<{TITLE}}" + "".join(f"{x:{COLUMN}.{digits}f}" for x in values)
+
+    lines = [
+        "Center coordinates of the probe tip, mm",
+        f"{'No. of test':<{TITLE}}"
+        + "".join(f"{axis + '-axis':>{COLUMN}}" for axis in "xyz"),
+        *(
+            row(f"{i + 1:>3} {tip.name}"[:TITLE], tip.tip_pen)
+            for i, tip in enumerate(found.tips)
+        ),
+        row("Ave", found.scatter.mean),
+        row("Std", found.scatter.deviation),
+        row("Range", found.scatter.range),
+    ]
+    if found.control is not None:
+        lines += [
+            row("Control limit, lower", found.control.lower),
+            row("Control limit, upper", found.control.upper),
+        ]
+    out = found.out_of_control
+    if out:
+        lines.append("Out of control: " + ", ".join(tip.name for tip in out))
+    return "\n".join([*lines, "", *verdict_lines(found.assessment, rule)])
+
+
+def pen_health_text(found: PenHealth) -> str:
+    """Return a pen over its swings as text."""
+    n_leds = len(found.swings[0].shifts)
+    lines = [
+        "LEDs since the first swing, mm, and size of the pen, ppm",
+        f"{'Swing':<{TITLE}}"
+        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
+        + f"{'size':>{COLUMN}}{'U':>{COLUMN}}",
+    ]
+    for swing in found.swings:
+        lengths = np.linalg.norm(swing.shifts, axis=1)
+        cells = "".join(
+            f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
+            for x in lengths
+        )
+        size = "".join(
+            f"{'-' if ppm is None else format(1e6 * ppm, '+.0f'):>{COLUMN}}"
+            for ppm in swing.growth or (None, None)
+        )
+        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size}")
+    by_rule = verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)
+    return "\n".join([*lines, "", *by_rule])
+
+
+def press_test_text(found: PressTest) -> str:
+    """Return the change by firm pressure as text."""
+    names = ("Tip x", "Tip y (along pen)", "Tip z")
+    lines = [f"{'Firm less light, mm':<{TITLE}}{'change':>{COLUMN}}{'U':>{COLUMN}}"]
+    for name, *values in zip(names, found.change, found.uncertainty, strict=True):
+        lines.append(f"{name:<{TITLE}}" + "".join(f"{x:{COLUMN}.4f}" for x in values))
+    return "\n".join(
+        [*lines, "", *verdict_lines(found.assessment, BY_SIMPLE_ACCEPTANCE)]
+    )
+
+
+def improved_pen_text(found: ImprovedPen) -> str:
+    """Return the new places of the LEDs of a pen as text."""
+    pen = found.pen
+    lines = [
+        "LEDs of the pen, mm: new, and new less old",
+        f"{'LED':<5}" + "".join(f"{axis:>{COLUMN}}" for axis in ("x", "y", "z") * 2),
+    ]
+    for j, (place, move) in enumerate(zip(pen.leds, found.moves, strict=True)):
+        cells = "".join(f"{x:{COLUMN}.4f}" for x in (*place, *move))
+        lines.append(f"{j + 1:<5}{cells}")
+    lines += [
+        f"A coordinate is known to {pen.led_sigma:.5f} mm, the scale to "
+        f"{1e6 * (pen.scale_sigma or 0.0):.1f} ppm (k = 1), by "
+        + ", ".join(found.pooled)
+        + ".",
+        f"{found.held_out} confirms it: residuals of {found.sigma_after:.4f} px, "
+        f"{found.sigma_before:.4f} px with the old file.",
+    ]
+    return "\n".join(lines)
+
+
+def verdict_lines(assessment: VerificationAssessment, rule: Message) -> list[str]:
+    """Return the lines of a verdict."""
+    return [
+        f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
+        f"             {assessment.next_step}",
+        f"             {rule}",
+    ]

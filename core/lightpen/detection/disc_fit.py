@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.model.quantiles import normal_quantile
+from lightpen.model.coverage import normal_quantile
 
 REACH = 1.9  # radii, and
 MORE_REACH = 0.5  # px, from the centre to the last pixel used, or less:

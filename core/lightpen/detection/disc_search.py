@@ -26,7 +26,7 @@ from lightpen.detection.disc_moments import (
 )
 from lightpen.detection.disc_stack import measure_discs
 from lightpen.detection.pixel_box import PixelBox, bounding_box
-from lightpen.model.quantiles import normal_quantile
+from lightpen.model.coverage import normal_quantile
 
 MAX_BOXES = 128  # the smallest of more are clutter
 MAX_REGIONS = 1024  # examined in one image

@@ -32,7 +32,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import as_strided
 
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
-from lightpen.model.quantiles import normal_quantile
+from lightpen.model.coverage import normal_quantile
 
 STEP = 0.5  # px between samples of a ray
 RAY_SPACING = 2.0  # px along the rim

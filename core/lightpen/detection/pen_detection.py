@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.labelling.constellation import certain_leds
+from lightpen.detection.labelling.constellation import UNWHOLE, certain_leds
 from lightpen.detection.labelling.hypotheses import MAX_SHIFT
 from lightpen.detection.labelling.labels import (
     Labels,
@@ -27,7 +27,6 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
-from lightpen.detection.labelling.spot_arrays import UNWHOLE
 from lightpen.detection.pixel_box import PixelBox
 from lightpen.detection.pose import MIN_POSE_LEDS, ImagePose, fit_pose
 from lightpen.detection.reasons import UNFORESEEN, Reason

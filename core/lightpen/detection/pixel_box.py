@@ -1,5 +1,6 @@
 """Rectangles of pixels."""
 
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias, TypeVar
 
 import cv2
@@ -7,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from cv2.typing import MatLike
 
-from lightpen.arrays import Image, IntArray
+from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 
 Reals: TypeAlias = npt.NDArray[np.float32]
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -78,3 +81,20 @@ def stacked(image: Image, frames: IntArray) -> Reals:
     for slot, (left, top, right, bottom) in zip(stack, frames.tolist(), strict=True):
         slot[: bottom - top, : right - left] = image[top:bottom, left:right]
     return stack
+
+
+@dataclass(frozen=True, eq=False)
+class RegionOfInterest:
+    """Camera, pen and mask for the detection in images."""
+
+    camera: Camera | None = None  # intrinsics, if they are known
+    pen: Pen | None = None
+    # (M, 3), circles of stray light to leave out: centre x, y and radius, px
+    mask: FloatArray | None = None
+    # Regions in the images of the other cameras of a rig.
+    others: tuple["RegionOfInterest", ...] = ()
+
+    @property
+    def regions(self) -> tuple["RegionOfInterest", ...]:
+        """The same for each camera."""
+        return (self, *self.others)

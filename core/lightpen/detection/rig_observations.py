@@ -1,7 +1,7 @@
 """Observations by several cameras at the same moments."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,14 +12,15 @@ from lightpen.detection.observations import (
     observe_centers,
     observe_images,
 )
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.pose import CameraReprojection, Poses, fit_reprojection
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource
-from lightpen.formats.observation_files import Centers
-from lightpen.formats.pairing import NONE, Pairing
+from lightpen.formats.observation_files import NONE, Centers, Pairing
 from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, of_camera
+from lightpen.model.rigid import Rig, of_camera
 
 
 def observe_rig_images(
@@ -119,3 +120,109 @@ def _with_exchange(rig: Rig, c: int, fault: Message) -> Message:
     if not others:
         return finding
     return message("rig.size-of-another", told=finding, other=others[0])
+
+
+# One pose of the pen by all cameras of a rig that see it at the same moment.
+#
+# All LEDs in all images make one pose ``rig_from_pen``, by maximum likelihood as in
+# `lightpen.detection.pose`. One camera hardly determines the depth along its view,
+# others do; the covariance of the pose combines all cameras.
+
+
+@dataclass(frozen=True, eq=False)
+class RigReprojection:
+    """Reprojection errors in the images of all cameras, camera by camera."""
+
+    rig: Rig
+    cameras: tuple[CameraReprojection, ...]
+
+    @property
+    def pixels(self) -> FloatArray:
+        """Observed centres, (N, C L, 2), px; NaN where an LED was not seen."""
+        return np.concatenate([each.pixels for each in self.cameras], axis=1)
+
+    def residuals_with_jacobian(
+        self, R: FloatArray, t: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return residuals (N, C L, 2) at poses rig_from_pen, and their Jacobian."""
+        residuals, jacobians = [], []
+        places = zip(self.rig.rotations, self.rig.translations, strict=True)
+        for camera, (turn, shift) in zip(self.cameras, places, strict=True):
+            errors, J = camera.residuals_with_jacobian(turn @ R, t @ turn.T + shift)
+            residuals.append(errors)
+            jacobians.append(derivatives_in_rig(J, turn))
+        return np.concatenate(residuals, axis=1), np.concatenate(jacobians, axis=1)
+
+
+def derivatives_in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
+    """Convert derivatives (..., 6) by the camera pose into those by the rig pose.
+
+    ``turn`` (3, 3) is the rotation of cam_from_rig.
+    """
+    return np.concatenate([J[..., :3] @ turn, J[..., 3:] @ turn], axis=-1)
+
+
+def fit_rig_poses(
+    rig: Rig,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    translations: FloatArray,
+) -> Poses:
+    """Fit poses rig_from_pen, each to the LEDs in all cameras.
+
+    Residuals and weights are ordered by camera.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where a camera did not see one. Every
+        moment needs four.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Start, rig_from_pen, mm.
+    """
+    cameras = tuple(
+        CameraReprojection(camera, pen.leds, pen.normals, pen.diameter / 2, seen)
+        for camera, seen in zip(rig.cameras, np.moveaxis(pixels, 1, 0), strict=True)
+    )
+    problem = cameras[0] if rig.n_cameras == 1 else RigReprojection(rig, cameras)
+    return fit_reprojection(problem, rotations, translations)
+
+
+def see_together(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
+    """Return the detection of a moment with one pose rig_from_pen by all cameras.
+
+    A camera without a pose, or with a blurred image, is ignored; if none is left, the
+    detection is returned as it is.
+    """
+    views = (detection, *detection.others)
+    if len(views) == 1:
+        return detection
+    fit = [view.has_pose and not view.is_blurred for view in views]
+    if not any(fit):
+        return detection
+    nowhere = np.full_like(detection.pixels, np.nan)
+    clean = [
+        view if is_fit else replace(view, pixels=nowhere)
+        for view, is_fit in zip(views, fit, strict=True)
+    ]
+    start = fit.index(True)
+    back = rig.rotations[start].T
+    poses = fit_rig_poses(
+        rig,
+        pen,
+        np.stack([view.pixels for view in clean])[None],
+        (back @ views[start].rotation)[None],
+        (back @ (views[start].translation - rig.translations[start]))[None],
+    )
+    return replace(
+        clean[0],
+        reason=Reason.NONE,
+        rotation=poses.rotations[0],
+        translation=poses.translations[0],
+        cofactors=poses.covariances[0] / poses.sigma**2,
+        sigma=poses.sigma,
+        spots=views[start].spots,
+        labels=views[start].labels,
+        others=tuple(clean[1:]),
+    )

@@ -25,11 +25,16 @@ from lightpen.detection.observations import Observations, without_copies
 from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.adjustment import Adjustment, adjust
+from lightpen.estimation.bundle.adjustment import (
+    Adjustment,
+    FoundField,
+    adjust,
+    found_fields,
+)
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.change_point import ChangePoint, step_of_poses
 from lightpen.estimation.bundle.consistency_findings import Contradiction
-from lightpen.estimation.bundle.field_search import FoundField, found_fields
+from lightpen.estimation.bundle.consistency_test import SelfCheck, check_prediction
 from lightpen.estimation.bundle.led_quality import (
     LedQuality,
     TipFrames,
@@ -38,13 +43,6 @@ from lightpen.estimation.bundle.led_quality import (
 )
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import Priors, priors_of, read_diameter
-from lightpen.estimation.bundle.self_check import SelfCheck, check_prediction
-from lightpen.estimation.contact.camera_motion import (
-    CameraPath,
-    SteadyImages,
-    pose_steadily,
-    without_field,
-)
 from lightpen.estimation.contact.joint import (
     ContactModel,
     JointFit,
@@ -52,22 +50,22 @@ from lightpen.estimation.contact.joint import (
     joint_at,
 )
 from lightpen.estimation.contact.single_images import (
+    CameraPath,
     PosedImages,
+    SteadyImages,
+    pose_steadily,
     require_fit,
     require_images,
+    without_field,
 )
-from lightpen.estimation.pivot.two_stage import (
-    TwoStageFit,
-    fit_two_stage,
-    projection_bias,
-)
+from lightpen.estimation.pivot.pivot import TwoStageFit, fit_two_stage, projection_bias
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
 from lightpen.estimation.rigs.rig_poses import (
     RigPoses,
+    TimeLag,
     find_initial_extrinsics,
     join_poses,
 )
-from lightpen.estimation.rigs.synchrony import TimeLag
 from lightpen.estimation.uncertainty.budget import (
     Budget,
     SplitHalfCheck,
@@ -83,12 +81,12 @@ from lightpen.estimation.uncertainty.second_cone import (
     second_images,
 )
 from lightpen.messages import Message
-from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
-from lightpen.model.method import Method
+from lightpen.model.limits import USUAL, Assumptions
+from lightpen.model.names import Method
 from lightpen.model.pen import Pen, grown
-from lightpen.model.rig import Rig, of_camera, rig_of
+from lightpen.model.rigid import Rig, of_camera, rig_of
 
 NOT_SETTLED = ("joint.not-settled", "bundle.not-settled")
 

@@ -39,13 +39,12 @@ from lightpen.estimation.uncertainty.budget import (
     seat_covariance,
 )
 from lightpen.messages import Message, message
-from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
-from lightpen.model.effective_tip import effective_tip
+from lightpen.model.coverage import symmetric_root
 from lightpen.model.ellipse import ellipse_centers
-from lightpen.model.information import symmetric_root
-from lightpen.model.pen import Pen, grown
-from lightpen.model.rig import rig_of
+from lightpen.model.limits import Assumptions
+from lightpen.model.pen import Pen, effective_tip, grown
+from lightpen.model.rigid import rig_of
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 

@@ -28,7 +28,7 @@ from lightpen.estimation.pivot.pivot_groups import (
     find_groups,
 )
 from lightpen.messages import Message, message
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
 
 # Detection of other conventions of poses: frames, order of numbers, units.
 #

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.model.quantiles import chi_square_quantile
+from lightpen.model.coverage import chi_square_quantile
 
 # How often chance alone makes so large a gain, at most, of errors that are
 CERTAIN = 0.001  # called significant

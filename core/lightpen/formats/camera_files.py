@@ -34,7 +34,7 @@ of OpenCV's ``calibrateCameraExtended``, fx and fy being taken as off together, 
 are; the day of the calibration, ``calibration_date`` or ``calibration_time``; the
 serial number of the camera, ``camera_serial``; how warm it was,
 ``calibration_temperature``, in degrees Celsius; and the residual field of the lens,
-``lens_field``, see `lightpen.model.lens_field`: ``amplitude`` and
+``lens_field``, see `lightpen.model.fisheye`: ``amplitude`` and
 ``correlation_length``, px, and where it was measured ``columns``, ``rows``, ``values``
 (a row u v for each node), ``covariance``, and ``intrinsics_covariance`` of what does
 not go with the field; and of a camera found from images of a pen (``lightpen
@@ -53,15 +53,13 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.camera_checks import (
+from lightpen.formats.camera_layouts import (
     check_fold,
     check_pinhole,
     check_skew,
     check_window,
     checked_distortion,
     checked_size,
-)
-from lightpen.formats.camera_layouts import (
     colmap_tree,
     foreign_intrinsics,
     refuse_foreign,
@@ -71,7 +69,7 @@ from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, quoted, read_bytes, read_text
 from lightpen.messages import Message, message, printable
 from lightpen.model.camera import Camera, LensModel
-from lightpen.model.lens_field import MOST, LensField
+from lightpen.model.fisheye import MOST, LensField
 from lightpen.model.self_calibration import FoundCamera
 
 CAMERA_FILE = message("file.camera")

@@ -7,15 +7,35 @@ import os
 import re
 import stat
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.file_locks import folder_locked
-from lightpen.formats.part_files import part_of, renamed, sweep_parts
-from lightpen.formats.system_reasons import strerror
+from lightpen.formats.part_files import folder_locked, part_of, renamed, sweep_parts
 from lightpen.messages import Message, message, printable
+
+_WORDED = {  # as the C library words them
+    errno.EPERM: message("system.not-permitted"),
+    errno.ENOENT: message("system.not-there"),
+    errno.EIO: message("system.input-output"),
+    errno.EACCES: message("system.denied"),
+    errno.ENOTDIR: message("system.no-folder"),
+    errno.EMFILE: message("system.many-open"),
+    errno.ENOSPC: message("system.full"),
+    errno.EROFS: message("system.read-only"),
+    errno.ENAMETOOLONG: message("system.long-name"),
+    errno.ELOOP: message("system.loop"),
+    errno.ETIMEDOUT: message("system.timed-out"),
+}
+
+
+def strerror(error: OSError) -> Message | str:
+    """Return the reason of an error, by default the system's text."""
+    known = _WORDED.get(error.errno or 0)
+    return known or error.strerror or type(error).__name__
+
 
 MEGABYTE = 1_000_000  # bytes
 LARGEST_RECORD = 32 * MEGABYTE  # of the own files; 5000 images of 4 cameras take 26
@@ -292,3 +312,44 @@ def _rename_anew(part: Path, target: Path) -> None:
 
 def _unwritten(path: Path, error: OSError) -> FileError:
     return FileError("write.failed", path=path, reason=why_unwritten(error))
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """A format of exported files."""
+
+    name: str  # on the command line
+    label: Message
+    suffix: str  # end of the names of its files
+    text: Callable[..., str]  # content of a file
+
+    def encoded(self, *values: object) -> bytes:
+        """Return the content of a file for some values, in UTF-8."""
+        return self.text(*values).encode("utf-8", "backslashreplace")
+
+
+# The mark of a folder with simulated files.
+#
+# A simulated camera file looks like a real one. Whoever writes simulated files leaves
+# this mark beside them, so that what is computed from them is known to be simulated.
+
+
+MARK = "SIMULATED.txt"
+TEXT = "The files in this folder were simulated by Lightpen; they are of no real pen.\n"
+
+
+def mark_simulated(folder: Path) -> None:
+    """Mark a folder."""
+    write_whole(folder / MARK, TEXT.encode())
+
+
+def is_simulated(path: Path) -> bool:
+    """Return whether a file, or a folder of images, was simulated.
+
+    Images may be in a subfolder beside the mark. Unreadable folders count as real.
+    """
+    folders = (path, path.parent, path.parent.parent)
+    try:
+        return any((folder / MARK).is_file() for folder in folders)
+    except (OSError, ValueError):
+        return False

@@ -15,8 +15,8 @@ from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, read_bytes
 from lightpen.formats.own_json import DamagedError, in_shape, parse_own_json
 from lightpen.messages import message
-from lightpen.model.laboratory import PLACES, Laboratory, is_country
 from lightpen.model.limits import LIMITS, StationLimits
+from lightpen.model.names import PLACES, Laboratory, is_country
 
 WHAT = message("file.machine-settings")
 

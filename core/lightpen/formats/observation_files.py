@@ -11,14 +11,18 @@ translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. 
 header the columns stand in this order, with the number first if there is one.
 """
 
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePath
+from typing import TypeAlias
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, read_text
+from lightpen.formats.images import natural_order
 from lightpen.formats.pose_files import (
     SEQUENCE_SUFFIXES,
     GivenPoses,
@@ -146,7 +150,7 @@ def _seen_pixels(table: Table, columns: list[int]) -> FloatArray:
 
 
 def read_poses(path: Path, tool: str | None = None) -> PoseTable:
-    """Read poses; see the module and `lightpen.formats.pose_columns` for the layouts.
+    """Read poses; see the module and `lightpen.formats.pose_files` for the layouts.
 
     Rotations given in few digits are replaced by the nearest rotations; those that are
     rotations to 1e-6 stay as they are. Rows without a pose are left out. ``tool`` is
@@ -332,3 +336,68 @@ def _check_covariances(table: Table, covariances: FloatArray) -> None:
     singular = values[:, 0] <= SINGULAR * values[:, -1]
     if np.any(singular):
         raise table.error(int(np.argmax(singular)), message("poses.certain-direction"))
+
+
+NONE = -1
+SHARED = 0.5  # share of images that must match, of the camera with fewest
+
+Key: TypeAlias = str | int
+
+
+@dataclass(frozen=True, eq=False)
+class Pairing:
+    """The images of C cameras at N moments."""
+
+    images: IntArray  # (N, C), index of the image, from 0; -1 for none
+    by_order: bool = False  # as the names do not match
+
+
+def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairing:
+    """Pair the images of cameras by name, by the last number in the names, or by order.
+
+    Raises `FileError` if the names do not match and the numbers of images differ.
+    """
+    for key_of in (_stem, _last_number):
+        paired = _paired(names, key_of)
+        if paired is not None:
+            return Pairing(paired)
+    counts = [len(each) for each in names]
+    if min(counts) < max(counts):
+        few, many = counts.index(min(counts)), counts.index(max(counts))
+        raise FileError(
+            "rig.names-tell-nothing",
+            n_few=counts[few],
+            few=cameras[few],
+            n_many=counts[many],
+            many=cameras[many],
+            example=names[few][0],
+            other=names[many][0],
+        )
+    return Pairing(np.tile(np.arange(counts[0])[:, None], (1, len(names))), True)
+
+
+def _paired(
+    names: Sequence[Sequence[str]], key_of: Callable[[str], Key | None]
+) -> IntArray | None:
+    """Return the images of each key in order; None if the keys do not match."""
+    places: list[dict[Key, int]] = []
+    for each in names:
+        keys = [key_of(name) for name in each]
+        if None in keys or len(set(keys)) < len(keys):
+            return None
+        places.append({key: i for i, key in enumerate(keys) if key is not None})
+    every = set[Key]().union(*places)
+    n_shared = sum(sum(key in each for each in places) > 1 for key in every)
+    if n_shared < SHARED * min(map(len, places)):
+        return None
+    ordered = sorted(every, key=lambda key: natural_order(str(key)))
+    return np.array([[each.get(key, NONE) for each in places] for key in ordered])
+
+
+def _stem(name: str) -> str:
+    return PurePath(name).stem
+
+
+def _last_number(name: str) -> int | None:
+    digits = re.findall(r"(?a:\d+)", _stem(name))
+    return int(digits[-1]) if digits else None

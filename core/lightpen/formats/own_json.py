@@ -9,12 +9,20 @@ twice. A checksum as the last entry shows damage that leaves the text well-forme
 import json
 import math
 import os
+from base64 import b64encode
+from collections.abc import Mapping
 from datetime import datetime
 from hashlib import sha256
+from math import isfinite
 from threading import Lock
-from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Any, NoReturn, Self, TypeAlias, TypeVar, Union
 
-from msgspec import Meta, convert
+import numpy as np
+from msgspec import Meta, Struct, convert, to_builtins
+
+from lightpen import __version__
+from lightpen.formats.opened_files import InputFile
+from lightpen.messages import Message, Translate, Value, in_english
 
 CHECKSUM = b', "checksum": "'  # no text in JSON holds quotation marks as they are
 MOST_VALUES = 2_000_000  # 5000 images of four cameras take less; some 300 MB
@@ -119,3 +127,186 @@ def _finite(text: str) -> float:
 
 def _refuse(constant: str) -> NoReturn:
     raise ValueError(f"{constant} is no number of JSON.")
+
+
+StoredValue: TypeAlias = Union[
+    str, int, float, "StoredMessage", tuple["StoredMessage", ...], None
+]
+
+
+class StoredMessage(Struct, frozen=True):
+    """A message with its English text for readers of the file.
+
+    Attributes
+    ----------
+    code : str
+        Code of a template in `lightpen.catalogue`.
+    values : mapping of str to StoredValue
+        Values for the fields of the template; None for a value that is not finite.
+    """
+
+    code: str
+    text: str
+    values: Mapping[str, StoredValue]
+
+    @classmethod
+    def of(cls, message: Message) -> Self:
+        """Return the stored form of a message."""
+        values = {name: _stored(value) for name, value in message.values.items()}
+        return cls(message.code, str(message), values)
+
+    def worded(self, translate: Translate = in_english) -> str:
+        """Return the words in the language of a translation.
+
+        The text is returned where the catalogue has no such message any more.
+        """
+        try:
+            return _message(self).text(translate)
+        except (LookupError, TypeError, ValueError):
+            return self.text
+
+
+def _stored(value: Any) -> StoredValue:
+    if isinstance(value, Message):
+        return StoredMessage.of(value)
+    if isinstance(value, tuple):
+        return tuple(map(StoredMessage.of, value))
+    if isinstance(value, str | int):
+        return value
+    number = float(value)
+    return number if number - number == 0 else None
+
+
+def _message(stored: StoredMessage) -> Message:
+    values = {name: _value(value) for name, value in stored.values.items()}
+    return Message(stored.code, values)
+
+
+def _value(stored: StoredValue) -> Value:
+    if isinstance(stored, StoredMessage):
+        return _message(stored)
+    if isinstance(stored, tuple):
+        return tuple(map(_message, stored))
+    return float("nan") if stored is None else stored
+
+
+# Records as JSON: heading, and plain values of arrays and messages.
+#
+# `lightpen.formats.own_json` reads what is written here.
+
+
+Plain: TypeAlias = str | int | float | bool | None
+
+
+class ProgramName(Struct, frozen=True):
+    """The program that wrote a file."""
+
+    name: str
+    version: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}"
+
+
+class FileRecord(Struct, frozen=True, omit_defaults=True):
+    """A file that was read, with its content where the record needs it."""
+
+    file: str
+    sha256: Digest
+    base64: str = ""
+
+    def __post_init__(self) -> None:
+        require_path(self.file)
+
+
+THIS_PROGRAM = ProgramName("lightpen", __version__)
+
+
+def record_heading(created: datetime) -> dict[str, Any]:
+    """Return the common first entries of a record: program and time."""
+    return {"program": THIS_PROGRAM, "created": created.isoformat(timespec="seconds")}
+
+
+def file_entry(file: InputFile) -> FileRecord:
+    """Return a file with its hash and, if stored, its content."""
+    content = b64encode(file.content or b"").decode()
+    return FileRecord(file.path.name, file.sha256, content)
+
+
+def plain(value: Any) -> Any:
+    """Return plain values: tuples of arrays, None for NaN, stored messages."""
+    if value is None or isinstance(value, (str, int)):
+        return value
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: plain(entry) for name, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return tuple(map(plain, value))
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, Message):
+        return to_builtins(StoredMessage.of(value))
+    return value
+
+
+def record_bytes(record: Mapping[str, Any] | Struct) -> bytes:
+    """Return a record as JSON with its checksum."""
+    return with_checksum(json_bytes(record)) + b"\n"
+
+
+def json_bytes(record: Mapping[str, Any] | Struct) -> bytes:
+    """Return a record as readable JSON: one line per entry, and one per image.
+
+    Bytes of a file name that are no text in the encoding of this system become JSON
+    escapes.
+    """
+    lines = []
+    entries = to_builtins(record) if isinstance(record, Struct) else record
+    for name, entry in entries.items():
+        if name == "frames":
+            rows = ",\n    ".join(map(_dumps, entry))
+            lines.append(f'  "frames": [\n    {rows}\n  ]')
+        else:
+            lines.append(f"  {_dumps(name)}: {_dumps(entry)}")
+    text = "{\n" + ",\n".join(lines) + "\n}\n"
+    return text.encode("utf-8", "backslashreplace")
+
+
+def _dumps(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, default=to_builtins)
+
+
+FORMAT = 1
+
+
+class LaterFormatError(ValueError):
+    """A file was written by a later version, which has the format ``number``."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"Format {number} is not known.")
+        self.number = number
+
+
+class _Format(Struct):
+    format: Annotated[int, Meta(ge=1)]
+
+
+def parse_stored(data: bytes, shape: type[T]) -> T:
+    """Parse a text with checksum in the present format.
+
+    Raises `DamagedError` if it has no checksum or is not of the format that it names,
+    and `LaterFormatError` if that is a later one.
+    """
+    entries = parse_checked(data, dict[str, Any])
+    require_format(entries)
+    return in_shape(entries, shape)
+
+
+def require_format(entries: dict[str, Any]) -> None:
+    """Refuse entries of another format; see `parse_stored`."""
+    number = in_shape(entries, _Format).format
+    if number > FORMAT:
+        raise LaterFormatError(number)

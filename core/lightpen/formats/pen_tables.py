@@ -1,26 +1,119 @@
 """A pen as a table; see `lightpen.formats.pen_files`."""
 
+import io
 import re
-from dataclasses import replace
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.errors import FileError
-from lightpen.formats.pen_content import (
-    LENGTHS,
-    RANGES,
-    UNIT_NAMES,
-    UNITS,
-    PenContent,
-    agreed_unit,
-    check_diameter,
-    checked_number,
-    stated_numbers,
-    unit_normal,
-)
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError, UsageError
+from lightpen.formats.documents import Tree
+from lightpen.formats.entries import Entries
 from lightpen.formats.tables import Table, number_flaw
-from lightpen.messages import message
+from lightpen.messages import Message, message
 from lightpen.model.pen import Pen
+from lightpen.model.self_calibration import FoundPen
+
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
+LARGEST_DIAMETER = 100.0  # mm
+NORMAL_TOLERANCE = 0.01  # of the length of a normal in the file
+_SPELLINGS = {
+    "mm": ("mm", "millimeter", "millimetre", "millimeters", "millimetres"),
+    "cm": ("cm",),
+    "m": ("m", "meter", "metre", "meters", "metres"),
+    "um": ("um", "μm", "micron", "microns"),
+    "inch": ("inch", "in", "inches"),
+}
+UNIT_NAMES = {name: unit for unit, names in _SPELLINGS.items() for name in names}
+LENGTHS = {"led_sigma", "diameter_sigma"}  # in the unit of the file
+# From above the first to the second: mm, relative, 1/K, degrees C.
+RANGES = {
+    "led_sigma": (0.0, 10.0),
+    "scale_sigma": (0.0, 0.01),
+    "diameter_sigma": (0.0, 10.0),
+    "expansion": (-1e-5, 1e-4),
+    "expansion_sigma": (0.0, 1e-4),
+    "temperature_c": (-50.0, 100.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PenContent:
+    """The content of a pen file, mm; None where it states nothing."""
+
+    leds: FloatArray
+    normals: FloatArray | None
+    diameter: float | None
+    nominal_tip: FloatArray | None = None
+    name: str = ""
+    stated: Mapping[str, float] = field(default_factory=dict)
+    covariance: FloatArray | None = None
+    normal_covariance: FloatArray | None = None
+    found: FoundPen | None = None
+
+
+def agreed_unit(stated: str, given: str | None, name: str) -> str:
+    """Return the unit of a file's lengths, as stated in the file or given by the user.
+
+    Raises `UsageError` if neither says it, or they differ.
+    """
+    if stated and given and stated != given:
+        raise UsageError(
+            "pen-file.contradicting-units", name=name, stated=stated, given=given
+        )
+    unit = stated or given
+    if not unit:
+        raise UsageError("pen-file.no-units", name=name)
+    return unit
+
+
+def checked_number(what: str, number: float, name: str) -> float:
+    """Return a number of a file, checked against `RANGES`."""
+    least, most = RANGES[what]
+    if not least < number <= most:
+        raise FileError(
+            "pen-file.number",
+            name=name,
+            what=what,
+            number=number,
+            least=least,
+            most=most,
+        )
+    return number
+
+
+def check_diameter(diameter: float, name: str) -> None:
+    """Refuse an implausible disc diameter, mm."""
+    if not 0 < diameter <= LARGEST_DIAMETER:
+        raise FileError(
+            "pen-file.diameter", name=name, diameter=diameter, most=LARGEST_DIAMETER
+        )
+
+
+def unit_normal(normal: FloatArray, place: str | Message) -> FloatArray:
+    """Return a normal (3,) of unit length; refuse one that is far from it."""
+    squared = float(normal @ normal) if np.abs(normal).max() < 2 else np.inf
+    if abs(squared - 1) > 2 * NORMAL_TOLERANCE:
+        raise FileError(
+            "pen-file.normal-length",
+            place=place,
+            normal=" ".join(f"{c:g}" for c in normal),
+        )
+    return normal if abs(squared - 1) < 1e-9 else normal / np.sqrt(squared)
+
+
+def stated_numbers(pen: Pen) -> dict[str, float]:
+    """Return the numbers stated for a pen, by the names of `RANGES`."""
+    return {
+        what: float(number)
+        for what in RANGES
+        if (number := getattr(pen, what)) is not None
+    }
+
 
 _LED_NAMES = (
     *("led", "no", "no.", "nr", "nr.", "number", "id", "point"),
@@ -167,3 +260,123 @@ def csv_text(pen: Pen) -> str:
         cells = [number, *led, *normal, float(pen.diameter), *stated.values()]
         lines.append(",".join(map(repr, cells)))
     return "\n".join(lines) + "\n"
+
+
+# LED coordinates in the files of other programs, and in workbooks.
+#
+# A list is found by its name: points as three numbers, with three more of the normal,
+# or as mappings with x y z, position and normal; in a mapping, each point has its own
+# name.
+
+
+LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
+# Where programs list markers, and in what unit if they always use the same.
+LISTS = (
+    ("marker_positions", "m"),  # rpg_monocular_pose_estimator
+    ("TrackedObject/ModelPoints", ""),  # Rift
+    ("lighthouse_config/modelPoints", "m"),  # Vive
+    *(("ModelPoints", ""), ("modelPoints", "m")),
+    *((name, "") for name in ("markers", "MarkerPositions", "points", "leds")),
+    *((f"{body}/markers", "") for body in ("RigidBody", "rigid_body", "asset", "tool")),
+)
+_PLACES = ("position", "pos", "xyz", "location", "offset", "coordinates")
+_NORMAL_FIELDS = ("normal", "direction", "dir")
+_AXES = ("x", "y", "z")
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")  # xlsx and ods; xls
+_ROM = b"NDI\x00"
+_FOREIGN = (  # how files begin that cannot be read
+    (rb"\s*<", "XML (Motive, Vicon)"),
+    (rb"ply\r?\n", "PLY (point cloud)"),
+    (rb"\s*Format Version,", "Motive (CSV)"),
+    (rb"\s*\[\w+\]\s*\n\s*\w+\s*=", "INI (Atracsys)"),
+)
+
+
+class Markers(NamedTuple):
+    """Points of a list, in its own unit."""
+
+    points: FloatArray  # (L, 3)
+    normals: FloatArray | None  # (L, 3)
+    unit: str  # empty if it does not go without saying
+
+
+def is_workbook(data: bytes) -> bool:
+    """Return whether the content of a file is that of a workbook."""
+    return data.startswith(_WORKBOOKS)
+
+
+def refuse_foreign_list(data: bytes, name: str) -> None:
+    """Refuse the file of a program whose points cannot be read, by name."""
+    if data.startswith(_ROM):
+        raise FileError("pen-file.rom", name=name)
+    for start, program in _FOREIGN:
+        if re.match(start, data.removeprefix(b"\xef\xbb\xbf")):
+            raise FileError("pen-file.foreign", name=name, program=program)
+
+
+def workbook_text(data: bytes, name: str) -> str:
+    """Return the first sheet of a workbook that has cells, as lines with tabs."""
+    try:
+        from python_calamine import CalamineError, CalamineWorkbook
+    except ImportError as error:
+        raise FileError("pen-file.no-workbooks", name=name) from error
+    try:
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as packed:
+                size = sum(each.file_size for each in packed.infolist())
+            if size > LARGEST_WORKBOOK:
+                raise FileError("pen-file.large-workbook", name=name)
+        book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+        for index in range(len(book.sheet_names)):
+            rows = book.get_sheet_by_index(index).to_python(skip_empty_area=True)
+            rows = [row for row in rows if any(cell != "" for cell in row)]
+            if rows:
+                return "".join("\t".join(map(_cell, row)) + "\n" for row in rows)
+    except (CalamineError, zipfile.BadZipFile, OSError, ValueError) as error:
+        raise FileError("pen-file.damaged-workbook", name=name) from error
+    raise FileError("table.no-rows", name=name)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float) and value.is_integer() and abs(value) < 2**53:
+        return str(int(value))
+    return " ".join(str(value).split())
+
+
+def markers_of(tree: Tree, name: str) -> Markers | None:
+    """Return the points of a document of another program; None if it lists none."""
+    if not isinstance(tree, dict):
+        return None
+    for path, unit in LISTS:
+        found: Tree = tree
+        for key in path.split("/"):
+            entries = Entries.of(found, name) if isinstance(found, dict) else None
+            found = None
+            if entries is not None and entries.has(key):
+                found = entries.value(key)
+        if isinstance(found, dict):
+            found = list(found.values())
+        if isinstance(found, list) and found:
+            return _markers(found, unit, name)
+    return None
+
+
+def _markers(listed: list[Tree], unit: str, name: str) -> Markers:
+    rows: list[list[float]] = []
+    for number, point in enumerate(listed, 1):
+        place = message("pen-file.led", led=number, name=name)
+        entries = Entries.of(
+            point if isinstance(point, dict) else {"position": point}, place
+        )
+        if entries.has(*_AXES):
+            row = [float(entries.counted(1, axis)[0]) for axis in _AXES]
+        else:
+            row = entries.numbers(*_PLACES).tolist()
+        if entries.has(*_NORMAL_FIELDS):
+            row = [*row[:3], *entries.counted(3, *_NORMAL_FIELDS).tolist()]
+        if len(row) < 3 or len(row) != len(rows[0] if rows else row):
+            raise FileError("pen-file.no-point", place=place, count=len(row))
+        rows.append(row)
+    values = np.array(rows)
+    normals = values[:, 3:6] if values.shape[1] >= 6 else None
+    return Markers(values[:, :3], normals, unit)

@@ -1,8 +1,10 @@
 """Tables in delimited text: comma, semicolon, tab or blanks; decimal comma; header."""
 
+import csv
+import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
@@ -399,3 +401,30 @@ def _check_last_number(table: Table) -> None:
                 n_others=decimals[0],
             ),
         )
+
+
+# CSV tables without formulas for spreadsheets [1]_.
+#
+# References
+# ----------
+# .. [1] OWASP, "CSV Injection", https://owasp.org/www-community/attacks/CSV_Injection.
+
+
+# First characters of texts that a spreadsheet evaluates, also in full width.
+_FORMULA = (*"=+-@\t\r\n", *"\uff1d\uff0b\uff0d\uff20")
+
+
+def csv_table(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV; a text that could be a formula begins with an apostrophe.
+
+    Numbers stay numbers.
+    """
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerows([_shown(cell) for cell in row] for row in rows)
+    return lines.getvalue()
+
+
+def _shown(value: object) -> object:
+    is_formula = isinstance(value, str) and value.lstrip(" ").startswith(_FORMULA)
+    return f"'{value}" if is_formula else value

@@ -15,23 +15,25 @@ from functools import partial, reduce
 from threading import Event, Thread
 from typing import Protocol, TypeAlias
 
-from lightpen.cameras.clock import Clock
-from lightpen.cameras.pairing import FramePairs, held_up
+from lightpen.cameras.pairing import Clock, FramePairs, held_up
 from lightpen.cameras.protocol import (
     CameraSettings,
     DeviceLost,
     EndOfImages,
+    Failed,
+    FaultRaised,
     Frame,
+    FrameReady,
     FramesDelayed,
     FrameTimeout,
     ImageCamera,
     Stats,
+    WorkerEvent,
 )
 from lightpen.cameras.worker import LONGEST_STOP, CameraWorker
-from lightpen.cameras.worker_events import Failed, FaultRaised, FrameReady, WorkerEvent
 from lightpen.detection.pen_detection import PenDetection, detect_pen
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.detection.reasons import UNFORESEEN
-from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.errors import LightpenError
 from lightpen.swing.capture.state import Phase, SwingSetup

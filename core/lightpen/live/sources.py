@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.pairing import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.cameras.source import FoundDevice, Source, SourcePlace
 from lightpen.cameras.sources import SIMULATED, SOURCES, found_cameras
@@ -15,7 +15,7 @@ from lightpen.formats.opened_files import OpenedFiles
 from lightpen.local_time import local_now
 from lightpen.model.pen import Pen
 from lightpen.swing.capture.state import SwingState
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import SourceChoice
 
 
 class Operator(Protocol):

@@ -14,7 +14,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from lightpen.messages import Message, message
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
 
 ASSUMED = 0.004  # mm, standard uncertainty
 VALIDITY = timedelta(days=365)

@@ -7,14 +7,16 @@ by how much. A swing about one axis leaves that axis without scatter.
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from math import erf, inf, sqrt
 
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message, message
-from lightpen.model.posture import directions_of, tilts_of
-from lightpen.model.rigid import nearest_rotation
+from lightpen.model.rigid import directions_of, nearest_rotation, tilts_of
 
 MIN_SPREAD = np.radians(3.0)  # rms turn of the worst direction; a cone of 3 degrees
 TILT_RINGS = (np.radians(8.0), np.radians(20.0))  # upright, leaning, leaning far
@@ -134,3 +136,149 @@ def dial_counts(rotations: FloatArray) -> IntArray:
     counts = np.zeros((3, N_DIRECTIONS), dtype=np.int64)
     np.add.at(counts, (ring, np.where(ring > 0, sector % N_DIRECTIONS, 0)), 1)
     return counts
+
+
+COVERAGE_FACTOR = 2.0  # k
+COVERAGE = erf(COVERAGE_FACTOR / sqrt(2))  # of a normal distribution, 0.9545
+
+
+# Decision rules: whether a measured value with its U keeps a limit.
+#
+# simple acceptance
+#     Within the limits is accepted, U is stated beside it [1]_.
+# guard band
+#     Accepted is what keeps the limits by the guard band of 1.65 u at least, rejected
+#     what exceeds them by as much; between them nothing is proven [2]_.
+# risk
+#     Accepted is what conforms with a probability of ``1 - max_risk`` or more, rejected
+#     what does so with ``max_risk`` or less; between them nothing is proven [1]_.
+#
+# The value is taken as normal with the standard uncertainty u = U / 2.
+#
+# References
+# ----------
+# .. [1] JCGM 106:2012, "The role of measurement uncertainty in conformity
+#    assessment", 8.2 and 8.3.
+# .. [2] ISO 14253-1:2017, "Decision rules for verifying conformity or nonconformity
+#    with specifications".
+
+
+GUARD_FACTOR = 1.65  # one-sided 95 % of a normal distribution
+USUAL_RISK = 0.05
+
+
+class DecisionRule(StrEnum):
+    """Decision rule for a measured value and its limits."""
+
+    SIMPLE = "simple acceptance"
+    GUARD_BAND = "guard band"
+    RISK = "risk"
+
+
+class Decision(StrEnum):
+    """Outcome of a decision rule."""
+
+    ACCEPTED = "accepted"
+    OPEN = "open"  # neither conformity nor nonconformity is proven
+    REJECTED = "rejected"
+
+
+def conformity_probability(
+    value: float, uncertainty: float, *, lower: float = -inf, upper: float = inf
+) -> float:
+    """Return the probability that the true value lies within its limits.
+
+    The uncertainty is U (k = 2) of the measured value, both in the unit of the limits.
+    """
+    if not uncertainty > 0:
+        return float(lower <= value <= upper)
+    from scipy.special import ndtr
+
+    u = uncertainty / COVERAGE_FACTOR
+    return float(ndtr((upper - value) / u) - ndtr((lower - value) / u))
+
+
+def decide(
+    rule: DecisionRule,
+    value: float,
+    uncertainty: float,
+    *,
+    lower: float = -inf,
+    upper: float = inf,
+    max_risk: float = USUAL_RISK,
+) -> Decision:
+    """Return the decision on a value with its U (k = 2) and limits of the true value.
+
+    ``max_risk`` is the maximum risk of a false acceptance and of a false rejection.
+    """
+    if rule is DecisionRule.RISK:
+        p = conformity_probability(value, uncertainty, lower=lower, upper=upper)
+        if p >= 1 - max_risk:
+            return Decision.ACCEPTED
+        return Decision.REJECTED if p <= max_risk else Decision.OPEN
+    band = 0.0
+    if rule is DecisionRule.GUARD_BAND:
+        band = GUARD_FACTOR * uncertainty / COVERAGE_FACTOR
+    room = min(value - lower, upper - value)
+    if room >= band:
+        return Decision.ACCEPTED
+    return Decision.REJECTED if room < -band else Decision.OPEN
+
+
+# Quantiles of the normal and the chi-square distribution, by the upper tail.
+#
+# `scipy.special` is imported when a quantile is first needed: it takes 0.1 s.
+
+
+@cache
+def normal_quantile(chance: float) -> float:
+    """Return the quantile that a standard normal variable exceeds with this chance."""
+    from scipy.special import ndtri
+
+    return -float(ndtri(chance))
+
+
+@cache
+def chi_square_quantile(n_free: int, chance: float) -> float:
+    """Return the upper quantile of chi-square with ``n_free`` degrees of freedom."""
+    from scipy.special import chdtri
+
+    return float(chdtri(n_free, chance))
+
+
+def chi_quantile(n_free: int, chance: float) -> float:
+    """Return the quantile of the length of a standard normal vector of ``n_free``."""
+    return sqrt(chi_square_quantile(n_free, chance))
+
+
+EXACT = 1e-6  # standard deviation that counts as exact, in the unit of the value
+
+
+def known_by(covariance: FloatArray) -> FloatArray:
+    """Return the information (k, k) of a stated covariance (k, k).
+
+    Variances are enlarged by 1e-6, since what is stated as exact may be rounded.
+    """
+    floor = np.maximum(np.diag(covariance) * EXACT, EXACT**2)
+    return inverse(covariance + np.diag(floor))
+
+
+def inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse (k, k) of a covariance or an information (k, k).
+
+    By Cholesky decomposition after scaling, since the unknowns have different units.
+    Raises `numpy.linalg.LinAlgError` unless it is positive definite.
+    """
+    scale = 1 / np.sqrt(np.diag(matrix))
+    # As scipy.linalg.cho_solve, whose import takes 0.03 s.
+    root = np.linalg.inv(np.linalg.cholesky(matrix * np.outer(scale, scale))) * scale
+    return np.asarray(root.T @ root)
+
+
+def symmetric_root(covariance: FloatArray) -> FloatArray:
+    """Return the symmetric square root (k, k) of a covariance, also a singular one.
+
+    Unlike other roots it is unique, so draws by it are the same with every library.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

@@ -4,7 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from lightpen.messages import Message
+from lightpen.runners import FaultReporter
+from lightpen.swing.capture.state import SwingEvent
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.status import SwingListener, SwingStatus, log_change
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,3 +68,29 @@ class OperatorPresence:
         return replace(
             self, begun_with=self.choices, paused_by_leaving=False, refusal=None
         )
+
+
+class PublishedSwing:
+    """Holds the status for the parts of the workflow, and notifies."""
+
+    def __init__(self, listener: SwingListener) -> None:
+        self._listener = listener
+        self.faults = FaultReporter(listener)
+        self.status = SwingStatus()
+        self.presence = OperatorPresence()
+
+    def publish(self, status: SwingStatus, *events: SwingEvent) -> None:
+        """Set the status and notify."""
+        is_open = status.is_capturing or (status.has_verdict and not status.result)
+        before = self.status
+        self.status = replace(
+            status,
+            refusal=self.presence.refusal,
+            has_other_choices=is_open and self.presence.has_other_choices,
+        )
+        log_change(before, self.status, events)
+        self._listener.on_swing(self.status, events)
+
+    def republish(self) -> None:
+        """Notify, after the presence has changed."""
+        self.publish(self.status)

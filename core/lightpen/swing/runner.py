@@ -10,12 +10,12 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.local_time import local_now
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.runners.serial_queue import SerialQueue
+from lightpen.runners import SerialQueue
 from lightpen.swing.capture.state import SwingSetup
 from lightpen.swing.status import SwingListener, SwingStatus
 from lightpen.swing.workflow import SwingWorkflow

@@ -5,15 +5,14 @@ from dataclasses import replace
 from datetime import datetime
 from typing import TypeVar
 
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook import LazyLogbook
 from lightpen.detection.reasons import Reason
 from lightpen.errors import AcceptanceError, LightpenError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.messages import Message, message
-from lightpen.model.method import Method
+from lightpen.messages import Code, Message, message
+from lightpen.model.names import Method
 from lightpen.record.library.supervision import Signature
-from lightpen.record.results.acceptance import accept
-from lightpen.record.results.assessment import SwingAssessment, assess
+from lightpen.record.results.acceptance import SwingAssessment, accept, assess
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
 from lightpen.record.swings.reading import Record, open_record
@@ -24,13 +23,11 @@ from lightpen.record.swings.solving import (
     solve_record,
 )
 from lightpen.record.swings.writing import note_excluded
-from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread
+from lightpen.runners import BackgroundTask, Report, StartThread
 from lightpen.swing.capture.rules import conclude
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.failed_swing import failed_swing
-from lightpen.swing.published import PublishedSwing
-from lightpen.swing.status import Activity, SwingListener, SwingStatus
-from lightpen.swing_messages import Code
+from lightpen.swing.operator_presence import PublishedSwing
+from lightpen.swing.status import Activity, SwingListener, SwingStatus, failed_swing
 
 T = TypeVar("T")
 

@@ -6,14 +6,21 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
+from lightpen.detection.rig_observations import fit_rig_poses
+from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Verdict
-from lightpen.messages import Message
-from lightpen.model.origin import Origin
-from lightpen.record.results.assessment import SwingAssessment
+from lightpen.messages import Code, Message, message
+from lightpen.model.names import Origin
+from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.solving import Solution
-from lightpen.runners.faults import FaultListener
+from lightpen.runners import FaultListener
+from lightpen.swing.capture.kept_images import AcceptedImages
 from lightpen.swing.capture.state import (
     Pause,
     Phase,
@@ -21,7 +28,43 @@ from lightpen.swing.capture.state import (
     SwingSetup,
     SwingState,
 )
-from lightpen.swing.failed_swing import FailedSwing
+
+
+@dataclass(frozen=True, eq=False)
+class FailedSwing:
+    """Reason of a failed solution, and the fit of the LEDs in each image alone."""
+
+    causes: tuple[Message, ...]  # the most evident one first
+    pixels: FloatArray  # (N, C, L, 2), LED centres, px; NaN where one was not seen
+    residuals: FloatArray  # (N, C, L, 2), from the pose of each moment, px
+
+
+def failed_swing(setup: SwingSetup, kept: AcceptedImages, why: Message) -> FailedSwing:
+    """Return a swing that gave no tip.
+
+    Residuals of the poses do not depend on the cone. Where they are above the usual
+    ones, a file or an LED is a likelier cause than the seat.
+    """
+    residuals = np.full_like(kept.pixels, np.nan)
+    if len(kept):
+        poses = fit_rig_poses(
+            setup.rig, setup.pen, kept.pixels, kept.rotations, kept.translations
+        )
+        residuals = poses.residuals.reshape(kept.pixels.shape)
+    sigma = float(np.median(kept.sigmas)) if len(kept) else 0.0
+    fits = sigma <= USUAL_SIGMA
+    causes = (
+        (why,)
+        if fits
+        else (
+            message(
+                Code.LEDS_MISFIT, sigma=sigma, usual=USUAL_SIGMA, cause=UNKNOWN_CAUSE
+            ),
+            why,
+        )
+    )
+    return FailedSwing(causes, kept.pixels, residuals)
+
 
 _logger = logging.getLogger(__name__)
 

@@ -4,20 +4,48 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
+from pathlib import Path
 from typing import Self, TypeAlias
 
 import numpy as np
 
+from lightpen import __version__
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import Frame, Stats
+from lightpen.cameras.sources import source_named
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.reasons import Reason
+from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
-from lightpen.messages import message
-from lightpen.record.swings.reading import DISCARDED, Record
+from lightpen.formats.own_json import Plain, plain
+from lightpen.formats.pen_files import PEN_FILE
+from lightpen.formats.rig_files import RIG_FILE, RigFile, read_rig
+from lightpen.local_time import local_now
+from lightpen.messages import Code, message
+from lightpen.model.names import Origin
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import Rig
+from lightpen.record.swings.header import (
+    FileCopy,
+    Header,
+    RigCopies,
+    assumption_entries,
+    damaged_file,
+)
+from lightpen.record.swings.reading import (
+    DISCARDED,
+    JOURNAL,
+    Record,
+    is_of_recording,
+    is_press_test,
+    open_record,
+    recorded_limits,
+)
+from lightpen.record.swings.solving import is_simulated_recording, source
 from lightpen.record.swings.writing import RecordWriter, SecondaryView
-from lightpen.swing.capture.kept_images import keep
-from lightpen.swing.capture.rules import advance_swing, finish
+from lightpen.swing.capture.guidance import limits_for_more
+from lightpen.swing.capture.kept_images import keep, kept_before
+from lightpen.swing.capture.rules import advance_swing, finish, start_again
 from lightpen.swing.capture.state import (
     Phase,
     Progress,
@@ -27,7 +55,12 @@ from lightpen.swing.capture.state import (
     SwingState,
     Transition,
 )
-from lightpen.swing_messages import Code
+from lightpen.swing.preparation import (
+    CameraInUse,
+    Preparation,
+    SecondCamera,
+    SourceChoice,
+)
 
 Rule: TypeAlias = Callable[[SwingSetup, SwingState, PenDetection, float], Transition]
 
@@ -231,4 +264,216 @@ def _others(frame: Frame, detection: PenDetection) -> tuple[SecondaryView, ...]:
     return tuple(
         SecondaryView(other.image, seen.pixels, other.device_ts_ns)
         for other, seen in zip(frame.others, detection.others, strict=True)
+    )
+
+
+def record_header(
+    preparation: Preparation, settings: dict[str, Plain] | None = None
+) -> Header:
+    """Return the header of a record that begins now; files are read again."""
+    second = preparation.second
+    rig_file = None if second is None else second.rig_file
+    if rig_file is not None:
+        camera_path = rig_file.camera_files[0]
+    elif preparation.camera_file is not None:
+        camera_path = preparation.camera_file.path
+    else:
+        raise ValueError("`camera_file` or a rig must be chosen.")
+    if preparation.pen_file is None:
+        raise ValueError("`pen_file` must be chosen.")
+    limits, origin = preparation.limits, preparation.origin
+    if origin is Origin.RECORDED and is_simulated_recording(preparation.source.place):
+        origin = Origin.SIMULATED
+    return Header(
+        camera_file=FileCopy.of(camera_path, CAMERA_FILE),
+        pen_file=FileCopy.of(preparation.pen_file.path, PEN_FILE),
+        created=local_now(),
+        program=f"lightpen {__version__}",
+        station=preparation.names.station,
+        operator=preparation.names.operator,
+        tip=preparation.names.tip,
+        cone=preparation.names.cone,
+        units=preparation.pen_file.units,
+        nominal_tip_mm=plain(preparation.nominal_tip),
+        mask_px=plain(preparation.mask),
+        settings={
+            "pen": preparation.names.pen,
+            "ball_diameter_mm": preparation.names.ball_diameter,
+            "origin": str(origin),
+            "source": str(preparation.source.kind),
+            "source_place": preparation.source.place,
+            **_camera_entries(preparation.camera_in_use),
+            **_second_entries(second),
+            "max_uncertainty_mm": limits.max_uncertainty,
+            "min_images": limits.min_images,
+            "max_images": limits.max_images,
+            "min_per_field": limits.min_per_field,
+            "spacing_rad": limits.spacing,
+            "requires_temperature": limits.requires_temperature,
+            "method": preparation.method,
+            **assumption_entries(preparation.assumptions_today),
+            **(settings or {}),
+        },
+        rig=None if second is None else _rig_copies(second),
+    )
+
+
+def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
+    """Return the entries of a record on the camera."""
+    if used is None:
+        return {}
+    settings, region = used.settings, used.settings.region
+    entries: dict[str, Plain] = {
+        "camera_serial": used.serial,
+        "exposure_us": settings.exposure_us,
+        "gain_db": settings.gain_db,
+        "frame_rate": settings.frame_rate,
+        "pixel_format": settings.pixel_format,
+        "trigger": None if settings.trigger is None else str(settings.trigger),
+        "packet_size": settings.packet_size,
+        "region_px": None
+        if region is None
+        else f"{region.width} x {region.height} at {region.x}, {region.y}",
+    }
+    return {name: entry for name, entry in entries.items() if entry is not None}
+
+
+def _second_entries(second: SecondCamera | None) -> dict[str, Plain]:
+    """Return the entries of a record on the second camera."""
+    if second is None:
+        return {}
+    entries: dict[str, Plain] = {
+        "source": str(second.source.kind),
+        "source_place": second.source.place,
+        **_camera_entries(second.in_use),
+    }
+    return {f"second_{name}": entry for name, entry in entries.items()}
+
+
+def _rig_copies(second: SecondCamera) -> RigCopies | None:
+    file = second.rig_file
+    if file is None:
+        return None
+    return RigCopies(
+        FileCopy.of(file.path, RIG_FILE),
+        tuple(FileCopy.of(path, CAMERA_FILE) for path in file.camera_files[1:]),
+        (plain(second.mask),),
+    )
+
+
+ROUNDING = 1e-6  # of a rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Resumable:
+    """An interrupted swing, ready to be resumed."""
+
+    record: Record
+    setup: SwingSetup  # of the record's own files
+    state: SwingState  # with all images in the journal
+    rig_file: RigFile | None = None  # the record's own copy; None of a single camera
+
+    @property
+    def source_choices(self) -> tuple[SourceChoice, ...]:
+        """The source of each camera; none where this version does not know one."""
+        settings, choices = self.record.header.settings, []
+        for which in ("", "second_")[: self.setup.rig.n_cameras]:
+            kind = settings.get(f"{which}source")
+            place = settings.get(f"{which}source_place")
+            if not isinstance(kind, str) or source_named(kind) is None:
+                return ()
+            choices.append(SourceChoice(kind, place if isinstance(place, str) else ""))
+        return tuple(choices)
+
+    def is_of(self, sources: Sequence[SourceChoice]) -> bool:
+        """Return whether images of these sources can continue it."""
+        if len(sources) != self.setup.rig.n_cameras:
+            return False
+        source, settings = sources[0], self.record.header.settings
+        kind, place = settings.get("source"), settings.get("source_place")
+        return source.kind == kind and (
+            not self.setup.is_recording or source.place == place
+        )
+
+    def fits(self, image_size: tuple[int, int]) -> bool:
+        """Return whether images of this width and height, px, can continue it."""
+        return image_size == self.setup.camera.image_size
+
+
+def read_resumable(folder: Path) -> Resumable:
+    """Read an interrupted swing and fit its images again."""
+    record = open_record(folder)
+    setup = recorded_setup(record)
+    if not _shows(record, setup.pen, setup.rig):
+        raise damaged_file(folder / JOURNAL)
+    if record.more is not None:
+        min_images, max_images = record.more
+        limits = replace(setup.limits, min_images=min_images, max_images=max_images)
+        setup = replace(setup, limits=limits)
+    found = source(record)
+    rig_file = None
+    if found.rig_file is not None:
+        rig_file = read_rig(found.rig_file, found.camera_files)
+    return Resumable(record, setup, resume_swing(setup, record), rig_file)
+
+
+def read_for_more(folder: Path) -> Resumable:
+    """Read a complete swing, to capture more images.
+
+    The record notes it, so that the swing continues likewise when it is interrupted.
+    """
+    swing = read_resumable(folder)
+    limits = limits_for_more(swing.setup.limits, swing.state.n_kept)
+    with RecordWriter.resume(swing.record) as writer:
+        writer.ask_for_more(limits.min_images, limits.max_images)
+    setup = replace(swing.setup, limits=limits)
+    return replace(swing, record=open_record(folder), setup=setup)
+
+
+def _shows(record: Record, pen: Pen, rig: Rig) -> bool:
+    """Return whether the journal can be of this pen before these cameras."""
+    for image in record.images:
+        R, t = image.rotation, image.translation
+        if image.rig_pixels.shape[:2] != (rig.n_cameras, pen.n_leds):
+            return False
+        if not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=ROUNDING):
+            return False
+        leds_rig = pen.leds @ R.T + t
+        depths = leds_rig @ rig.rotations[:, 2].T + rig.translations[:, 2]
+        if depths.min(axis=0).max() <= 0:  # behind all of them
+            return False
+    return True
+
+
+def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingState:
+    """Return an interrupted swing with all images that its record acknowledged.
+
+    The setup has the record's own camera and pen.
+    """
+    images = record.used_images
+    kept = kept_before(
+        setup.rig,
+        setup.pen,
+        record.numbers,
+        np.array([image.rig_pixels for image in images]),
+        np.array([image.rotation for image in images]),
+        np.array([image.translation for image in images]),
+        setup.assumptions,
+    )
+    return start_again(setup, kept, record.next_number, time)
+
+
+def recorded_setup(record: Record) -> SwingSetup:
+    """Return the setup of a record, from its own copies of the files."""
+    found = source(record)
+    return SwingSetup(
+        found.camera,
+        found.pen,
+        recorded_limits(record),
+        found.masks[0],
+        assumptions=found.assumptions,
+        is_recording=is_of_recording(record),
+        beside=found.rig,
+        other_masks=found.masks[1:],
+        is_press_test=is_press_test(record),
     )

@@ -9,11 +9,11 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook
+from lightpen.archive.logbook import LazyLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
-from lightpen.formats.json_records import Plain
+from lightpen.formats.own_json import Plain
 from lightpen.messages import Message, message
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.interrupted import discard_swing
@@ -25,8 +25,8 @@ from lightpen.record.swings.reading import (
 )
 from lightpen.record.swings.solving import Solution
 from lightpen.record.swings.writing import RecordWriter, make_record_folder
-from lightpen.runners.serial_queue import StartThread, Task
-from lightpen.swing.capture.rig_sighting import seen_by_rig
+from lightpen.runners import StartThread, Task
+from lightpen.swing.capture.kept_images import seen_by_rig
 from lightpen.swing.capture.rules import (
     advance_swing,
     finish,
@@ -44,13 +44,17 @@ from lightpen.swing.capture.state import (
     SwingState,
     Transition,
 )
+from lightpen.swing.operator_presence import PublishedSwing
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.published import PublishedSwing
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.solving import SwingSolving
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
-from lightpen.swing.swing_recorder import SwingRecorder
+from lightpen.swing.swing_recorder import (
+    Resumable,
+    SwingRecorder,
+    read_for_more,
+    read_resumable,
+    record_header,
+)
 
 PRESS_IMAGES = 60  # at least, with firm pressure
 PRESS_UNCERTAINTY = 1.0  # mm; limit of U in a press test, which ends no swing

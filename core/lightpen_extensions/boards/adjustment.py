@@ -29,8 +29,8 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_centroids
 from lightpen.model.rigid import rotation_from_vector, skew
 from lightpen_extensions.boards.boards import Board
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.start import BoardPoses
-from lightpen_extensions.boards.views import Views
 
 N_POSE, N_SHAPE = 6, 5
 MAX_STEPS = 100

@@ -13,10 +13,10 @@ from datetime import date
 import numpy as np
 
 from lightpen.errors import CalibrationError
-from lightpen.formats.camera_checks import LARGEST_FOLD
+from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
-from lightpen.model.quantiles import normal_quantile
+from lightpen.model.coverage import normal_quantile
 from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.adjustment import BoardFit
 from lightpen_extensions.boards.changes import (
@@ -31,12 +31,12 @@ from lightpen_extensions.boards.changes import (
 )
 from lightpen_extensions.boards.distortion import Choice, choose_distortion, fit_camera
 from lightpen_extensions.boards.effects import MixedFit, fit_effects, rms_together
-from lightpen_extensions.boards.start import start_any_camera, start_board_poses
-from lightpen_extensions.boards.views import (
+from lightpen_extensions.boards.observing import (
     Views,
     message_on_duplicates,
     without_duplicates,
 )
+from lightpen_extensions.boards.start import start_any_camera, start_board_poses
 
 MIN_VIEWS = 5
 ENOUGH_VIEWS = 15

@@ -22,8 +22,8 @@ from lightpen.model.uncertainty_map import moved_in_image
 from lightpen_extensions.boards.adjustment import BoardFit, fit_board_poses
 from lightpen_extensions.boards.distortion import fit_camera
 from lightpen_extensions.boards.effects import held_out_errors
+from lightpen_extensions.boards.observing import Views, listed_names
 from lightpen_extensions.boards.start import start_board_poses
-from lightpen_extensions.boards.views import Views, listed_names
 
 FEWEST = 4  # views of a group that a set is refused for
 LEAST_GROUP = 2

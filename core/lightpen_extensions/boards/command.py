@@ -19,11 +19,10 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.errors import UsageError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
-from lightpen.formats.json_records import plain
-from lightpen.formats.pairing import pair_images
-from lightpen.formats.rig_files import write_rig
+from lightpen.formats.observation_files import pair_images
+from lightpen.formats.own_json import plain
+from lightpen.formats.rig_files import write_camera, write_rig
 from lightpen.local_time import local_now
 from lightpen.messages import printable
 from lightpen_extensions.boards.boards import parse_board

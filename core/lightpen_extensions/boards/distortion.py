@@ -26,8 +26,8 @@ from lightpen_extensions.boards.effects import (
     is_significantly_less,
     rms_together,
 )
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.start import BoardPoses, start_board_poses, start_camera
-from lightpen_extensions.boards.views import Views
 
 FEW, MANY, FISHEYE = 5, 8, 4  # distortion coefficients
 WIDE = 0.6  # distance in the normalised plane: 31 degrees off the axis

@@ -28,7 +28,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
 from lightpen_extensions.boards.adjustment import (
     FINEST,
     N_POSE,
@@ -39,7 +39,7 @@ from lightpen_extensions.boards.adjustment import (
     linearise,
     moved_state,
 )
-from lightpen_extensions.boards.views import Views
+from lightpen_extensions.boards.observing import Views
 
 LENGTHS = (0.15, 0.21, 0.3, 0.42, 0.6)  # of the field, in the image's longer side
 LEAST = 1e-3  # of the noise: a component of no effect

@@ -2,19 +2,110 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import partial
 from itertools import islice
 
 import numpy as np
 
-from lightpen.arrays import FloatArray, Image
+from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource, look_at_all
-from lightpen.formats.pairing import NONE, Pairing
+from lightpen.formats.observation_files import NONE, Pairing
 from lightpen.messages import Message, message, printable
 from lightpen_extensions.boards.boards import Board, BoardKind
 from lightpen_extensions.boards.sightings import count_corners, find_points, for_search
-from lightpen_extensions.boards.views import Views
+
+SAME = 0.002  # of the image's longer side: distance of the points, rms
+COMMON = 0.8  # of the points of the view that shows fewer
+SHOWN = 6  # names in a message
+
+
+def listed_names(names: tuple[str, ...]) -> str:
+    """Return the first names of views as text."""
+    return ", ".join(names[:SHOWN]) + (" ..." if len(names) > SHOWN else "")
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """The points of a board in V views of C cameras."""
+
+    board: Board
+    names: tuple[str, ...]  # one a view
+    pixels: FloatArray  # (V, C, N, 2), px; NaN where a point was not seen
+    image_sizes: tuple[tuple[int, int], ...]  # width and height, one a camera, px
+
+    @property
+    def n_views(self) -> int:
+        """Number of views."""
+        return len(self.names)
+
+    @property
+    def seen(self) -> BoolArray:
+        """Mask of the visible points, (V, C, N)."""
+        return np.asarray(np.isfinite(self.pixels).all(axis=-1))
+
+    @property
+    def found(self) -> BoolArray:
+        """Which views each camera saw the board in, (V, C)."""
+        return np.asarray(self.seen.any(axis=-1))
+
+    def chosen(self, which: BoolArray) -> "Views":
+        """Return some of the views."""
+        names = np.array(self.names)[which].tolist()
+        return Views(self.board, tuple(names), self.pixels[which], self.image_sizes)
+
+    def of_camera(self, camera: int) -> "Views":
+        """Return the views in which one camera saw the board."""
+        own = Views(
+            self.board,
+            self.names,
+            self.pixels[:, camera : camera + 1],
+            (self.image_sizes[camera],),
+        )
+        return own.chosen(own.found[:, 0])
+
+
+def without_duplicates(views: Views) -> tuple[Views, tuple[str, ...]]:
+    """Return the views in which the board is somewhere else, and the others' names.
+
+    What views of one place share (pixels, hang of the board, blur, shadows) is the same
+    in all of them: more of them add no information on the camera.
+    """
+    kept: list[int] = []
+    scale = SAME * np.array([max(size) for size in views.image_sizes])
+    for v in range(views.n_views):
+        if not any(_is_same(views.pixels[v], views.pixels[k], scale) for k in kept):
+            kept.append(v)
+    which = np.zeros(views.n_views, dtype=np.bool_)
+    which[kept] = True
+    return views.chosen(which), tuple(np.array(views.names)[~which].tolist())
+
+
+def message_on_duplicates(n_views: int, names: tuple[str, ...]) -> Message:
+    """Return the message on the named views that do not count; ``n_views`` do."""
+    return message(
+        "intrinsics.duplicates",
+        n_duplicates=len(names),
+        n_views=n_views,
+        names=listed_names(names),
+    )
+
+
+def _is_same(one: FloatArray, other: FloatArray, scale: FloatArray) -> bool:
+    """Return whether all cameras see the points (C, N, 2) at the same places."""
+    squares = np.square(one - other).sum(axis=-1)
+    common = np.isfinite(squares)
+    n_seen = np.isfinite(one[..., 0]).sum(axis=-1)
+    n_other = np.isfinite(other[..., 0]).sum(axis=-1)
+    if np.any((n_seen > 0) != (n_other > 0)):
+        return False
+    n_common = common.sum(axis=-1)
+    if np.any(n_common < COMMON * np.minimum(n_seen, n_other)):
+        return False
+    sums = np.where(common, squares, 0.0).sum(axis=-1)
+    return bool(np.all(sums <= scale**2 * n_common))
+
 
 MEMORY_A_PIXEL = 5  # bytes: 16 bits, 8 bits, and copies
 EXAMINED = 3  # images that are searched for another board
@@ -154,3 +245,67 @@ def _why_unseen(source: ImageSource, board: Board) -> Message:
 
 def _is_found(images: Iterable[Image], board: Board) -> bool:
     return any(find_points(image, board) is not None for image in images)
+
+
+STILL = 0.0015  # of the image's longer side, between detections, rms
+STILL_TIME = 0.4  # s
+NEW = 0.05  # of the image's longer side, from each captured view, rms
+MAX_VIEWS = 60
+
+
+class BoardVisibility(StrEnum):
+    """Visibility of the board in the newest image."""
+
+    UNSEEN = "unseen"
+    MOVING = "moving"
+    STILL = "still"
+    KEPT = "kept"
+    ALIKE = "alike"
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """Captured views, and the last detection of the board."""
+
+    board: Board
+    image_size: tuple[int, int]
+    kept: tuple[FloatArray, ...] = ()  # each (N, 2), px
+    # (N, 2), in the newest image; None where it is not seen.
+    points: FloatArray | None = None
+    still_since: float = 0.0  # s, on the clock of the images
+    sight: BoardVisibility = BoardVisibility.UNSEEN
+
+    def after(self, points: FloatArray | None, time_s: float) -> "Capture":
+        """Return the capture after another image, which is added if still and new."""
+        if points is None:
+            return replace(self, points=None, sight=BoardVisibility.UNSEEN)
+        longer = max(self.image_size)
+        if self.points is None or _apart(self.points, points) > STILL * longer:
+            moved = replace(self, points=points, still_since=time_s)
+            return replace(moved, sight=BoardVisibility.MOVING)
+        seen = replace(self, points=points)
+        if any(_apart(each, points) < NEW * longer for each in self.kept):
+            is_last = self.sight is BoardVisibility.KEPT
+            return replace(
+                seen, sight=BoardVisibility.KEPT if is_last else BoardVisibility.ALIKE
+            )
+        if time_s - self.still_since < STILL_TIME or len(self.kept) >= MAX_VIEWS:
+            return replace(seen, sight=BoardVisibility.STILL)
+        return replace(seen, kept=(*self.kept, points), sight=BoardVisibility.KEPT)
+
+    @property
+    def views(self) -> Views:
+        """The captured views."""
+        names = tuple(str(number) for number in range(1, len(self.kept) + 1))
+        pixels = np.full((len(self.kept), 1, self.board.n_points, 2), np.nan)
+        for v, points in enumerate(self.kept):
+            pixels[v, 0] = points
+        return Views(self.board, names, pixels, (self.image_size,))
+
+
+def _apart(one: FloatArray, other: FloatArray) -> float:
+    """Return the distance between two detections of a board, px rms."""
+    squares = np.square(one - other).sum(axis=-1)
+    if not np.isfinite(squares).any():
+        return np.inf
+    return float(np.sqrt(np.nanmean(squares)))

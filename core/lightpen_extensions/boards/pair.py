@@ -15,8 +15,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
-from lightpen.model.rig import Rig, of_camera
-from lightpen.model.rigid import vector_from_rotation
+from lightpen.model.rigid import Rig, of_camera, vector_from_rotation
 from lightpen_extensions.boards.adjustment import (
     FINEST,
     N_SHAPE,
@@ -32,12 +31,12 @@ from lightpen_extensions.boards.calibration import (
 )
 from lightpen_extensions.boards.changes import USELESS
 from lightpen_extensions.boards.effects import views_without_field
-from lightpen_extensions.boards.start import BoardPoses, start_board_poses
-from lightpen_extensions.boards.views import (
+from lightpen_extensions.boards.observing import (
     Views,
     message_on_duplicates,
     without_duplicates,
 )
+from lightpen_extensions.boards.start import BoardPoses, start_board_poses
 
 MIN_PAIRS = 3
 ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view

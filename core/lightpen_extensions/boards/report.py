@@ -8,15 +8,14 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.rigid import vector_from_rotation
 from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.adjustment import BoardFit
 from lightpen_extensions.boards.calibration import CameraCalibration
 from lightpen_extensions.boards.distortion import choice_record
-from lightpen_extensions.boards.observing import ObservedBoard
+from lightpen_extensions.boards.observing import ObservedBoard, Views
 from lightpen_extensions.boards.pair import PairCalibration
-from lightpen_extensions.boards.views import Views
 
 COLUMNS, ROWS = 4, 3
 PINHOLE = ("fx", "fy", "cx", "cy")

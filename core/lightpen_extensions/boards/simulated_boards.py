@@ -8,11 +8,11 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, Image, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.boards.boards import Board, BoardKind, marker_dictionary
 from lightpen_extensions.boards.start import BoardPoses
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 
 SAMPLES = (
     3  # for measurements, per pixel and axis; blurred before they are taken together

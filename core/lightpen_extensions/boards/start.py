@@ -18,7 +18,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.fisheye import N_COEFFICIENTS
-from lightpen_extensions.boards.views import Views
+from lightpen_extensions.boards.observing import Views
 
 USUAL_FOCAL_LENGTH = 1.5  # of the longer side of the image, where the views show none
 FISHEYE_FOCALS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0)  # of the longer side

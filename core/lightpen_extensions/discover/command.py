@@ -25,32 +25,36 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.errors import UsageError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import require_folder_of, write_whole
 from lightpen.formats.images import SUFFIXES
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera
 from lightpen.model.pen import DISC_DIAMETER, Pen, check_leds
 from lightpen_extensions.discover.discover import discover
-from lightpen_extensions.discover.picture import picture_of_pen
+from lightpen_extensions.discover.found import require_lens
 from lightpen_extensions.discover.report import (
     discovery_record,
     discovery_text,
+    picture_of_pen,
     swings_record,
     swings_text,
 )
-from lightpen_extensions.discover.request import Request, SecondSightings, TouchedLength
-from lightpen_extensions.discover.requirements import require_lens
-from lightpen_extensions.discover.scale import MeasuredLength
-from lightpen_extensions.discover.sightings import (
+from lightpen_extensions.discover.scale import (
+    MeasuredLength,
+    Request,
+    SecondSightings,
+    TouchedLength,
+)
+from lightpen_extensions.discover.together import discover_together
+from lightpen_extensions.discover.tracks import (
     Report,
     Sightings,
     find_spots,
     sightings_of_centers,
 )
-from lightpen_extensions.discover.together import discover_together
 from lightpen_extensions.measure.commands.touched import touches_at
 
 LONGEST = "longest"

@@ -23,22 +23,15 @@ from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.artefacts import Artefact, ArtefactKind
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.ellipse import centers_from_centroids
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.boards.distortion import Choice
-from lightpen_extensions.discover.found import Discovery, discovery_of
-from lightpen_extensions.discover.hypotheses import (
-    Hypothesis,
-    require_one_focal_length,
-    solve_seed,
-)
-from lightpen_extensions.discover.labelling import Labelled, label, pixels_of
-from lightpen_extensions.discover.numbering import number_by_sketch
-from lightpen_extensions.discover.request import Request
-from lightpen_extensions.discover.requirements import (
+from lightpen_extensions.discover.found import (
     SECOND_PEN,
+    Discovery,
     contradicting_distance,
+    discovery_of,
     require_certain,
     require_distance,
     require_enough,
@@ -47,10 +40,18 @@ from lightpen_extensions.discover.requirements import (
     require_one_camera,
     require_sketched,
 )
+from lightpen_extensions.discover.hypotheses import (
+    Hypothesis,
+    number_by_sketch,
+    require_one_focal_length,
+    solve_seed,
+)
+from lightpen_extensions.discover.labelling import Labelled, label, pixels_of
 from lightpen_extensions.discover.scale import (
     CONTRADICTING,
     SHAPE,
     MeasuredLength,
+    Request,
     known_lengths,
     with_lengths_known,
 )
@@ -60,15 +61,16 @@ from lightpen_extensions.discover.scaled_start import (
     numbered,
     scaled_start,
 )
-from lightpen_extensions.discover.sightings import Report, Sightings
 from lightpen_extensions.discover.starts import any_covariance, scaled_to
 from lightpen_extensions.discover.tracks import (
     Pieces,
+    Report,
+    Sightings,
     find_lamps,
     follow,
     without_lamps,
 )
-from lightpen_extensions.measure.tasks.artefact import measure_artefacts
+from lightpen_extensions.measure.tasks.registry import measure_artefacts
 from lightpen_extensions.measure.tasks.task import Conditions
 
 NOT_SETTLED = (

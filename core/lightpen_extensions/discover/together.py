@@ -16,15 +16,18 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.model.camera import Camera
-from lightpen.model.information import inverse, known_by, symmetric_root
+from lightpen.model.coverage import inverse, known_by, symmetric_root
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.request import Request
-from lightpen_extensions.discover.scale import MeasuredLength, with_led_covariance
-from lightpen_extensions.discover.sightings import Report, Sightings
+from lightpen_extensions.discover.scale import (
+    MeasuredLength,
+    Request,
+    with_led_covariance,
+)
 from lightpen_extensions.discover.starts import any_camera, gradient_of
+from lightpen_extensions.discover.tracks import Report, Sightings
 
 CONTRADICTING = 4.0  # standard deviations of a held-out swing
 OF_OTHER_PEN = ("discover.sketch-count", "discover.other-sketch")

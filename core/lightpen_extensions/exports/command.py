@@ -4,16 +4,15 @@ import argparse
 from dataclasses import fields, replace
 from pathlib import Path
 
-from lightpen.archive.logbook.result_entry import with_entry
+from lightpen.archive.logbook import with_entry
 from lightpen.commands.console import are_same, printing, shown
 from lightpen.errors import UsageError
 from lightpen.formats.files import write_whole
 from lightpen.formats.machine_settings import machine_settings
 from lightpen.local_time import local_now
 from lightpen.messages import printable
-from lightpen.model.laboratory import PLACES, Laboratory, is_country
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.calibrations.export_status import with_status
+from lightpen.model.names import PLACES, Laboratory, is_country
+from lightpen.record.calibrations import read_calibration, with_status
 from lightpen_extensions.exports.formats import FORMATS
 
 LABORATORY = {

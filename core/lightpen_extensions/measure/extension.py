@@ -6,7 +6,7 @@ from lightpen.extension import Extension, Subcommand
 
 
 def _add_verify(parser: ArgumentParser) -> None:
-    from lightpen_extensions.measure.commands.verify import add_verify
+    from lightpen_extensions.measure.commands.measure import add_verify
 
     add_verify(parser)
 

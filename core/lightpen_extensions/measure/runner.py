@@ -12,14 +12,11 @@ from pathlib import Path
 
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.local_time import local_now
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.runners.serial_queue import SerialQueue
-from lightpen_extensions.measure.session.status import (
-    VerificationListener,
-    VerificationStatus,
-)
+from lightpen.runners import SerialQueue
+from lightpen_extensions.measure.session import VerificationListener, VerificationStatus
 from lightpen_extensions.measure.workflow import VerificationWorkflow
 
 

@@ -18,42 +18,38 @@ from msgspec.structs import replace as with_entries
 
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.errors import FileError, LightpenError
 from lightpen.messages import Message, message
-from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.folder.verifications import TOUCHES
+from lightpen.record.folder import TOUCHES, TrialOutcome
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.swings.header import Header
 from lightpen.record.swings.writing import make_record_folder
-from lightpen.runners.faults import FaultReporter
-from lightpen.runners.serial_queue import BackgroundTask, Report, StartThread
+from lightpen.runners import BackgroundTask, FaultReporter, Report, StartThread
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.record_header import record_header
+from lightpen.swing.swing_recorder import record_header
 from lightpen_extensions.measure.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
 )
 from lightpen_extensions.measure.probing.drift_reference import LampObservations
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.session import (
+    ReadingState,
+    SessionEventKind,
     SessionState,
     SessionTransition,
+    VerificationListener,
+    VerificationStatus,
     end_task,
+    ending,
+    event_kinds,
     setup_of,
     with_pen_at_rest,
     without_last_touch,
 )
-from lightpen_extensions.measure.session.status import (
-    ReadingState,
-    SessionEventKind,
-    VerificationListener,
-    VerificationStatus,
-    ending,
-    event_kinds,
-)
-from lightpen_extensions.measure.storage.live_points import LivePoints
 from lightpen_extensions.measure.storage.resuming import (
+    LivePoints,
     ResumedVerification,
     resume_verification,
 )

@@ -5,19 +5,22 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import Database, open_file
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import Database, open_file
 from lightpen.commands.arguments import data_of
 from lightpen.commands.console import printing, shown
 from lightpen.errors import UsageError
 from lightpen.messages import Message
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen_extensions.plant.address import SERVER, server_address
-from lightpen_extensions.plant.comparison import check_server
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.fetching import fetch
-from lightpen_extensions.plant.server import open_server
-from lightpen_extensions.plant.server_setup import server_sql
+from lightpen_extensions.plant.server import (
+    SERVER,
+    check_server,
+    deliver,
+    fetch,
+    open_server,
+    server_address,
+    server_sql,
+)
 
 
 def checked_copy(database: Database) -> tuple[tuple[Message, ...], str]:

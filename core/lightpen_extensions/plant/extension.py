@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 from lightpen.extension import Extension, SubParsers
 
 if TYPE_CHECKING:
-    from lightpen.archive.store.database import Database
+    from lightpen.archive.store import Database
     from lightpen.messages import Message
-    from lightpen_extensions.plant.replication import Replicator
+    from lightpen_extensions.plant.server import Replicator
 
 
 def _check_copy(database: "Database") -> "tuple[tuple[Message, ...], str]":
@@ -64,12 +64,12 @@ def _add_archive_actions(actions: SubParsers, check: ArgumentParser) -> None:
 
 def replicate(database: "Database", chain: str) -> "Replicator | None":
     """Deliver a chain to the server of the plant, if one is named."""
-    from lightpen_extensions.plant.address import server_address
+    from lightpen_extensions.plant.server import server_address
 
     address = server_address()
     if not address:
         return None
-    from lightpen_extensions.plant.replication import Replicator
+    from lightpen_extensions.plant.server import Replicator
 
     return Replicator(database, chain, address)
 

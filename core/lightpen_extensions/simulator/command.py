@@ -123,10 +123,15 @@ def _n_images(text: str) -> int:
 @printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
-    from lightpen_extensions.simulator.samples import SAMPLE_PENS, row_of_cameras
     from lightpen_extensions.simulator.scene_files import write_rig_scene, write_scene
-    from lightpen_extensions.simulator.scenes import LEDS, SCENES, Scene
-    from lightpen_extensions.simulator.sensor import Sensor
+    from lightpen_extensions.simulator.scenes import (
+        LEDS,
+        SAMPLE_PENS,
+        SCENES,
+        Scene,
+        Sensor,
+        row_of_cameras,
+    )
     from lightpen_extensions.simulator.swings import paper_camera
 
     looks = LEDS[options.leds]

@@ -12,17 +12,10 @@ from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.clutter import (
-    random_finger,
-    random_glares,
-    random_lamps,
-)
+from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
 from lightpen_extensions.simulator.faces import Dome, Face, HotSpot, Ring
 from lightpen_extensions.simulator.render import render_view
-from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.sensor import expose
+from lightpen_extensions.simulator.scenes import Scene, expose
 from lightpen_extensions.simulator.swings import (
     Swing,
     leds_in_camera,
@@ -32,7 +25,15 @@ from lightpen_extensions.simulator.swings import (
     slip_tip,
     swing_poses,
 )
-from lightpen_extensions.simulator.view import Lamp, Optics, View, moving_poses
+from lightpen_extensions.simulator.view import (
+    Lamp,
+    Optics,
+    View,
+    moving_poses,
+    random_finger,
+    random_glares,
+    random_lamps,
+)
 
 LED_DECIMALS = 5  # of a measuring machine's millimetres
 MIN_GAIN = 0.93  # of the dimmest LED against the brightest

@@ -12,14 +12,14 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.contours import (
+from lightpen_extensions.simulator.faces import (
     LightArray,
     Patch,
     blurred_insides,
     disc_contours,
     ellipse_contour,
+    face_patches,
 )
-from lightpen_extensions.simulator.faces import face_patches
 from lightpen_extensions.simulator.swings import faces_camera, leds_in_camera
 from lightpen_extensions.simulator.view import (
     BOARD_OFFSET,

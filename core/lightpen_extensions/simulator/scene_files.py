@@ -11,17 +11,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.files import why_unwritten, write_whole
+from lightpen.formats.files import mark_simulated, why_unwritten, write_whole
 from lightpen.formats.pen_files import write_pen
-from lightpen.formats.rig_files import write_rig
-from lightpen.formats.simulated_files import mark_simulated
+from lightpen.formats.rig_files import write_camera, write_rig
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
-from lightpen.model.rig import Rig, from_first
-from lightpen.model.rigid import fit_rigid, vector_from_rotation
-from lightpen_extensions.simulator.contours import disc_contours, measure_insides
+from lightpen.model.rigid import Rig, fit_rigid, from_first, vector_from_rotation
+from lightpen_extensions.simulator.faces import disc_contours, measure_insides
 from lightpen_extensions.simulator.image_plans import (
     ImagePlan,
     ScenePlan,
@@ -30,8 +27,7 @@ from lightpen_extensions.simulator.image_plans import (
     render_plan,
 )
 from lightpen_extensions.simulator.render import hidden_fraction, led_levels
-from lightpen_extensions.simulator.samples import beside
-from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.scenes import Scene, beside
 from lightpen_extensions.simulator.swings import edge_gaps, leds_in_camera
 
 Json: TypeAlias = dict[str, Any]

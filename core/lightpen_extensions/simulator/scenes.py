@@ -1,20 +1,193 @@
-"""Scenes: content and disturbances of a simulated set of images."""
+"""Scenes, and the sensor that takes their images."""
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
+from statistics import NormalDist
 from typing import Literal, TypeAlias
 
-from lightpen.arrays import FloatArray
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.postures import SwingKind
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen.model.rigid import Rig, rotation_from_vector
+from lightpen_extensions.simulator.faces import LightArray
+from lightpen_extensions.simulator.render import Light
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
+    SwingKind,
+    flat_pen,
     paper_camera,
     paper_pen,
 )
 from lightpen_extensions.simulator.view import Optics
+
+# The image sensor: shot noise, read noise, quantisation.
+#
+# A pixel that collects the mean charge q reads
+#
+#     DN = round(clip((Poisson(q) + N(0, read noise) + offset) / e_per_dn)).
+#
+# Shot noise is drawn as a Gaussian of variance q: read noise of some electrons hides
+# the difference at small q, the central limit at large q. Most of an image is dark: its
+# pixels are independent draws from one discrete distribution, so only those that do not
+# read the most likely number are drawn, at exponential gaps.
+
+
+MOSTLY = 0.9  # share of the most likely reading above which the rest is drawn alone
+TABLE_SIZE = 2**16  # equally likely values: one for each 16-bit random number
+STRIP = 64  # rows
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """An image sensor."""
+
+    bits: Literal[8, 12, 16] = 8  # 8, or 12 or 16 in a 16-bit image
+    full_well: float = 10_000.0  # charge that reads full scale, electrons
+    read_noise: float = 7.0  # standard deviation, electrons
+    offset: float = 0.1 * 10_000 / 255  # added to the charge, electrons
+
+    def __post_init__(self) -> None:
+        if self.bits not in {8, 12, 16}:
+            raise ValueError(f"`bits` must be 8, 12 or 16, got {self.bits}.")
+
+    @property
+    def full_scale(self) -> int:
+        """Largest number a pixel reads."""
+        return int(2**self.bits - 1)
+
+    @property
+    def electrons_per_dn(self) -> float:
+        """Charge of one step of the reading."""
+        return self.full_well / self.full_scale
+
+
+def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
+    """Return the image (H, W) that a sensor reads, uint8 for 8 bits, else uint16."""
+    if light.gradient != (0.0, 0.0):
+        return _read_uneven(light, sensor, rng)
+    image = _dark_image(light.background, sensor, light.levels.size, rng)
+    image = image.reshape(light.levels.shape)
+    for window in light.windows:
+        levels = light.levels[window.slices] + np.float32(light.background)
+        # Where windows overlap the last reading stands, which is as good as the first.
+        image[window.slices] = _read(levels, sensor, rng)
+    return image
+
+
+def quantize(light: Light, sensor: Sensor) -> Image:
+    """Return the image without noise, as `expose`."""
+    charges = (light.levels + _background(light)) * np.float32(sensor.full_well)
+    return _digits(charges, sensor)
+
+
+def _background(light: Light) -> LightArray:
+    height, width = light.levels.shape
+    across, down = light.gradient
+    ramp = across * (np.arange(width) / width - 0.5)
+    slope = down * (np.arange(height) / height - 0.5)
+    background = light.background + ramp + slope[:, None]
+    return np.asarray(np.maximum(background, 0), dtype=np.float32)
+
+
+def _read_uneven(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
+    """Read all pixels one by one, in strips that fit the processor's cache."""
+    image = _blank(light.levels.shape, sensor)
+    levels = light.levels + _background(light)
+    for top in range(0, len(image), STRIP):
+        rows = slice(top, top + STRIP)
+        image[rows] = _read(levels[rows], sensor, rng)
+    return image
+
+
+def _read(levels: LightArray, sensor: Sensor, rng: np.random.Generator) -> Image:
+    charges = levels * np.float32(sensor.full_well)
+    noise = np.maximum(charges, 0)
+    noise += np.float32(sensor.read_noise**2)
+    np.sqrt(noise, out=noise)
+    noise *= _normal_table()[
+        rng.integers(TABLE_SIZE, size=noise.shape, dtype=np.uint16)
+    ]
+    charges += noise
+    return _digits(charges, sensor)
+
+
+def _digits(charges: LightArray, sensor: Sensor) -> Image:
+    readings = charges + np.float32(sensor.offset)
+    readings *= np.float32(1 / sensor.electrons_per_dn)
+    np.rint(readings, out=readings)
+    np.clip(readings, 0, sensor.full_scale, out=readings)
+    if sensor.bits == 8:
+        return readings.astype(np.uint8)
+    return readings.astype(np.uint16)
+
+
+def _blank(shape: tuple[int, ...], sensor: Sensor) -> Image:
+    if sensor.bits == 8:
+        return np.zeros(shape, dtype=np.uint8)
+    return np.zeros(shape, dtype=np.uint16)
+
+
+@lru_cache(maxsize=1)
+def _normal_table() -> LightArray:
+    """Return equally likely values of a standard normal variable."""
+    chances = (np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE
+    values = np.array([NormalDist().inv_cdf(chance) for chance in chances.tolist()])
+    return np.asarray(values / values.std(), dtype=np.float32)
+
+
+def _dark_image(
+    background: float, sensor: Sensor, n_pixels: int, rng: np.random.Generator
+) -> Image:
+    """Return ``n_pixels`` independent readings of an even background."""
+    values, probabilities = _dark_distribution(background, sensor)
+    likely = int(np.argmax(probabilities))
+    others = 1 - probabilities[likely]
+    if probabilities[likely] < MOSTLY:
+        edges = np.rint(np.cumsum(probabilities) * TABLE_SIZE).astype(np.int64)
+        table = _blank((TABLE_SIZE,), sensor)
+        table[:] = np.repeat(values, np.diff(edges, prepend=0))
+        return table[rng.integers(TABLE_SIZE, size=n_pixels, dtype=np.uint16)]
+    image = _blank((n_pixels,), sensor)
+    if values[likely] > 0:
+        image[:] = values[likely]
+    if others <= 0:
+        return image
+    places = _bernoulli_places(n_pixels, others, rng)
+    probabilities = probabilities.copy()
+    probabilities[likely] = 0
+    cumulated = np.cumsum(probabilities / others)
+    rank = np.searchsorted(cumulated, rng.random(len(places)))
+    image[places] = values[np.minimum(rank, len(values) - 1)]
+    return image
+
+
+def _bernoulli_places(n: int, probability: float, rng: np.random.Generator) -> IntArray:
+    """Return the places of the successes in ``n`` independent trials."""
+    spread = np.sqrt(n * probability)
+    n_gaps = int(n * probability + 8 * spread + 8)
+    places = np.cumsum(rng.geometric(probability, size=n_gaps)) - 1
+    return places[: np.searchsorted(places, n)]
+
+
+@lru_cache(maxsize=32)
+def _dark_distribution(
+    background: float, sensor: Sensor
+) -> tuple[IntArray, FloatArray]:
+    """Return the readings that occur and their probabilities."""
+    charge = background * sensor.full_well
+    mean = (charge + sensor.offset) / sensor.electrons_per_dn
+    sigma = np.sqrt(charge + sensor.read_noise**2) / sensor.electrons_per_dn
+    low = max(int(np.floor(mean - 7 * sigma)), 0)
+    high = min(int(np.ceil(mean + 7 * sigma)), sensor.full_scale)
+    values = np.arange(low, max(high, low) + 1)
+    reading = NormalDist(mean, max(sigma, 1e-12))
+    upper = np.array([reading.cdf(value + 0.5) for value in values.tolist()])
+    upper[-1] = 1
+    return values, np.diff(upper, prepend=0.0)
 
 
 @dataclass(frozen=True)
@@ -103,3 +276,98 @@ class Scene:
     has_lamp: bool = False  # whether a lamp beside the cone is in view
     camera_turn: float = 0.0  # px, by which images shift in all, or live in a minute
     viewpoint: int = 0  # index of the camera in the rig, from 0; it selects the noise
+
+
+FAN_ANGLE = np.radians(20)  # of a fanned column's discs from +z
+NEARLY = 2.0  # mm by which the near-symmetric pen misses its mirror image
+NAMES = ("left", "right", "third", "fourth")
+LENS_SPREAD = 0.004  # of the focal length, from one lens of a kind to the next
+CENTRE_SPREAD = np.array([7.0, -5.0])  # px
+ROTATION_SIGMA = 1e-4  # rad, of a rig that was calibrated with a board
+TRANSLATION_SIGMA = 0.1  # mm
+BASELINE = 500.0  # mm, of a camera and the one beside it
+
+
+def six_led_pen() -> Pen:
+    """Return a pen with four LEDs in front of two."""
+    front = [(-25, 20, 0), (25, 45, 0), (-25, 115, 0), (25, 160, 0)]
+    back = [(0, 75, -30), (0, 180, -30)]
+    return flat_pen("six", front + back)
+
+
+def eight_led_pen() -> Pen:
+    """Return a pen with LEDs at three depths."""
+    front = [(-28, 10, 0), (24, 40, 0), (-22, 95, 0), (30, 130, 0), (-26, 175, 0)]
+    middle = [(3, 70, -15), (0, 150, -18)]
+    back = [(0, 0, -35)]
+    return flat_pen("eight", front + middle + back)
+
+
+def near_symmetric_pen() -> Pen:
+    """Return a ten-LED pen that its mirror image fits to `NEARLY`."""
+    back = [(0.0, y, -30.0) for y in (0.0, 60.0, 120.0, 180.0)]
+    left = [(-25.0, y, 0.0) for y in (25.0, 90.0, 155.0)]
+    right = [(25.0, y + NEARLY, 0.0) for _, y, _ in left]
+    return flat_pen("near-symmetric", back + left + right)
+
+
+def fanned_pen() -> Pen:
+    """Return the paper's pen with the discs of its two columns turned outwards."""
+    pen = paper_pen()
+    turns = FAN_ANGLE * np.sign(pen.leds[:, 0])
+    zero = np.zeros_like(turns)
+    rotations = rotation_from_vector(np.stack([zero, turns, zero], axis=-1))
+    return replace(pen, normals=rotations[:, :, 2], name="fanned")
+
+
+SAMPLE_PENS: dict[str, Callable[[], Pen]] = {
+    "paper": paper_pen,
+    "six": six_led_pen,
+    "eight": eight_led_pen,
+    "near-symmetric": near_symmetric_pen,
+    "fanned": fanned_pen,
+}
+
+
+def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
+    """Return 2 to 4 cameras in a row about the paper's camera position.
+
+    The baseline is from the first to the last, mm.
+    """
+    u, _, w = PAPER_CONE
+    places = np.linspace(-baseline / 2, baseline / 2, n_cameras)
+    turns = np.zeros((n_cameras, 3))
+    turns[:, 1] = np.arctan2(u, w) - np.arctan2(u - places, w)
+    rotations = rotation_from_vector(turns)
+    sigmas = np.tile(np.repeat([ROTATION_SIGMA, TRANSLATION_SIGMA], 3), n_cameras - 1)
+    return Rig(
+        cameras=tuple(_camera(number, binning) for number in range(n_cameras)),
+        rotations=rotations,
+        translations=-rotations[:, :, 0] * places[:, None],
+        covariance=np.diag(sigmas**2),
+        names=NAMES[:n_cameras],
+    )
+
+
+def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
+    """Return the rig of a camera and one to its right that sees the cone alike."""
+    u, _, w = cone_cam
+    turn = np.array([0.0, np.arctan2(u, w) - np.arctan2(u - BASELINE, w), 0.0])
+    R = rotation_from_vector(turn)
+    return Rig(
+        cameras=(camera, replace(camera, fx=camera.fx * (1 + LENS_SPREAD))),
+        rotations=np.stack([np.eye(3), R]),
+        translations=np.stack([np.zeros(3), -BASELINE * R[:, 0]]),
+        covariance=np.diag(np.repeat([ROTATION_SIGMA, TRANSLATION_SIGMA], 3) ** 2),
+        names=NAMES[:2],
+    )
+
+
+def _camera(number: int, binning: int) -> Camera:
+    """Return the paper's camera with another lens."""
+    camera = paper_camera(binning)
+    longer = 1 + LENS_SPREAD * number
+    cx, cy = np.array([camera.cx, camera.cy]) + CENTRE_SPREAD * number / binning
+    return replace(
+        camera, fx=longer * camera.fx, fy=longer * camera.fy, cx=float(cx), cy=float(cy)
+    )

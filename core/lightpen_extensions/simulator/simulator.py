@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from lightpen.cameras.clock import Clock
+from lightpen.cameras.pairing import Clock
 from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
 from lightpen.formats.rig_files import read_rig
 from lightpen.model.pen import Pen
 from lightpen_extensions.simulator.camera import SERIAL, SimulatedCamera
-from lightpen_extensions.simulator.samples import beside
 from lightpen_extensions.simulator.scene_files import write_sample_files
-from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.scenes import Scene, beside
 
 SECOND_SERIAL = "SIM-2"
 

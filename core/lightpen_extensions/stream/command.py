@@ -7,18 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 
-from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     EndOfImages,
+    Failed,
+    FaultRaised,
     FrameTimeout,
     ImageCamera,
+    WorkerEvent,
 )
 from lightpen.cameras.replay import RECORDED, USUAL_FRAME_RATE, ReplayCamera
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, source_named
 from lightpen.cameras.worker import CameraWorker
-from lightpen.cameras.worker_events import Failed, FaultRaised, WorkerEvent
 from lightpen.commands.arguments import (
     above_zero,
     add_camera,
@@ -27,21 +29,19 @@ from lightpen.commands.arguments import (
 )
 from lightpen.commands.console import lacking, printing, shown
 from lightpen.detection.pen_detection import PenDetection, detect_pen
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.errors import LightpenError, UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.calibrations.export_status import with_status
-from lightpen.record.calibrations.tip_bending import bending_of
-from lightpen.record.swings.names import Names
-from lightpen.record.swings.recordings import FilesBeside, files_beside
-from lightpen_extensions.measure.probing.image_locations import (
+from lightpen.record.calibrations import bending_of, read_calibration, with_status
+from lightpen.record.swings.header import Names
+from lightpen.record.swings.solving import FilesBeside, files_beside
+from lightpen_extensions.measure.probing.sources import (
+    instrument_of,
     touch_place,
     viewers_of_camera,
 )
-from lightpen_extensions.measure.probing.sources import instrument_of
 from lightpen_extensions.stream.messages import StreamedTip, tip_metadata
 from lightpen_extensions.stream.server import (
     LOOPBACK,

@@ -17,9 +17,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.record.calibrations.calibrations import CalibrationFile
-from lightpen.record.calibrations.export_status import status_of
-from lightpen.record.swings.names import Names
+from lightpen.record.calibrations import CalibrationFile, status_of
+from lightpen.record.swings.header import Names
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbingFrame,
     StillFrames,

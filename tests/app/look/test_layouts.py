@@ -30,7 +30,7 @@ from lightpen_app.look.layouts import (
     horizontal_layout,
     vertical_layout,
 )
-from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.controls import LazyWidget
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard

@@ -5,10 +5,8 @@ from string import Formatter
 
 import pytest
 
-from lightpen.messages import CATALOGUE, Message, message
-from lightpen.model.posture import Posture
-from lightpen.swing.capture.state import Pause, Phase
-from lightpen.swing_messages import (
+from lightpen.messages import (
+    CATALOGUE,
     FOLLOW_ARROW,
     HOLD_STILL,
     LEAN_TO_YOUR_RIGHT,
@@ -21,8 +19,12 @@ from lightpen.swing_messages import (
     SWING_TO_SEAT,
     TOO_FAST,
     Code,
+    Message,
+    message,
     too_little_tilt,
 )
+from lightpen.model.rigid import Posture
+from lightpen.swing.capture.state import Pause, Phase
 from lightpen_app.look.phrases import lean_phrase, phase_text, phrase
 from lightpen_app.look.words import phrases_whole
 

@@ -32,7 +32,7 @@ from lightpen_app.look.theme import (
     text_label,
 )
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_program.self_test.desk import CLASSES_WITH_FONTS
+from lightpen_program.self_test import CLASSES_WITH_FONTS
 from lightpen_resources import RESOURCES
 
 PALETTES = pytest.mark.parametrize("colors", [DARK, LIGHT], ids=["dark", "light"])

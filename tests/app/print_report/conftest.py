@@ -15,24 +15,21 @@ from PySide6.QtSvg import QSvgGenerator
 
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import write_whole
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.messages import message
-from lightpen.model.laboratory import Laboratory
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.calibrations.reestimated_poses import reestimate_poses
-from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.formats.own_json import StoredMessage
+from lightpen.messages import Code, message
+from lightpen.model.names import Laboratory, Origin
+from lightpen.record.calibrations import TracedItem, read_calibration
 from lightpen.record.library.entered_files import EntryPlace
+from lightpen.record.recomputing import reestimate_poses
 from lightpen.record.results.results import Result, result_bytes
-from lightpen.record.swings.names import Names
-from lightpen.swing_messages import Code
+from lightpen.record.swings.header import Names
 from lightpen_app.print_report.pages import (
     PAGE_HEIGHT,
     PAGE_WIDTH,
     PrintReport,
     paint_page,
+    print_report_of,
 )
-from lightpen_app.print_report.printing import print_report_of
 
 SVG = "{http://www.w3.org/2000/svg}text"
 

@@ -12,10 +12,9 @@ from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
 from lightpen.record.results.results import Result
-from lightpen_app.print_report.pages import PrintReport
-from lightpen_app.print_report.preview import PrintReportWindow
-from lightpen_app.print_report.printing import paint_on
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.print_report.control import PrintReportWindow
+from lightpen_app.print_report.pages import PrintReport, paint_on
+from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.workbench import Workbench
 
 

@@ -13,19 +13,15 @@ from benchmarks.small_records import record_of
 from msgspec import structs
 from PySide6.QtWidgets import QApplication
 
-from lightpen.formats.stored_messages import StoredMessage
+from lightpen.formats.own_json import StoredMessage
 from lightpen.messages import message
-from lightpen.model.laboratory import Laboratory
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.export_status import OVERDUE, RETIRED
-from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.model.names import Laboratory, Origin
+from lightpen.record.calibrations import OVERDUE, RETIRED, TracedItem
 from lightpen.record.library.entered_files import EntryPlace
 from lightpen.record.library.tip_library import ItemKind, ListedPen
 from lightpen.record.results.results import Result, TipChange, result_bytes
-from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sentences import worded
-from lightpen_app.print_report.pages import PrintReport
-from lightpen_app.print_report.printing import pdf_of
+from lightpen_app.look.languages import LanguageSwitch, worded
+from lightpen_app.print_report.pages import PrintReport, pdf_of
 
 HASHES = re.compile(r"(?<![A-Za-z0-9])[0-9a-f]+(?![A-Za-z0-9])")  # and parts of them
 

@@ -8,9 +8,8 @@ from threading import Event
 
 import pytest
 
-from lightpen_program.self_test.report import Report, SelfTestError
-from lightpen_program.self_test.run import FILE_LIST, damaged_files
-from lightpen_program.self_test.run import test_program as run_self_test
+from lightpen_program.self_test import FILE_LIST, Report, SelfTestError, damaged_files
+from lightpen_program.self_test import test_program as run_self_test
 
 
 @pytest.fixture
@@ -102,8 +101,8 @@ def test_a_test_that_hangs_reports_what_it_does_and_where(
         report.doing = lambda: "_accept on the page review"
         assert given_up.wait(60)
 
-    monkeypatch.setattr("lightpen_program.self_test.run.LONGEST", 0.01)
-    monkeypatch.setattr("lightpen_program.self_test.run._test_all", hang)
+    monkeypatch.setattr("lightpen_program.self_test.LONGEST", 0.01)
+    monkeypatch.setattr("lightpen_program.self_test._test_all", hang)
     monkeypatch.setattr("os._exit", lambda status: given_up.set())
     file = tmp_path / "report.json"
 

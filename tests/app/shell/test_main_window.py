@@ -20,22 +20,19 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen.model.origin import Origin
-from lightpen.record.swings.names import Names
+from lightpen.model.names import Origin
+from lightpen.record.swings.header import Names
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Appearance
-from lightpen_app.shell.action_bar import ActionBar
-from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.main_window import MainWindow
-from lightpen_app.shell.page_area import NoticeBar
-from lightpen_app.shell.sidebar import Subject
-from lightpen_app.shell.step_list import StepButton, StepState
-from lightpen_app.widgets.fitted_text import FittedText
-from lightpen_app.widgets.fitted_window import FittedWindow, fitted_place
+from lightpen_app.shell.menus import HelpWindow
+from lightpen_app.shell.page_area import ActionBar, NoticeBar
+from lightpen_app.shell.sidebar import StepButton, StepState, Subject
+from lightpen_app.widgets.bars import Question, QuestionBar
+from lightpen_app.widgets.fitting import FittedText, FittedWindow, fitted_place
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction, Page, step_titles
-from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.work.notifications import Notifications
+from lightpen_app.work.job import Notifications
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_resources import SOURCE_LANGUAGE
 
@@ -224,7 +221,7 @@ def test_escape_neither_leaves_the_page_nor_closes_the_window(
 def test_a_key_pressed_twice_leads_on_by_one_step(
     shell: Shell, press: Callable[[Key], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 60_000)
+    monkeypatch.setattr("lightpen_app.shell.page_area.GUARD_MS", 60_000)
 
     for key in (Key.Key_Return, Key.Key_Return, Key.Key_PageDown):
         press(key)
@@ -236,7 +233,7 @@ def test_a_key_pressed_twice_leads_on_by_one_step(
 def test_a_key_meant_for_what_the_button_did_before_does_nothing(
     shell: Shell, press: Callable[[Key], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lightpen_app.shell.action_bar.GUARD_MS", 60_000)
+    monkeypatch.setattr("lightpen_app.shell.page_area.GUARD_MS", 60_000)
     shell.pages[0].name = "Another"
     shell.pages[0].changed.emit()
 

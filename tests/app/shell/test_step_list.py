@@ -1,6 +1,6 @@
 """What the list of steps says of each step."""
 
-from lightpen_app.shell.step_list import Status, Step, StepState, list_steps
+from lightpen_app.shell.sidebar import Status, Step, StepState, list_steps
 
 STATUSES = (
     Status("Start", complete=True, why_closed=""),

@@ -13,7 +13,7 @@ from lightpen_app.look.words import unbroken
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.page import Page
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_extensions.simulator.motion import TrackingMotion
+from lightpen_extensions.simulator.hand import TrackingMotion
 
 W = TypeVar("W", bound=QWidget)
 

@@ -9,8 +9,8 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QGroupBox, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.widgets.file_drops import FileDrops
-from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.controls import FileDrops
+from lightpen_app.widgets.fields import PathField
 
 COPY = Qt.DropAction.CopyAction
 LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier

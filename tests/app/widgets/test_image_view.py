@@ -9,10 +9,10 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import Image
-from lightpen_app.look.pooling import pooled
+from lightpen_app.look.figures import pooled
 from lightpen_app.look.theme import DARK, Tone
 from lightpen_app.widgets.image_view import MAX_ZOOM, ImageView, Marker
-from lightpen_app.work.live_images import Mailbox
+from lightpen_app.work.live_view import Mailbox
 
 WIDTH, HEIGHT = 2448, 2048
 

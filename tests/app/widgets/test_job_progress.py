@@ -2,9 +2,9 @@
 
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.look.time_left import TimeLeft
-from lightpen_app.widgets.job_progress import JobProgress
-from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.look.words import TimeLeft
+from lightpen_app.widgets.bars import JobProgress
+from lightpen_app.widgets.controls import PushButton
 
 
 def test_a_job_tells_its_percentage_and_is_hidden_once_it_has_ended(

@@ -3,7 +3,7 @@
 from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.controls import LazyWidget
 
 
 def test_nothing_is_made_before_it_is_seen(qtbot: QtBot) -> None:

@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.fields import PathField
 
 
 class Form:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from lightpen.model.posture import Posture
+from lightpen.model.rigid import Posture
 from lightpen_app.widgets.pen_in_space import (
     DisplayedPosture,
     PenInSpace,

@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.widgets.pen_view import PenPicture, PenView
-from lightpen_extensions.simulator.samples import fanned_pen
+from lightpen_extensions.simulator.scenes import fanned_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 LEFT = Qt.MouseButton.LeftButton

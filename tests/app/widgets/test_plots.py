@@ -13,23 +13,26 @@ from tests.app.pictures import colors_in
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen_app.look.arrows import arrow_scale
-from lightpen_app.look.budget_figure import budget_figure
+from lightpen_app.look.figures import arrow_scale, budget_figure
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
-from lightpen_app.steps.review.budget_plot import BudgetPlot
-from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
+from lightpen_app.steps.review.plots_panel import BudgetPlot
 from lightpen_app.steps.review.residual_plots import (
     ArrowPlot,
     DotPlot,
     Histogram,
     MisfitPlot,
 )
-from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
-from lightpen_app.steps.swing.plots_panel import SwingPlots
+from lightpen_app.steps.review.series_plots import (
+    BarPlot,
+    LinePlot,
+    PlotCard,
+    PlotGrid,
+    PosturePlot,
+)
+from lightpen_app.steps.swing.view import SwingPlots
 from lightpen_app.widgets.figure import Axes, Figure
-from lightpen_app.widgets.plot_canvas import Canvas
-from lightpen_app.widgets.plots import Curve, Plot, TracePlot
+from lightpen_app.widgets.plots import Canvas, Curve, Plot, TracePlot
 
 IMAGES = np.arange(1.0, 6.0)
 VALUES = np.array([0.06, 0.05, np.nan, 0.07, 0.06])

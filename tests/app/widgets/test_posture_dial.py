@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.model.coverage import measure_coverage
-from lightpen.model.posture import Posture, posture_of, rotations_of
+from lightpen.model.rigid import Posture, posture_of, rotations_of
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
 from lightpen_app.widgets import posture_dial
 from lightpen_app.widgets.posture_dial import (
@@ -22,7 +22,7 @@ from lightpen_app.widgets.posture_dial import (
     legend_box,
     place_of,
 )
-from lightpen_extensions.simulator.samples import eight_led_pen
+from lightpen_extensions.simulator.scenes import eight_led_pen
 
 SIDE = 600
 RIM = 0.435 * SIDE

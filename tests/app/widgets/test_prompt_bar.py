@@ -17,9 +17,8 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen_app.steps.leds.file_panel import LedFilePanel
-from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.reason_bar import ReasonBar
-from lightpen_app.widgets.supervisor_fields import SupervisorFields
+from lightpen_app.widgets.bars import QuestionBar, ReasonBar
+from lightpen_app.widgets.fields import SupervisorFields
 
 
 @pytest.mark.parametrize("kind", [QuestionBar, ReasonBar])

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout, SizeClass
+from lightpen_app.widgets.fitting import ResponsiveLayout, SizeClass
 
 
 class Arranged(ResponsiveLayout, QWidget):

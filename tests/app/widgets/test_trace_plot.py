@@ -10,8 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.theme import TextSize, font
 from lightpen_app.widgets.figure import Axes
-from lightpen_app.widgets.plot_canvas import Canvas
-from lightpen_app.widgets.plots import Curve, TracePlot
+from lightpen_app.widgets.plots import Canvas, Curve, TracePlot
 
 
 def shown(qtbot: QtBot, plot: TracePlot) -> TracePlot:

@@ -12,9 +12,9 @@ from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import DARK, TextSize, Tone
 from lightpen_app.look.words import BREAK, breakable, unbroken
 from lightpen_app.shell.page_area import NoticeBar
-from lightpen_app.steps.camera.exposure_bar import ExposureBar
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.steps.camera.exposure_panel import ExposureBar
+from lightpen_app.widgets.fields import ChoiceField
+from lightpen_app.widgets.fitting import FittedText
 from lightpen_app.widgets.operator_view import (
     DISTANCES_M,
     LEAST_SHARE,
@@ -23,8 +23,12 @@ from lightpen_app.widgets.operator_view import (
     other_screen,
 )
 from lightpen_app.widgets.posture_dial import DialValue
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.widgets.state_banner import (
+    SignLabel,
+    State,
+    StateBanner,
+    StatusMessage,
+)
 
 
 @pytest.mark.parametrize(

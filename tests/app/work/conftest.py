@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
-from lightpen_app.work.notifications import Notifications
+from lightpen_app.work.job import Notifications
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.simulator.scene_files import write_sample_files

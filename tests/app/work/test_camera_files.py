@@ -8,11 +8,10 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QThreadPool
 
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.opened_files import CameraFile
-from lightpen.formats.rig_files import read_rig, write_rig
-from lightpen.model.rig import Rig
-from lightpen.swing.image_sources import CameraInUse, SourceChoice
+from lightpen.formats.rig_files import read_rig, write_camera, write_rig
+from lightpen.model.rigid import Rig
+from lightpen.swing.preparation import CameraInUse, SourceChoice
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.swings import paper_camera
 

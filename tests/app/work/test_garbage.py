@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QObject
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.work.garbage import GarbageCollector
+from lightpen_app.work.job import GarbageCollector
 
 N_CYCLES = 50_000
 

@@ -13,17 +13,22 @@ from pytestqt.qtbot import QtBot
 from tests.faulty_camera import FaultyCamera, scene_of
 from typing_extensions import override
 
-from lightpen.cameras.protocol import CameraSettings, Frame, FramesSkipped
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    Connection,
+    FaultRaised,
+    Frame,
+    FramesSkipped,
+    ProcessingKeepsUp,
+)
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker_events import Connection, FaultRaised, ProcessingKeepsUp
 from lightpen.formats.decoding import encode_png
 from lightpen.live.sources import SourceEnvironment
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.resuming import read_resumable
-from lightpen_app.work.live_images import DisplayedImage
-from lightpen_app.work.live_view import LiveView
-from lightpen_app.work.notifications import Notifications
+from lightpen.swing.swing_recorder import read_resumable
+from lightpen_app.work.job import Notifications
+from lightpen_app.work.live_view import DisplayedImage, LiveView
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app_extensions.measure.verification_run import VerificationRun
 from lightpen_extensions.simulator.hand import Operator

@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, QThreadPool
 from lightpen.formats.opened_files import PenFile
 from lightpen.record.library.library_changes import Author, change_item
 from lightpen.record.library.tip_library import LedFile, ListedPen, read_library
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.work.workbench import Workbench
 
 ANN = Author("Hall 2", "Ann")

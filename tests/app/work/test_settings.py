@@ -13,13 +13,18 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.formats.machine_settings import machine_file
-from lightpen.model.laboratory import Laboratory
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.model.names import Laboratory
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.look.languages import system_language
 from lightpen_app.look.theme import Appearance
-from lightpen_app.work.settings import Preferences, Settings, settings_file
-from lightpen_app.work.stations import Station, StoredCamera
+from lightpen_app.work.settings import (
+    Preferences,
+    Settings,
+    Station,
+    StoredCamera,
+    settings_file,
+)
 from lightpen_resources import languages
 
 STATION = Station(
@@ -41,7 +46,7 @@ PREFERENCES = Preferences(
 HOLDER = """
 import sys, time
 from pathlib import Path
-from lightpen.formats.file_locks import folder_locked
+from lightpen.formats.part_files import folder_locked
 
 with folder_locked(Path(sys.argv[1]), 0.0) as is_alone:
     print("held" if is_alone else "taken", flush=True)

@@ -12,21 +12,23 @@ from PySide6.QtCore import QCoreApplication, QThreadPool
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import CameraSettings, Connection
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import PenFile
-from lightpen.model.assumptions import USUAL, with_focal_length
-from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
+from lightpen.model.limits import USUAL, SwingLimits, with_focal_length
+from lightpen.model.names import Origin
 from lightpen.record.results.result_folder import SIMULATED
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
-from lightpen.swing.preparation import MissingInput, Preparation
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import (
+    NO_SOURCE,
+    MissingInput,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.work.settings import Settings
-from lightpen_app.work.stations import FilePaths, StoredCamera
+from lightpen_app.work.settings import FilePaths, Settings, StoredCamera
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.stream.service import StreamService
 from lightpen_extensions.simulator.simulator import SceneSimulator

@@ -12,10 +12,10 @@ from threading import Thread
 import pytest
 from benchmarks.postgres_server import Postgres, postgres_programs
 
-from lightpen.archive.chains.entries import Event, Kind, StoredEntry, text_sha256
-from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.store.database import Database, open_file
-from lightpen.record.swings.names import Names
+from lightpen.archive.chains import Event, Kind, StoredEntry, text_sha256
+from lightpen.archive.growth import append, own_chain
+from lightpen.archive.store import Database, open_file
+from lightpen.record.swings.header import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 

@@ -11,23 +11,30 @@ from benchmarks.postgres_server import Postgres
 from msgspec import structs
 from tests.core.archive.test_logbook import checked, result
 
-from lightpen.archive.chains.chains import entries_of, records_of
-from lightpen.archive.chains.entries import ChainHead, Kind, StoredEntry, chained
-from lightpen.archive.chains.growth import copy_entries
-from lightpen.archive.history.history import messages_on
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.chains import (
+    ChainHead,
+    Kind,
+    StoredEntry,
+    chained,
+    entries_of,
+    records_of,
+)
+from lightpen.archive.growth import copy_entries
+from lightpen.archive.history import messages_on
+from lightpen.archive.logbook import Logbook
 from lightpen.errors import AcceptanceError, ArchiveError, FileError
 from lightpen.local_time import local_now
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.library.guard_files import LIMITS_FOLDER
-from lightpen.record.library.signing.keys import SigningKey, key_folder, station_key
+from lightpen.record.calibrations import read_calibration
+from lightpen.record.library.signing import SigningKey, key_folder, station_key
 from lightpen.record.library.supervision import (
+    LIMITS_FOLDER,
     Signature,
     Supervision,
     read_supervision,
+    renew_station_key,
     require_supervisor,
+    set_password,
 )
-from lightpen.record.library.supervision_changes import renew_station_key, set_password
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import result_bytes
 from lightpen_extensions.plant.server import open_server

@@ -10,16 +10,10 @@ from pathlib import Path
 from msgspec import structs
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import chain_head, chain_names, entries_of
-from lightpen.archive.chains.entries import FileHash, Kind
-from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.history.queries import (
-    EntryFilter,
-    last_accepted,
-    n_wanted,
-    newest,
-)
-from lightpen.archive.store.database import open_file
+from lightpen.archive.chains import FileHash, Kind, chain_head, chain_names, entries_of
+from lightpen.archive.growth import append, own_chain
+from lightpen.archive.history import EntryFilter, last_accepted, n_wanted, newest
+from lightpen.archive.store import open_file
 from lightpen.record.library.entered_files import NOTHING_BEFORE
 
 N_EACH = 20

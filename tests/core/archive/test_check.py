@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains.chains import chain_names, entries_of, records_of
-from lightpen.archive.checks.check import check_archive, check_file
-from lightpen.archive.store.database import look_into
+from lightpen.archive.chains import chain_names, entries_of, records_of
+from lightpen.archive.checks import check_archive, check_file
+from lightpen.archive.store import look_into
 from lightpen.errors import ArchiveError
 
 N_FLIPS = 60
@@ -119,7 +119,7 @@ def test_a_row_rewritten_with_a_right_hash_breaks_the_chain(
             "SELECT DISTINCT chain FROM archive_entries"
         ).fetchone()
         text = entries[2].text.replace(other.chain, chain)
-        from lightpen.archive.chains.entries import text_sha256
+        from lightpen.archive.chains import text_sha256
 
         connection.execute(
             "UPDATE archive_entries SET text = ?, sha256 = ?, station = 'Hall 3',"

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.checks import check_file
+from lightpen.archive.logbook import Logbook
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.signing.keys import KEYS
+from lightpen.record.library.signing import KEYS
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 
 

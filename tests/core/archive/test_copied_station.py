@@ -11,12 +11,12 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.logbook import Logbook
 from lightpen.errors import FileError
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.signing.keys import KEYS, key_folder
+from lightpen.record.library.signing import KEYS, key_folder
 from lightpen.record.library.tip_library import ListedCone, ListedTip
-from lightpen_extensions.plant.address import SERVER
+from lightpen_extensions.plant.server import SERVER
 
 Run = Callable[..., CompletedProcess[str]]
 BY = Author("Hall 2", "Ann")

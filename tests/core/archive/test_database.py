@@ -11,13 +11,8 @@ from time import sleep
 import pytest
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.store import database
-from lightpen.archive.store.database import (
-    VERSION_TABLE,
-    Database,
-    look_into,
-    open_file,
-)
+from lightpen.archive import store as database
+from lightpen.archive.store import VERSION_TABLE, Database, look_into, open_file
 from lightpen.errors import ArchiveError, NoArchiveError
 
 

@@ -14,16 +14,14 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import Station, accepted
 
-from lightpen.archive.chains.chains import chain_names, entries_of, records_of
-from lightpen.archive.chains.entries import FileHash
-from lightpen.archive.chains.growth import append, copy_entries, own_chain
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.history.entries_file import export_entries
-from lightpen.archive.store.database import Database, open_file
+from lightpen.archive.chains import FileHash, chain_names, entries_of, records_of
+from lightpen.archive.checks import check_file
+from lightpen.archive.growth import append, copy_entries, own_chain
+from lightpen.archive.history import export_entries
+from lightpen.archive.store import Database, open_file
 from lightpen.errors import ArchiveError, NameTakenError
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.server import open_server
+from lightpen_extensions.plant.server import deliver, open_server
 
 
 def test_an_export_has_every_entry_with_its_record(

@@ -11,21 +11,18 @@ from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import NOON, Station
 from tests.core.archive.test_logbook import result
 
-from lightpen.archive.chains.chains import entries_of
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import Database, open_file
+from lightpen.archive.chains import entries_of
+from lightpen.archive.checks import check_file
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import Database, open_file
 from lightpen.errors import ArchiveError
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.entered_files import ARCHIVE, add_numbered
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import save_limits
+from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.library.tip_library import ListedCone, read_library
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.fetching import FetchResult, fetch
-from lightpen_extensions.plant.server import open_server
+from lightpen_extensions.plant.server import FetchResult, deliver, fetch, open_server
 
 
 @pytest.fixture

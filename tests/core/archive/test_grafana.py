@@ -13,8 +13,7 @@ from benchmarks.plant_view import dashboard_queries
 from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import NOON, Station
 
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.server import open_server
+from lightpen_extensions.plant.server import deliver, open_server
 
 VALUES = {
     "pen": "LP-04",

@@ -10,14 +10,21 @@ from msgspec import structs
 from sqlalchemy import text
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.entries import Event, Kind, StoredEntry
-from lightpen.archive.chains.growth import append
-from lightpen.archive.history.due import due_tips
-from lightpen.archive.history.history import TipState, known_names, lines, messages_on
-from lightpen.archive.history.listing import COLUMNS, save_entries
-from lightpen.archive.history.queries import EntryFilter, n_wanted
+from lightpen.archive.chains import Event, Kind, StoredEntry
+from lightpen.archive.growth import append
+from lightpen.archive.history import (
+    COLUMNS,
+    EntryFilter,
+    TipState,
+    due_tips,
+    known_names,
+    lines,
+    messages_on,
+    n_wanted,
+    save_entries,
+)
 from lightpen.model.limits import DueRule
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 
 ALL = EntryFilter()
 IN_FORCE, REPLACED = TipState.IN_FORCE, TipState.REPLACED

@@ -9,19 +9,15 @@ import numpy as np
 import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
 
-from lightpen.archive.chains.chains import entries_of
-from lightpen.archive.chains.entries import Entry, Kind
-from lightpen.archive.chains.growth import append
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.history.due import due_tips
-from lightpen.archive.history.history import known_names
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.logbook.tip_status import folder_statuses, statuses
-from lightpen.archive.store.database import look_into
+from lightpen.archive.chains import Entry, Kind, entries_of
+from lightpen.archive.checks import check_archive
+from lightpen.archive.growth import append
+from lightpen.archive.history import due_tips, known_names
+from lightpen.archive.logbook import Logbook, folder_statuses, statuses
+from lightpen.archive.store import look_into
 from lightpen.formats.decoding import encode_png
 from lightpen.messages import Message
 from lightpen.model.limits import DueRule
-from lightpen.record.library.calibration_status import StationStatus, TipStatus
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import (
     Author,
@@ -35,6 +31,8 @@ from lightpen.record.library.tip_library import (
     Library,
     ListedCone,
     ListedTip,
+    StationStatus,
+    TipStatus,
     library_files,
 )
 

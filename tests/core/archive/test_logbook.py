@@ -13,20 +13,19 @@ from benchmarks.small_records import small_record
 from msgspec import structs
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.chains.chains import entries_of, records_of
-from lightpen.archive.chains.entries import Entry, Kind
-from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import look_into
+from lightpen.archive.chains import Entry, Kind, entries_of, records_of
+from lightpen.archive.checks import ArchiveCheckResult, check_archive
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import look_into
 from lightpen.errors import ArchiveError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.signing.account import OwedFile, owe, owed_files
+from lightpen.record.library.signing import OwedFile, owe, owed_files
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
 from lightpen.record.results.results import Result
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import discard_damaged, discard_swing
-from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import open_record
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)

@@ -8,12 +8,11 @@ import pytest
 from sqlalchemy import text
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains.chains import entries_of
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.history.entries_file import export_entries
+from lightpen.archive.chains import entries_of
+from lightpen.archive.checks import check_archive
+from lightpen.archive.history import export_entries
 from lightpen.errors import ArchiveError
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.fetching import fetch
+from lightpen_extensions.plant.server import deliver, fetch
 
 MOVE = text(
     "UPDATE archive_entries SET number = number + 1"

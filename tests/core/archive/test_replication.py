@@ -9,13 +9,11 @@ import pytest
 from benchmarks.postgres_server import Postgres
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains.chains import entries_of
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.history.queries import EntryFilter, last_accepted, newest
-from lightpen_extensions.plant import replication
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.replication import Replicator
-from lightpen_extensions.plant.server import open_server
+from lightpen.archive.chains import entries_of
+from lightpen.archive.checks import check_archive
+from lightpen.archive.history import EntryFilter, last_accepted, newest
+from lightpen_extensions.plant import server as replication
+from lightpen_extensions.plant.server import Replicator, deliver, open_server
 
 PATIENCE_S = 60.0
 N_EACH = 30

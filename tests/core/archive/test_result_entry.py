@@ -8,15 +8,14 @@ from pathlib import Path
 import pytest
 from benchmarks.small_records import small_record
 
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.logbook.result_entry import entry_of_file
+from lightpen.archive.logbook import Logbook, entry_of_file
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.record.library.entered_files import ARCHIVE
-from lightpen.record.library.signing.station import known_station_name
+from lightpen.record.library.signing import known_station_name
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 

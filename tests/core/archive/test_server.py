@@ -9,11 +9,10 @@ import pytest
 from benchmarks.postgres_server import PASSWORD, Postgres
 from tests.core.archive.conftest import Station
 
-from lightpen.archive.chains.chains import chain_names, entries_of, records_of
-from lightpen.archive.checks.check import check_archive
+from lightpen.archive.chains import chain_names, entries_of, records_of
+from lightpen.archive.checks import check_archive
 from lightpen.errors import ArchiveError
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.server import open_server
+from lightpen_extensions.plant.server import deliver, open_server
 
 
 @pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])

@@ -9,24 +9,24 @@ from pathlib import Path
 import pytest
 from tests.core.archive.conftest import NOON
 
-from lightpen.archive.chains.chains import entries_of, records_of
-from lightpen.archive.chains.entries import Event, Kind
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import look_into
+from lightpen.archive.chains import Event, Kind, entries_of, records_of
+from lightpen.archive.checks import check_archive
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import look_into
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.comparisons.records import verification_record
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import record_bytes
+from lightpen.formats.opened_files import InputFile
+from lightpen.formats.own_json import record_bytes
 from lightpen.messages import message
 from lightpen.model.limits import StationLimits
-from lightpen.model.origin import Origin
-from lightpen.record.folder.camera_calibrations import CameraTrial, keep_camera_trial
-from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.folder.verifications import (
+from lightpen.model.names import Origin
+from lightpen.record.folder import (
     CONCLUSION,
     VERIFICATIONS,
+    CameraTrial,
+    TrialOutcome,
+    keep_camera_trial,
     keep_verification,
 )
 from lightpen.record.library.entered_files import ARCHIVE, add_numbered
@@ -34,10 +34,11 @@ from lightpen.record.library.supervision import (
     Signature,
     read_supervision,
     require_supervisor,
+    save_limits,
+    set_password,
 )
-from lightpen.record.library.supervision_changes import save_limits, set_password
 from lightpen.record.results.result_folder import SIMULATED
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 NAMES = Names("Hall 2", "Ann")
 EVE = Signature("Eve", "correct horse")

@@ -16,24 +16,25 @@ from tests.core.archive.conftest import NOON
 from tests.core.archive.test_logbook import result
 from tests.entering import enter_in
 
-from lightpen.archive.chains.chains import chain_names, entries_of
-from lightpen.archive.chains.entries import ChainHead, StoredEntry, chained
-from lightpen.archive.chains.rows import columns_of
-from lightpen.archive.checks.check import check_file
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import look_into, open_file
+from lightpen.archive.chains import (
+    ChainHead,
+    StoredEntry,
+    chain_names,
+    chained,
+    columns_of,
+    entries_of,
+)
+from lightpen.archive.checks import check_file
+from lightpen.archive.logbook import Logbook
+from lightpen.archive.store import look_into, open_file
 from lightpen.errors import ArchiveError, FileError
 from lightpen.model.limits import StationLimits
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import save_limits
+from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.library.tip_library import ListedCone
 from lightpen.record.results.result_folder import RECORDS, FolderArchive
-from lightpen_extensions.plant.comparison import check_server
-from lightpen_extensions.plant.exchange import deliver
-from lightpen_extensions.plant.fetching import fetch
-from lightpen_extensions.plant.server import open_server
+from lightpen_extensions.plant.server import check_server, deliver, fetch, open_server
 
 N_RESULTS, N_ENTRIES = 3, 6  # with a cone, a password and limits
 SWING = f"{RECORDS}/swing"

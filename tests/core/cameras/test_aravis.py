@@ -22,20 +22,18 @@ from lightpen.cameras.aravis import AravisDevice
 from lightpen.cameras.device_camera import DeviceCamera
 from lightpen.cameras.protocol import (
     CameraSettings,
+    Connection,
+    ConnectionChanged,
     DeviceBusy,
     DeviceLost,
     DeviceNotFound,
-    FrameIncomplete,
-    Region,
-)
-from lightpen.cameras.worker import CameraWorker
-from lightpen.cameras.worker_events import (
-    Connection,
-    ConnectionChanged,
     Failed,
     FaultRaised,
+    FrameIncomplete,
+    Region,
     WorkerEvent,
 )
+from lightpen.cameras.worker import CameraWorker
 
 TIMEOUT = 60.0  # s until a test gives up
 RNG = np.random.default_rng(5)

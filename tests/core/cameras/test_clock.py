@@ -4,7 +4,7 @@ from threading import Event
 
 import pytest
 
-from lightpen.cameras.clock import Clock, MachineClock, SkippingClock
+from lightpen.cameras.pairing import Clock, MachineClock, SkippingClock
 
 
 @pytest.fixture(params=[MachineClock, SkippingClock])

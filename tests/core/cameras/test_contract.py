@@ -13,20 +13,22 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.cameras.clock import MachineClock, SkippingClock
+from lightpen.cameras.pairing import MachineClock, SkippingClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     ConfigError,
+    Connection,
+    ConnectionChanged,
     FrameTimeout,
     ImageCamera,
     Region,
     TriggerMode,
+    WorkerEvent,
 )
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import source_named
 from lightpen.cameras.worker import CameraWorker
-from lightpen.cameras.worker_events import Connection, ConnectionChanged, WorkerEvent
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
 from lightpen_extensions.simulator.camera import SimulatedCamera

@@ -4,8 +4,8 @@ import pytest
 from typing_extensions import override
 
 from lightpen.cameras.basler import BASLER
-from lightpen.cameras.clock import MachineClock
-from lightpen.cameras.genapi_features import GenapiFeatures
+from lightpen.cameras.genicam import GenapiFeatures
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import CameraSettings, FrameTimeout, TriggerMode
 from lightpen.cameras.source import SourcePlace
 

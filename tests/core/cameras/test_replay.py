@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import Image
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import (
     DeviceLost,
     DeviceNotFound,

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from lightpen.cameras import aravis_library, basler, genicam
+from lightpen.cameras import aravis as aravis_library
+from lightpen.cameras import basler, genicam
 from lightpen.cameras.basler import BaslerDevice
-from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.device_camera import DeviceCamera
+from lightpen.cameras.pairing import MachineClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     DeviceNotFound,

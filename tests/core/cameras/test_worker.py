@@ -10,36 +10,34 @@ import pytest
 from tests.faulty_camera import FaultyCamera
 from typing_extensions import override
 
-from lightpen.cameras.clock import Clock, MachineClock, SkippingClock
+from lightpen.cameras.pairing import Clock, MachineClock, SkippingClock
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
     ConfigError,
+    Connection,
+    ConnectionChanged,
     DeviceBusy,
     DeviceLost,
     DeviceNotFound,
     EndOfImages,
+    Failed,
+    FaultRaised,
     Frame,
     FrameIncomplete,
+    FrameReady,
     FramesSkipped,
     FrameTimeout,
     ImageCamera,
+    ProcessingKeepsUp,
+    SettingsApplied,
     Stats,
+    WorkerEvent,
+    WorkerStopped,
     sealed,
 )
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import CameraWorker, is_too_slow
-from lightpen.cameras.worker_events import (
-    Connection,
-    ConnectionChanged,
-    Failed,
-    FaultRaised,
-    FrameReady,
-    ProcessingKeepsUp,
-    SettingsApplied,
-    WorkerEvent,
-    WorkerStopped,
-)
 from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
 from lightpen_extensions.simulator.hand import Operator

@@ -5,7 +5,7 @@ import pytest
 from lightpen.comparisons.assessment import VERIFY_AGAIN, accepted, check, graded, worst
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
-from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
 
 REASON = message("drift.too-few")

@@ -10,10 +10,9 @@ from tests.accepted_tip import accept_tip
 from lightpen.comparisons.pen_over_time import adjust_together, read_pen_over_time
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.files import sha256
+from lightpen.formats.files import is_simulated, mark_simulated, sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import read_pen, write_pen
-from lightpen.formats.simulated_files import is_simulated, mark_simulated
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
 from lightpen.swing.preparation import Preparation
 

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lightpen.comparisons.records import repeatability_entries
+from lightpen.comparisons.records import repeatability_entries, repeatability_text
 from lightpen.comparisons.repeatability import TipEstimate, measure_repeatability
-from lightpen.comparisons.summaries import repeatability_text
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.simulator.swings import PAPER_TIP
 

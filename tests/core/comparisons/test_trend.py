@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.archive.chains.entries import Event, Kind, StoredEntry
-from lightpen.archive.chains.growth import append, own_chain
-from lightpen.archive.history.queries import EntryFilter
-from lightpen.archive.store.database import Database, open_file
-from lightpen.comparisons.trend import compare, repeatability_of, trend_of
+from lightpen.archive.chains import Event, Kind, StoredEntry
+from lightpen.archive.growth import append, own_chain
+from lightpen.archive.history import EntryFilter
+from lightpen.archive.store import Database, open_file
+from lightpen.comparisons.repeatability import compare, repeatability_of, trend_of
 from lightpen.model.limits import VerificationLimits
-from lightpen.model.origin import Origin
-from lightpen.record.swings.names import Names
+from lightpen.model.names import Origin
+from lightpen.record.swings.header import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 WANTED = EntryFilter(pen="LP-04", tip="T-10")

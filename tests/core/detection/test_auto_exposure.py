@@ -6,16 +6,16 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Frame, Range
-from lightpen.detection.auto_exposure import (
+from lightpen.detection.inspection import (
+    LONGEST_EXPOSURE_US,
     MAX_BLIND,
     TARGET,
     AutoExposure,
     ExposureState,
+    inspect,
 )
-from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US
-from lightpen.detection.inspection import inspect
 from lightpen.detection.pen_detection import detect_pen
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene

@@ -9,8 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.model.ellipse import disc_images
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
-from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Scene, Sensor
 from lightpen_extensions.simulator.swings import leds_in_camera, paper_camera
 from lightpen_extensions.simulator.view import Optics
 

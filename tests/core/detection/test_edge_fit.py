@@ -8,14 +8,13 @@ import pytest
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.edge_fit import EdgeFit, fit_edge
-from lightpen.detection.labelling.spot_arrays import UNWHOLE
+from lightpen.detection.labelling.constellation import UNWHOLE
 from lightpen.detection.spots import SpotFlaw, Spots, detect_spots
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen_extensions.simulator.faces import Dome, Ring
 from lightpen_extensions.simulator.image_plans import ImagePlan, plan_scene
 from lightpen_extensions.simulator.render import render_view
-from lightpen_extensions.simulator.scenes import LEDS, Scene
-from lightpen_extensions.simulator.sensor import expose
+from lightpen_extensions.simulator.scenes import LEDS, Scene, expose
 from lightpen_extensions.simulator.swings import leds_in_camera
 from lightpen_extensions.simulator.view import Finger
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
-from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US, Advice, advise
-from lightpen.detection.inspection import Exposure
+from lightpen.detection.inspection import LONGEST_EXPOSURE_US, Advice, Exposure, advise
 
 CAPS = CameraCapabilities(
     *(2448, 2048, ("Mono8",)),

@@ -8,11 +8,12 @@ import pytest
 
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.detection.exposure_advice import Advice, advise
 from lightpen.detection.inspection import (
     SEARCHED_IMAGES,
+    Advice,
     Exposure,
     StraySearch,
+    advise,
     inspect,
     is_sharp,
     lasting_light,
@@ -21,8 +22,7 @@ from lightpen.detection.inspection import (
 from lightpen.detection.labelling.labels import label_spots
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
-from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Scene, Sensor
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 from lightpen_extensions.simulator.view import Optics
 

@@ -24,9 +24,7 @@ from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.image_plans import ImagePlan, plan_scene, render_plan
-from lightpen_extensions.simulator.samples import six_led_pen
-from lightpen_extensions.simulator.scenes import HARD, Scene
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import HARD, Scene, Sensor, six_led_pen
 from lightpen_extensions.simulator.swings import flat_pen, leds_in_camera
 from lightpen_extensions.simulator.view import Finger, Glare, Lamp
 

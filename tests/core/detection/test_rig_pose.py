@@ -1,4 +1,4 @@
-"""Tests of `lightpen.detection.rig_pose`."""
+"""Tests of `lightpen.detection.rig_observations`."""
 
 from dataclasses import replace
 
@@ -8,9 +8,9 @@ from tests.accepted_tip import Hold, Holder, seen_by
 from lightpen.detection.pen_detection import unseen
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
-from lightpen.detection.rig_pose import fit_rig_poses, see_together
-from lightpen.model.rig import from_first, rig_of
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.detection.rig_observations import fit_rig_poses, see_together
+from lightpen.model.rigid import from_first, rig_of
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 RIG = replace(from_first(row_of_cameras(2, 800.0)), names=("left", "right"))

@@ -19,8 +19,7 @@ from lightpen.formats.images import ImageSource
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen_extensions.simulator.image_plans import render_plan
-from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Scene, Sensor
 
 N_IMAGES = 600
 N_FILES = 60

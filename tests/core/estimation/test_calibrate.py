@@ -13,9 +13,9 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.postures import SwingKind
 from lightpen_extensions.simulator.swings import (
     Swing,
+    SwingKind,
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -15,10 +15,9 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.estimation.uncertainty.prediction import predict_uncertainty
-from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.model.assumptions import USUAL
-from lightpen.model.limits import SwingLimits
-from lightpen.swing_messages import Code
+from lightpen.formats.opened_files import InputFile, Inputs
+from lightpen.messages import Code
+from lightpen.model.limits import USUAL, SwingLimits
 from lightpen_extensions.simulator.swings import paper_pen
 
 FILE = InputFile(Path("file"), 64 * "0")

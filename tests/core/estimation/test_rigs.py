@@ -18,7 +18,7 @@ from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import Grade, judge
-from lightpen.estimation.rigs.synchrony import (
+from lightpen.estimation.rigs.rig_poses import (
     PenRotations,
     RelativeRotation,
     TimeLag,
@@ -26,19 +26,17 @@ from lightpen.estimation.rigs.synchrony import (
     relative_turn,
 )
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.formats.hashes import InputFile, Inputs, RigInputs
-from lightpen.formats.observation_files import Centers
-from lightpen.formats.pairing import pair_images
+from lightpen.formats.observation_files import Centers, pair_images
+from lightpen.formats.opened_files import InputFile, Inputs, RigInputs
+from lightpen.messages import Code
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, from_first
-from lightpen.model.rigid import rotation_from_vector
-from lightpen.swing_messages import Code
-from lightpen_extensions.simulator.postures import operator_postures
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.rigid import Rig, from_first, rotation_from_vector
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
+    operator_postures,
     paper_pen,
     seen_from,
     swing_from_postures,

@@ -7,8 +7,8 @@ import numpy as np
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera, LensModel
+from lightpen.model.limits import Assumptions
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.swings import (
     paper_pen,

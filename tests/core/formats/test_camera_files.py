@@ -16,11 +16,10 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera
-from lightpen.model.camera import Camera, LensModel
-from lightpen.model.camera_validity import unmodelled_effects_of
-from lightpen.model.lens_field import LensField
+from lightpen.formats.rig_files import write_camera
+from lightpen.model.camera import Camera, LensModel, unmodelled_effects_of
+from lightpen.model.fisheye import LensField
 from lightpen.model.self_calibration import FoundCamera
 
 DISTORTION = np.array([-0.082, 0.105, 3e-4, -2e-4, 1 / 3])

@@ -10,10 +10,10 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.camera_file_writing import write_window
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.rig_files import write_window
 from lightpen.model.camera import Camera, LensModel
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
 
 # f 1320.5, centre (652.25, 355.75) from the centre of the first pixel, k1 k2 p1 p2
 PINHOLE = (1320.5, 1318.25, 652.25, 355.75)

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
-from lightpen.formats.file_locks import locked, unlock
 from lightpen.formats.files import (
     create_whole,
     quoted,
@@ -25,6 +24,7 @@ from lightpen.formats.files import (
     sha256,
     write_whole,
 )
+from lightpen.formats.part_files import locked, unlock
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.messages import printable
 

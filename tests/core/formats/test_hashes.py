@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.errors import FileError
-from lightpen.formats.hashes import all_hashed
+from lightpen.formats.opened_files import all_hashed
 
 
 @pytest.mark.parametrize("n_files", [0, 1, 7])

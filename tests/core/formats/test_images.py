@@ -21,9 +21,11 @@ from lightpen.formats.decoding import (
     full_scale_of,
     read_image,
 )
-from lightpen.formats.images import find_images, look_at_all
-from lightpen.formats.mosaic import is_mosaic
-from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
+from lightpen.formats.images import find_images, is_mosaic, look_at_all
+from lightpen.formats.video_process import (
+    count_frames_in_process,
+    frame_loaders_in_process,
+)
 
 RNG = np.random.default_rng(0)
 GREY = RNG.integers(0, 255, (48, 64), dtype=np.uint8)
@@ -235,7 +237,9 @@ from lightpen.cameras.protocol import DeviceNotFound
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.errors import FileError
 from lightpen.formats.images import find_images
-from lightpen.formats.videos import count_frames_in_process, frame_loaders_in_process
+from lightpen.formats.video_process import (
+    count_frames_in_process, frame_loaders_in_process
+)
 try:
     find_images(sys.argv[1])
 except FileError as error:

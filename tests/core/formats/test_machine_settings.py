@@ -14,8 +14,8 @@ from lightpen.formats.machine_settings import (
     machine_settings,
     read_update,
 )
-from lightpen.model.laboratory import Laboratory
-from lightpen_extensions.plant.address import SERVER, server_address
+from lightpen.model.names import Laboratory
+from lightpen_extensions.plant.server import SERVER, server_address
 
 ADDRESS = "postgresql://archive.plant/lightpen"
 

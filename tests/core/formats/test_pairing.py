@@ -3,7 +3,7 @@
 import pytest
 
 from lightpen.errors import FileError
-from lightpen.formats.pairing import pair_images
+from lightpen.formats.observation_files import pair_images
 
 CAMERAS = ("left", "right")
 

@@ -12,10 +12,9 @@ import pytest
 import yaml
 
 from lightpen.errors import FileError
-from lightpen.formats.camera_file_writing import write_camera
-from lightpen.formats.rig_files import RigFile, read_rig, write_rig
-from lightpen.model.rig import from_first
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.formats.rig_files import RigFile, read_rig, write_camera, write_rig
+from lightpen.model.rigid import from_first
+from lightpen_extensions.simulator.scenes import row_of_cameras
 
 RIG = from_first(row_of_cameras(3, 900.0))
 FILES = tuple(f"{name}.yaml" for name in RIG.names)

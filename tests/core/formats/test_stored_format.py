@@ -3,9 +3,13 @@
 import pytest
 from msgspec import Struct
 
-from lightpen.formats.json_records import record_bytes
-from lightpen.formats.own_json import DamagedError
-from lightpen.formats.stored_format import FORMAT, LaterFormatError, parse_stored
+from lightpen.formats.own_json import (
+    FORMAT,
+    DamagedError,
+    LaterFormatError,
+    parse_stored,
+    record_bytes,
+)
 
 
 class Rod(Struct):

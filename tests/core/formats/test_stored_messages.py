@@ -6,10 +6,8 @@ import math
 import pytest
 from msgspec import structs, to_builtins
 
-from lightpen.formats.own_json import DamagedError, in_shape
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.messages import Message, message
-from lightpen.swing_messages import Code, file_uncertain, too_little_tilt
+from lightpen.formats.own_json import DamagedError, StoredMessage, in_shape
+from lightpen.messages import Code, Message, file_uncertain, message, too_little_tilt
 
 DAMAGED = message("results.damaged", file="a, b {c}.json")
 ADVICE = message("share.leds")

@@ -3,7 +3,7 @@
 import errno
 import os
 
-from lightpen.formats.system_reasons import strerror
+from lightpen.formats.files import strerror
 from lightpen.messages import Message
 
 

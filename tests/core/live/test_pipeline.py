@@ -13,23 +13,24 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.protocol import CameraSettings, ImageCamera
-from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker_events import (
+from lightpen.cameras.pairing import SkippingClock
+from lightpen.cameras.protocol import (
+    CameraSettings,
     Connection,
     ConnectionChanged,
     Failed,
+    ImageCamera,
     WorkerEvent,
 )
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.formats.decoding import encode_png
 from lightpen.live.pipeline import UNHURRIED, ImageListener, Live, LiveImage
 from lightpen.model.limits import SwingLimits
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase, SwingEventKind
-from lightpen_extensions.simulator.samples import SAMPLE_PENS
+from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.stream.server import LOOPBACK, PoseStream, StreamPlace
 
 if TYPE_CHECKING:

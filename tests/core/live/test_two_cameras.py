@@ -17,26 +17,28 @@ from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen.cameras.aravis import AravisDevice
-from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.device_camera import DeviceCamera
-from lightpen.cameras.protocol import CameraSettings, Frame, ImageCamera, Region
-from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker_events import (
+from lightpen.cameras.pairing import MachineClock
+from lightpen.cameras.protocol import (
+    CameraSettings,
     Connection,
     ConnectionChanged,
     Failed,
     FaultRaised,
+    Frame,
+    ImageCamera,
+    Region,
     WorkerEvent,
 )
+from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.pen_detection import PenDetection, unseen
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.detection.reasons import Reason
-from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.formats.decoding import encode_png
 from lightpen.live.pipeline import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen_extensions.simulator.samples import beside
-from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.scenes import Scene, beside
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -5,8 +5,7 @@ from datetime import date
 
 import pytest
 
-from lightpen.model.camera import Camera
-from lightpen.model.camera_validity import unmodelled_effects_of
+from lightpen.model.camera import Camera, unmodelled_effects_of
 
 CAMERA = Camera(640, 480, 900.0, 900.0, 320.0, 240.0)
 TODAY = date(2026, 11, 22)

@@ -1,9 +1,9 @@
-"""Tests of `lightpen.model.decision_rules`."""
+"""Tests of `lightpen.model.coverage`."""
 
 import numpy as np
 import pytest
 
-from lightpen.model.decision_rules import (
+from lightpen.model.coverage import (
     Decision,
     DecisionRule,
     conformity_probability,

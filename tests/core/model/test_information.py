@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightpen.model.information import inverse, known_by
+from lightpen.model.coverage import inverse, known_by
 
 
 def test_unknowns_of_very_different_units_are_inverted_to_rounding() -> None:

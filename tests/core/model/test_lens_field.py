@@ -6,8 +6,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
-from lightpen.model.information import inverse
-from lightpen.model.lens_field import LensField, correlation
+from lightpen.model.coverage import inverse
+from lightpen.model.fisheye import LensField, correlation
 
 WIDTH, HEIGHT = 2448, 2048
 

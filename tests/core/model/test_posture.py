@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from lightpen.model.coverage import measure_coverage
-from lightpen.model.posture import Posture, angles_between, posture_of, rotations_of
-from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.postures import random_postures
-from lightpen_extensions.simulator.swings import paper_pen
+from lightpen.model.rigid import (
+    Posture,
+    angles_between,
+    posture_of,
+    rotation_from_vector,
+    rotations_of,
+)
+from lightpen_extensions.simulator.swings import paper_pen, random_postures
 
 PEN = paper_pen()
 POSTURES = random_postures(50, np.random.default_rng(0))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lightpen.model.quantiles import chi_quantile, chi_square_quantile, normal_quantile
+from lightpen.model.coverage import chi_quantile, chi_square_quantile, normal_quantile
 
 
 def test_published_quantiles_are_met() -> None:

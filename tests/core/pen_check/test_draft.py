@@ -6,7 +6,7 @@ import pytest
 from lightpen.errors import FileError
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.draft import FACING, PenDraft, check_draft
-from lightpen_extensions.simulator.samples import fanned_pen
+from lightpen_extensions.simulator.scenes import fanned_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()

@@ -8,14 +8,14 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.model.pen import Pen, check_frame
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.pen_check.frame import (
+from lightpen.pen_check.draft import (
     FrameCheck,
     Rule,
     RuleStatus,
     examine_frame,
     moved_into_frame,
 )
-from lightpen_extensions.simulator.samples import SAMPLE_PENS, six_led_pen
+from lightpen_extensions.simulator.scenes import SAMPLE_PENS, six_led_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 PEN = paper_pen()

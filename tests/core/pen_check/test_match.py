@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.spots import SpotFlaw, Spots
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen

@@ -5,7 +5,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.pen_check.shifts import find_shifts
-from lightpen_extensions.simulator.samples import six_led_pen
+from lightpen_extensions.simulator.scenes import six_led_pen
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

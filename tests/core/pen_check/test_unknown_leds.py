@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import Poses, fit_poses
-from lightpen.pen_check.unknown_leds import find_unknown_leds
+from lightpen.pen_check.match import find_unknown_leds
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -15,12 +15,14 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, Cancelled, FileError
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.formats.own_json import with_checksum
-from lightpen.model.assumptions import USUAL
-from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.assumed import assumption_entries
-from lightpen.record.swings.header import HEADER
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.reading import image_name, open_record, record_files
+from lightpen.model.limits import USUAL, SwingLimits
+from lightpen.record.swings.header import HEADER, assumption_entries
+from lightpen.record.swings.reading import (
+    JOURNAL,
+    image_name,
+    open_record,
+    record_files,
+)
 from lightpen.record.swings.solving import (
     Solution,
     record_inputs,

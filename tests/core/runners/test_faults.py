@@ -7,7 +7,7 @@ import pytest
 
 from lightpen.errors import LightpenError
 from lightpen.messages import Message, message
-from lightpen.runners.faults import FaultReporter
+from lightpen.runners import FaultReporter
 
 FULL = message("system.full")
 OTHER = message("swing.bug")

@@ -8,7 +8,7 @@ import pytest
 
 from lightpen.errors import Cancelled, LightpenError
 from lightpen.messages import message
-from lightpen.runners.serial_queue import Report, SerialQueue
+from lightpen.runners import Report, SerialQueue
 
 TIMEOUT = 60.0  # s until a test gives up
 FULL = message("system.full")

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import FileError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.pen_files import PEN_FILE, write_pen
+from lightpen.formats.rig_files import write_camera
 from lightpen.messages import message
 from lightpen.record.swings.header import FileCopy, Header
 from lightpen.record.swings.reading import open_record
@@ -30,8 +30,7 @@ from lightpen.swing.capture.state import (
     Transition,
     start_swing,
 )
-from lightpen.swing.resuming import resume_swing
-from lightpen.swing.swing_recorder import capture_image
+from lightpen.swing.swing_recorder import capture_image, resume_swing
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera

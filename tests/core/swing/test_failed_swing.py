@@ -6,13 +6,12 @@ import numpy as np
 
 from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
-from lightpen.messages import message
+from lightpen.messages import Code, message
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of
 from lightpen.swing.capture.kept_images import keep, none_kept
 from lightpen.swing.capture.state import SwingSetup
-from lightpen.swing.failed_swing import FailedSwing, failed_swing
-from lightpen.swing_messages import Code
+from lightpen.swing.status import FailedSwing, failed_swing
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lightpen.messages import message
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.preparation import Preparation
 

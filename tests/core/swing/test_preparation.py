@@ -10,14 +10,18 @@ from msgspec import structs
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
-from lightpen.record.swings.names import Names
+from lightpen.model.names import Origin
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import Record, open_record, recorded_names
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
-from lightpen.swing.preparation import MissingInput, Preparation
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import recorded_setup
+from lightpen.swing.preparation import (
+    NO_SOURCE,
+    MissingInput,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.swing.swing_recorder import record_header, recorded_setup
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 

@@ -20,14 +20,13 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.verdict import Grade, judge
 from lightpen.formats.decoding import encode_png, read_image
 from lightpen.formats.images import find_images
-from lightpen.model.origin import Origin
+from lightpen.messages import Code
+from lightpen.model.names import Origin
 from lightpen.record.swings.reading import open_record, recorded_origin
-from lightpen.record.swings.recorded_source import source
-from lightpen.record.swings.solving import solve_record
+from lightpen.record.swings.solving import solve_record, source
 from lightpen.swing.capture.state import Phase, Progress, SwingEventKind
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.resuming import read_resumable
-from lightpen.swing_messages import Code
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.swing_recorder import read_resumable
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -11,22 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.worker_events import WorkerEvent
+from lightpen.cameras.protocol import CameraSettings, WorkerEvent
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.live.pipeline import Live, LiveImage
+from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.reading import IMAGES, open_record
+from lightpen.record.swings.reading import IMAGES, JOURNAL, open_record
 from lightpen.record.swings.solving import solve_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.capture.state import Phase, SwingEventKind
-from lightpen.swing.resuming import read_resumable
+from lightpen.swing.swing_recorder import read_resumable
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen.swing_messages import Code
-from lightpen_extensions.simulator.samples import SAMPLE_PENS
+from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

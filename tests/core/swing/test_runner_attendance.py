@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.reading import DISCARDED, IMAGES, open_record
+from lightpen.record.swings.reading import DISCARDED, IMAGES, JOURNAL, open_record
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.preparation import Preparation
+from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
 from lightpen.swing.workflow import SwingWorkflow
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ import pytest
 
 from lightpen.record.swings.reading import open_record
 from lightpen.swing.capture.state import Phase
-from lightpen.swing.resuming import read_resumable
 from lightpen.swing.operator_presence import OperatorPresence
 from lightpen.swing.status import Activity
+from lightpen.swing.swing_recorder import read_resumable
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 from tests.core.conftest import TIMEOUT, Station
 
-from lightpen.archive.chains.chains import chain_names, entries_of
-from lightpen.archive.chains.entries import Event, Kind
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.archive.store.database import look_into
+from lightpen.archive.chains import Event, Kind, chain_names, entries_of
+from lightpen.archive.checks import check_archive
+from lightpen.archive.logbook import LazyLogbook, Logbook
+from lightpen.archive.store import look_into
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.swings.interrupted import discard_swing
 from lightpen.swing.runner import SwingRunner

@@ -17,10 +17,9 @@ from lightpen.formats.decoding import decode_image
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.rig_files import read_rig
 from lightpen.record.swings.reading import open_record
-from lightpen.record.swings.recorded_source import source
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.preparation import MissingInput
-from lightpen.swing.resuming import read_resumable
+from lightpen.record.swings.solving import source
+from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
+from lightpen.swing.swing_recorder import read_resumable
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scene_files import write_sample_files
 

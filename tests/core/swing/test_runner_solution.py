@@ -15,9 +15,10 @@ from benchmarks.small_records import entries_of
 
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.swings.journal import JOURNAL
+from lightpen.messages import Code
 from lightpen.record.swings.reading import (
     DISCARDED,
+    JOURNAL,
     Record,
     open_record,
     recorded_limits,
@@ -25,11 +26,10 @@ from lightpen.record.swings.reading import (
 from lightpen.record.swings.solving import Solution, record_inputs, solve_record
 from lightpen.swing.capture.rules import stillness
 from lightpen.swing.capture.state import Phase, SwingEventKind
-from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.status import Activity
+from lightpen.swing.swing_recorder import read_resumable
 from lightpen.swing.workflow import SwingWorkflow
-from lightpen.swing_messages import Code
 
 if TYPE_CHECKING:
     from tests.core.conftest import Station

@@ -1,23 +1,39 @@
 """The intrinsics of the camera: file, content and match."""
 
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
 import numpy as np
-from PySide6.QtCore import QDate, QLocale, Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QLabel
+from PySide6.QtCore import QDate, QLocale, QObject, Qt, Signal
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QGroupBox,
+    QLabel,
+    QWidget,
+)
 
 from lightpen.formats.opened_files import CameraFile
+from lightpen.formats.rig_files import write_window
 from lightpen.local_time import local_now
-from lightpen.model.camera import Camera
-from lightpen.model.camera_validity import unmodelled_effects_of
+from lightpen.model.camera import Camera, unmodelled_effects_of
 from lightpen.record.swings.solving import Solution
-from lightpen_app.look.layouts import grid_layout, vertical_layout
-from lightpen_app.look.quantities import MAX_DECIMALS, number_text
-from lightpen_app.look.sentences import worded
+from lightpen_app.face import Services
+from lightpen_app.look.languages import worded
+from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.widgets.file_drops import FileDrops
-from lightpen_app.widgets.path_field import PathField
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import MAX_DECIMALS, number_text
+from lightpen_app.widgets.controls import FileDrops
+from lightpen_app.widgets.fields import PathField, Translated
+from lightpen_app.widgets.fitting import FittedWindow
+from lightpen_app.widgets.number_field import NumberField, is_refusing
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.work.job import LatestJob
+from lightpen_app.work.workbench import Workbench
 
 FILES = "*.yaml *.yml *.json *.xml *.toml *.cameramodel *.txt"
 N_FACTS = 5
@@ -255,3 +271,134 @@ def _let_select(label: QLabel, selectable: bool) -> None:
     label.setTextInteractionFlags(
         flags.TextSelectableByMouse if selectable else flags.NoTextInteraction
     )
+
+
+MOST_BINNING = 8
+
+
+class PartDialog(FittedWindow, Translated, QDialog):
+    """Dialog for the region of the sensor that the images show, and its binning."""
+
+    given = Signal(int, tuple)  # binning; x, y, width and height of the region, px
+
+    def __init__(self, camera: Camera, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.say(self, self.tr("Binned or cropped images"))
+        width, height = camera.image_size
+
+        # Widgets
+        self._lead = self.say(
+            text_label(TextSize.BODY),
+            self.tr(
+                "An intrinsics file for these images is written beside the file of the "
+                "whole sensor. The region is in pixels of that file, before binning."
+            ),
+        )
+        self._binning = NumberField("", (1, MOST_BINNING), 0)
+        self._region = [
+            NumberField("px", limits, 0)
+            for limits in ((0, width - 1), (0, height - 1), (1, width), (1, height))
+        ]
+        standard = QDialogButtonBox.StandardButton
+        self._buttons = QDialogButtonBox(standard.Ok | standard.Cancel)
+        self.say(self._buttons.button(standard.Ok), self.tr("Write and use"))
+        self.say(self._buttons.button(standard.Cancel), self.tr("Cancel"))
+
+        # Layout
+        layout = vertical_layout(self, self._lead, spacing=2 * GRID, margins=3 * GRID)
+        grid = grid_layout(layout, spacing=(2 * GRID, 2 * GRID))
+        places = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1))
+        texts = (
+            self.tr("Binning"),
+            self.tr("Left edge"),
+            self.tr("Top edge"),
+            self.tr("Width"),
+            self.tr("Height"),
+        )
+        fields = (self._binning, *self._region)
+        for field, text, at in zip(fields, texts, places, strict=True):
+            self.make_field(grid, field, text, at=at)
+        fill(layout, self._buttons)
+        self.setMinimumWidth(56 * GRID)
+
+        # Connections
+        self._buttons.accepted.connect(self._on_accepted)
+        self._buttons.rejected.connect(self.reject)
+
+        self._binning.set_value(1)
+        for each, value in zip(self._region, (0, 0, width, height), strict=True):
+            each.set_value(value)
+
+    def _on_accepted(self) -> None:
+        if is_refusing(self):
+            return
+        region = tuple(round(each.value()) for each in self._region)
+        self.given.emit(round(self._binning.value()), region)
+        self.accept()
+
+
+Region: TypeAlias = tuple[int, int, int, int]  # x, y, width and height, px
+
+
+class IntrinsicsControl(QObject):
+    """Carries out requests of the intrinsics panel."""
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        panel: IntrinsicsPanel,
+        services: Services,
+        page: QWidget,
+    ) -> None:
+        super().__init__(page)
+        self._selection, self._services = workbench.selection, services
+        self._panel = panel
+        self._page = page
+        self._reading = LatestJob(self)
+
+        # Connections
+        workbench.selection.station_changed.connect(self._forget_file)
+        panel.path_chosen.connect(self._on_path_chosen)
+        panel.part_requested.connect(self._on_part_requested)
+        panel.calibration_requested.connect(self._on_calibration_requested)
+
+    def shut_down(self) -> None:
+        """Cancel reading."""
+        self._reading.cancel()
+
+    def _forget_file(self) -> None:
+        """Clear the message on a file that was chosen at another station."""
+        self._reading.cancel()
+        self._panel.forget_refused()
+
+    def _on_path_chosen(self, path: str) -> None:
+        self._reading.start(
+            lambda _: CameraFile.read(Path(path)),
+            self._on_file_read,
+            self._panel.set_problem,
+        )
+
+    def _on_part_requested(self) -> None:
+        file = self._selection.preparation.camera_file
+        if file is None:
+            return
+        dialog = PartDialog(file.camera, self._page)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.given.connect(partial(self._on_part_given, file.path))
+        dialog.open()
+
+    def _on_part_given(self, path: Path, binning: int, region: Region) -> None:
+        self._reading.start(
+            lambda _: CameraFile.read(write_window(path, binning, region)),
+            self._on_file_read,
+            self._panel.set_problem,
+        )
+
+    def _on_calibration_requested(self) -> None:
+        for each in self._services:
+            if each.calibrates_cameras:
+                each.calibrate_camera(self._page, self._on_path_chosen)
+
+    def _on_file_read(self, camera_file: CameraFile) -> None:
+        now = self._selection.preparation
+        self._selection.set_preparation(replace(now, camera_file=camera_file))

@@ -2,22 +2,21 @@
 
 from typing_extensions import override
 
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import Connection
 from lightpen.detection.inspection import Exposure, inspect
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
-from lightpen.swing.preparation import MissingInput
+from lightpen.swing.preparation import NO_SOURCE, MissingInput, SourceChoice, SourceKind
 from lightpen_app.face import Services
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import first_missing, missing_input_text
 from lightpen_app.look.sounds import Sound, Sounds
-from lightpen_app.steps.camera.exposure_control import ExposureControl
-from lightpen_app.steps.camera.intrinsics_control import IntrinsicsControl
-from lightpen_app.steps.camera.mask_control import MaskControl
-from lightpen_app.steps.camera.source_control import BesideControl, SourceSearch
+from lightpen_app.steps.camera.exposure_panel import ExposureControl
+from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsControl
+from lightpen_app.steps.camera.source_panel import BesideControl, SourceSearch
+from lightpen_app.steps.camera.stray_light_panel import MaskControl
 from lightpen_app.steps.camera.view import CameraPanels
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.widgets.state_banner import StatusMessage
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 _LACKS_SOURCE = MissingInput.SOURCE, MissingInput.SOURCE_PLACE, MissingInput.DEVICE

@@ -3,7 +3,7 @@
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
 
-from lightpen.cameras.pixel_formats import pixel_format_named
+from lightpen.cameras.features import pixel_format_named
 from lightpen.cameras.protocol import (
     CameraCapabilities,
     CameraSettings,
@@ -13,12 +13,28 @@ from lightpen.cameras.protocol import (
     TriggerMode,
 )
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
-from lightpen_app.look.theme import TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, on_one_line
-from lightpen_app.steps.camera.setting_field import SettingField
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.fields import ChoiceField, Translated
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+
+FIELD_WIDTH = 13 * GRID  # px, at least: of "30.00 ms"
+
+
+class SettingField(NumberField):
+    """A number that takes effect when it is stepped, or typed and Enter pressed."""
+
+    def __init__(self, unit: str, limits: tuple[float, float], n_decimals: int) -> None:
+        super().__init__(unit, limits, n_decimals)
+        self.setMinimumWidth(FIELD_WIDTH)
+
+    def set_offered(self, offered: Range, value: float) -> None:
+        """Show range and value of the camera in the unit of the field."""
+        with QSignalBlocker(self):
+            self.set_limits(offered.low, offered.high)
+            self.set_value(value)
+
 
 LARGEST = 100_000  # px or bytes, of a field before the range of the camera is known
 

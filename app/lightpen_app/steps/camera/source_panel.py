@@ -4,27 +4,87 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu, QWidget
+from PySide6.QtCore import QObject, QSignalBlocker, Signal
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QMenu, QSizePolicy, QWidget
 
 from lightpen.cameras.source import FoundDevice, Source, SourceNeeds
+from lightpen.cameras.sources import absent_sources
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
 from lightpen.messages import Message
-from lightpen.record.swings.recordings import FilesBeside
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
+from lightpen.record.swings.solving import FilesBeside, files_beside
+from lightpen.swing.preparation import NO_SOURCE, SourceChoice, SourceKind
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, Tone
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.look.words import shortened
-from lightpen_app.steps.camera.device_field import DeviceField
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.file_drops import FileDrops
-from lightpen_app.widgets.path_field import PathField
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.theme import GRID, Tone, set_tone
+from lightpen_app.look.words import set_tooltip, shortened
+from lightpen_app.widgets.controls import FileDrops, PushButton
+from lightpen_app.widgets.fields import ChoiceField, EnterEdit, PathField, Translated
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.work.camera_setup import CameraSetup
+from lightpen_app.work.chosen_files import ChosenFiles
+from lightpen_app.work.job import Job, LatestJob
+from lightpen_app.work.selection import Selection
+
+
+class DeviceField(ChoiceField):
+    """A camera, taken over when it is chosen, or typed and Enter pressed."""
+
+    # Another camera was given, or the same one again by Enter.
+    value_changed = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value = ""
+        self.setEditable(True)
+        self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self._edit = edit = EnterEdit()
+        self.setLineEdit(edit)
+        self.setCompleter(None)  # type: ignore[arg-type] # Qt takes it away by this
+
+        # Connections
+        self.activated.connect(self._on_activated)
+        edit.returnPressed.connect(self._on_return_pressed)
+
+    def set_value(self, value: str) -> None:
+        """Show another camera."""
+        self._value = value
+        index = self.findData(value)
+        with QSignalBlocker(self):
+            self.setCurrentIndex(index)
+            self.setEditText(value if index < 0 else self.itemText(index))
+
+    def set_found(self, found: tuple[FoundDevice, ...]) -> None:
+        """Offer other cameras."""
+        with QSignalBlocker(self):
+            self.clear()
+            for device in found:
+                self.addItem(device.label, device.place)
+        self.set_value(self._value)
+
+    def set_name(self, name: str) -> None:
+        """Set the label of the field."""
+        self.setAccessibleName(name)
+        self._edit.setAccessibleName(name)
+        self._edit.setPlaceholderText(name)
+
+    def set_faulty(self, faulty: bool) -> None:
+        """Mark the camera as one that cannot be opened."""
+        set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
+
+    def _on_activated(self, index: int) -> None:
+        self._take(str(self.itemData(index)))
+
+    def _on_return_pressed(self) -> None:
+        text = self.currentText().strip()
+        index = self.findText(text)
+        self._take(text if index < 0 else str(self.itemData(index)))
+
+    def _take(self, value: str) -> None:
+        self.set_value(value)
+        self.value_changed.emit(value)
+
 
 LONGEST_LABEL = 32  # letters of a camera on a button
 
@@ -321,3 +381,89 @@ class SourcePanel(Translated, QGroupBox):
         producer.setPlaceholderText(self.tr("GenTL producers of the system"))
         self._device.set_name(self.tr("Serial number or address"))
         self._refresh()
+
+
+class SourceSearch(QObject):
+    """Searches cameras for the panel that asked last, and installed libraries."""
+
+    def __init__(self, camera: CameraSetup, *panels: SourcePanel) -> None:
+        super().__init__(panels[0])
+        self._camera = camera
+        self._asking = panels[0]
+        job = Job(lambda _: absent_sources(), self)
+
+        # Connections
+        for panel in panels:
+            panel.search_requested.connect(partial(self._start, panel))
+            job.succeeded.connect(panel.set_absent)
+        camera.cameras_found.connect(self._on_found)
+        camera.search_failed.connect(self._on_failed)
+        camera.all_found.connect(panels[0].set_offers)
+
+        job.start()
+
+    def _start(self, panel: SourcePanel) -> None:
+        self._asking.set_searching(False)
+        self._asking, source = panel, panel.value()
+        self._camera.search(source.kind, source.producer)
+        panel.set_searching(True)
+
+    def _on_found(self, found: tuple[FoundDevice, ...]) -> None:
+        if self._asking.is_searching:  # else another source is chosen by now
+            self._asking.set_searching(False)
+            self._asking.set_found(found)
+
+    def _on_failed(self, why: str) -> None:
+        if self._asking.is_searching:
+            self._asking.set_searching(False)
+            self._asking.set_search_problem(why)
+
+
+class BesideControl(QObject):
+    """Offers files beside recorded images unless they are in use."""
+
+    def __init__(
+        self, selection: Selection, files: ChosenFiles, panel: SourcePanel
+    ) -> None:
+        super().__init__(panel)
+        self._selection = selection
+        self._panel = panel
+        self._looking = LatestJob(self)
+        self._source = SourceChoice()
+        self._found = FilesBeside()
+
+        # Connections
+        panel.files_requested.connect(files.use_files)
+
+    def follow(self, source: SourceChoice) -> bool:
+        """Offer the files of a source; return whether the source has changed."""
+        is_other = source != self._source
+        if is_other:
+            self._look(source)
+        self._offer()
+        return is_other
+
+    def shut_down(self) -> None:
+        """Stop."""
+        self._looking.cancel()
+
+    def _look(self, source: SourceChoice) -> None:
+        self._source, self._found = source, FilesBeside()
+        self.shut_down()
+        if source.kind != SourceKind.RECORDED or not source.place:
+            return
+        self._looking.start(lambda _: files_beside(source.place), self._on_found)
+
+    def _on_found(self, files: FilesBeside) -> None:
+        self._found = files
+        self._offer()
+
+    def _offer(self) -> None:
+        now, beside = self._selection.preparation, self._found
+        camera = None if now.camera_file is None else now.camera_file.path
+        pen = None if now.pen_file is None else now.pen_file.path
+        others = FilesBeside(
+            None if beside.camera == camera else beside.camera,
+            None if beside.pen == pen else beside.pen,
+        )
+        self._panel.set_beside(others)

@@ -10,13 +10,12 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
-from lightpen_app.steps.camera.second_camera import SecondCameraChoice
+from lightpen_app.steps.camera.rig_panel import SecondCameraChoice
 from lightpen_app.steps.camera.settings_panel import SettingsPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
-from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.fitting import PageScroll, ResponsiveLayout
+from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.camera_setup import CameraSetup
 from lightpen_app.work.chosen_files import ChosenFiles
 from lightpen_app.work.selection import Selection

@@ -1,6 +1,6 @@
 """Content of the step History: the entries of the archive and their evaluation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,34 +9,63 @@ from typing import TypeVar
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QTabWidget, QWidget
 
-from lightpen.archive.chains.entries import Kind, StoredEntry
-from lightpen.archive.checks.check import ArchiveCheckResult
-from lightpen.archive.history.history import Line
-from lightpen.archive.history.queries import EntryFilter
+from lightpen.archive.chains import Kind, StoredEntry
+from lightpen.archive.checks import ArchiveCheckResult
+from lightpen.archive.history import EntryFilter, Line
 from lightpen.comparisons.pen_over_time import NewLedFile, adjust_together
-from lightpen.comparisons.trend import Trend
-from lightpen.model.limits import DueRule
+from lightpen.comparisons.records import repeatability_entries, verification_record
+from lightpen.comparisons.repeatability import Repeatability, Trend
+from lightpen.formats.opened_files import InputFile
+from lightpen.formats.own_json import file_entry
+from lightpen.model.limits import DueRule, VerificationLimits, rule_in_words
+from lightpen.model.names import Origin
+from lightpen.record.folder import attributed, keep_verification
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.words import number_text
 from lightpen_app.print_report.control import PrintReportControl
-from lightpen_app.steps.history.archive_control import NOTICE, ArchiveControl
-from lightpen_app.steps.history.archive_panel import ArchivePanel
-from lightpen_app.steps.history.due_panel import DuePanel
-from lightpen_app.steps.history.entry_panel import EntryPanel
-from lightpen_app.steps.history.filter_bar import FilterBar
-from lightpen_app.steps.history.history_table import HistoryTable
-from lightpen_app.steps.history.kept_study import keep_study
+from lightpen_app.steps.history.archive_panel import (
+    NOTICE,
+    ArchiveControl,
+    ArchivePanel,
+)
+from lightpen_app.steps.history.entry_panel import EntryPanel, EventText
+from lightpen_app.steps.history.history_table import FilterBar, HistoryTable
 from lightpen_app.steps.history.reader import FirstEntries, HistoryReader
-from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.steps.history.texts import EventText
-from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
+from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench
+
+
+def keep_study(
+    data: Path,
+    found: Repeatability,
+    entries: Sequence[StoredEntry],
+    limits: VerificationLimits,
+    operator: str,
+) -> Path:
+    """Keep a study of tips as a verification of a data folder, and return its file."""
+    events = [each.entry.event for each in entries]
+    results = [each.result for each in events if each.result is not None]
+    record = verification_record(
+        "repeatability",
+        repeatability_entries(found),
+        found.assessment,
+        {"repeatability": limits.repeatability},
+        {"files": [file_entry(InputFile(Path(r.place), r.sha256)) for r in results]},
+        rule_in_words(limits),
+    )
+    is_simulated = any(each.is_simulated for each in events)
+    origin = Origin.SIMULATED if is_simulated else events[-1].origin
+    names = replace(events[-1].names, operator=operator)
+    record = attributed(record, names, origin)
+    return keep_verification(data, record, is_simulated=is_simulated)
+
 
 T = TypeVar("T")
 TABLE_SHARE, TABS_SHARE = 3, 4  # of the height

@@ -8,13 +8,13 @@ from typing_extensions import override
 
 from lightpen_app.face import Services, event_text
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.widgets.lazy import LazyWidget
+from lightpen_app.widgets.controls import LazyWidget
+from lightpen_app.widgets.fitting import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
-    from lightpen.archive.checks.check import ArchiveCheckResult
+    from lightpen.archive.checks import ArchiveCheckResult
     from lightpen_app.steps.history.content import HistoryContent
 
 

@@ -7,19 +7,20 @@ from typing import TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
-from lightpen.archive.chains.entries import StoredEntry
-from lightpen.archive.history.due import DueTip, due_tips
-from lightpen.archive.history.history import (
+from lightpen.archive.chains import StoredEntry
+from lightpen.archive.history import (
+    DueTip,
+    EntryFilter,
     KnownNames,
     Line,
+    due_tips,
     known_names,
     lines,
     messages_on,
+    n_wanted,
 )
-from lightpen.archive.history.queries import EntryFilter, n_wanted
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook
-from lightpen.archive.logbook.logbook import ReplicationState
-from lightpen.comparisons.trend import trend_of
+from lightpen.archive.logbook import LazyLogbook, ReplicationState
+from lightpen.comparisons.repeatability import trend_of
 from lightpen.model.limits import DueRule
 from lightpen.record.library.tip_library import Library
 from lightpen_app.work.job import Job, Report

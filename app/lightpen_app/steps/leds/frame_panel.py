@@ -5,15 +5,15 @@ import math
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGroupBox
 
-from lightpen.pen_check.frame import FrameCheck, Rule, RuleCheck, RuleStatus
+from lightpen.pen_check.draft import FrameCheck, Rule, RuleCheck, RuleStatus
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import fill, grid_layout, vertical_layout
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
+from lightpen_app.look.words import set_tooltip
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.pen_view import PenPicture, PenView
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
 
 SIGNS = {
     RuleStatus.MET: (Sign.CHECK, Tone.GOOD),

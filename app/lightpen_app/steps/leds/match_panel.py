@@ -15,19 +15,23 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
 from lightpen.pen_check.shifts import MIN_SHIFT
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import vertical_layout
 from lightpen_app.look.phrases import reason_text
-from lightpen_app.look.quantities import number_text
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone
+from lightpen_app.look.words import number_text
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.state_banner import State, StateBanner
-from lightpen_app.widgets.translated import Translated
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.widgets.state_banner import (
+    SignLabel,
+    State,
+    StateBanner,
+    StatusMessage,
+)
+from lightpen_app.work.live_view import DisplayedImage
 
 
 class FixableMessage(Translated, QWidget):

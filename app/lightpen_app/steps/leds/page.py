@@ -5,25 +5,26 @@ from typing_extensions import override
 
 from lightpen.pen_check.draft import PenDraft, corrected, exchanged
 from lightpen.pen_check.match import Finding, PenMatch
-from lightpen.swing.image_sources import SourceKind
+from lightpen.swing.preparation import SourceKind
 from lightpen_app.face import Services, can_discover
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.phrases import first_missing
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.leds.draft import LedDraft, unsaved_leds_text, why_not_next
-from lightpen_app.steps.leds.file_control import LedFileControl
-from lightpen_app.steps.leds.file_panel import LedFilePanel
+from lightpen_app.steps.leds.file_panel import LedFileControl, LedFilePanel
 from lightpen_app.steps.leds.frame_panel import FramePanel
-from lightpen_app.steps.leds.match_control import MatchControl
+from lightpen_app.steps.leds.match_control import LedSimulatorControls, MatchControl
 from lightpen_app.steps.leds.match_panel import MatchPanel
-from lightpen_app.steps.leds.simulator_controls import LedSimulatorControls
 from lightpen_app.steps.leds.table_panel import LedTablePanel
+from lightpen_app.widgets.fitting import (
+    PageScroll,
+    ResponsiveLayout,
+    ShrinkingScrollContent,
+)
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.page_scroll import PageScroll, ShrinkingScrollContent
 from lightpen_app.widgets.pen_view import PenPicture
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout
-from lightpen_app.widgets.undo_buttons import UndoButtons
+from lightpen_app.widgets.tables import UndoButtons
 from lightpen_app.work.workbench import Workbench
 
 # Of table, pen in space and image

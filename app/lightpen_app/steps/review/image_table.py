@@ -7,13 +7,12 @@ from PySide6.QtCore import QItemSelection, QItemSelectionModel, QModelIndex, Qt,
 from typing_extensions import override
 
 from lightpen.detection.reasons import Reason
-from lightpen.record.swings.image_list import ImageRow
+from lightpen.record.swings.interrupted import ImageRow
 from lightpen_app.look.phrases import reason_text
-from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.tooltips import plain_tooltip
-from lightpen_app.widgets.row_table import RIGHT, Index, RowTable, TitledModel
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import decimals_for, number_text, plain_tooltip
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.tables import RIGHT, Index, RowTable, TitledModel
 
 NUMBER, MISFIT, LEDS, STATE = range(4)
 

@@ -12,25 +12,27 @@ from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen.formats.decoding import full_scale_of
-from lightpen.record.swings.image_list import ImageRow, count_left_out, worst_first
-from lightpen.record.swings.recorded_source import RecordSource
-from lightpen.record.swings.solving import Solution, load_image
-from lightpen_app.look.arrows import arrow_scale
+from lightpen.record.swings.interrupted import ImageRow, count_left_out, worst_first
+from lightpen.record.swings.solving import RecordSource, Solution, load_image
+from lightpen_app.look.figures import arrow_scale, pooled
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import grid_layout, horizontal_layout
 from lightpen_app.look.phrases import reason_text
-from lightpen_app.look.pooling import pooled
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.image_table import ImageTable
-from lightpen_app.steps.review.plot_card import PlotCard
-from lightpen_app.steps.review.residual_plots import MisfitPlot
-from lightpen_app.steps.review.residual_view import NO_ARROWS, Arrows, ResidualView
-from lightpen_app.widgets.camera_switch import CameraSwitch
+from lightpen_app.steps.review.residual_plots import (
+    NO_ARROWS,
+    Arrows,
+    MisfitPlot,
+    ResidualView,
+)
+from lightpen_app.steps.review.series_plots import PlotCard
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.figure import Axes
+from lightpen_app.widgets.fitting import NO_ROOM, ResponsiveLayout
 from lightpen_app.widgets.image_view import Marker
-from lightpen_app.widgets.responsive_layout import NO_ROOM, ResponsiveLayout
-from lightpen_app.widgets.translated import Translated
-from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
+from lightpen_app.widgets.live_markers import CameraSwitch
+from lightpen_app.widgets.tables import UndoableStep, UndoButtons
 from lightpen_app.work.job import LatestJob, Report
 
 TABLE_WIDTH = 38 * GRID

@@ -11,19 +11,19 @@ from lightpen.estimation.monte_carlo import (
     local_workers,
     run_monte_carlo,
 )
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.record.swings.solving import Solution
+from lightpen_app.look.languages import worded
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
-from lightpen_app.look.quantities import AXES, decimals_for, number_text
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, text_label
-from lightpen_app.widgets.focus import give_focus
-from lightpen_app.widgets.job_progress import JobProgress
+from lightpen_app.look.words import AXES, decimals_for, number_text
+from lightpen_app.widgets.bars import JobProgress
+from lightpen_app.widgets.controls import give_focus
+from lightpen_app.widgets.fields import Translated
 from lightpen_app.widgets.number_field import NumberField, is_refusing
-from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.widgets.tables import Figures, NumberTable
 from lightpen_app.work.job import LatestJob, Report
 
 USUAL_TRIALS, MOST_TRIALS = 200, 10_000

@@ -7,17 +7,19 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QWidget
 
-from lightpen.record.library.calibration_status import StationStatus, TipStatus
-from lightpen.record.results.next_tips import NextTip, next_tips
+from lightpen.record.library.tip_library import StationStatus, TipStatus
+from lightpen.record.results.acceptance import NextTip, next_tips
 from lightpen.record.results.results import Result
 from lightpen_app.look.layouts import horizontal_layout
 from lightpen_app.look.theme import TextSize, Tone, text_label
-from lightpen_app.look.tooltips import set_tooltip
-from lightpen_app.look.words import PARTED, shortened
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.widgets.status_mark import message_icon, status_message
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import PARTED, set_tooltip, shortened
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.state_banner import (
+    StatusMessage,
+    message_icon,
+    status_message,
+)
 from lightpen_app.work.job import LatestJob
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.selection import Selection

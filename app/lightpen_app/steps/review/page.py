@@ -10,15 +10,14 @@ from PySide6.QtWidgets import QApplication, QWidget
 from typing_extensions import override
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
-from lightpen.model.method import Method
-from lightpen.record.results.assessment import SwingAssessment
+from lightpen.model.names import Method
+from lightpen.record.results.acceptance import SwingAssessment
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import vertical_layout
-from lightpen_app.steps.review.acceptance_control import AcceptanceControl
+from lightpen_app.steps.review.acceptance import AcceptanceControl, PressTestControl
 from lightpen_app.steps.review.next_tips import NextTipsControl
-from lightpen_app.steps.review.press_control import PressTestControl
 from lightpen_app.steps.review.result_export import ResultExport
 from lightpen_app.steps.review.result_panel import reviewed_result
 from lightpen_app.steps.review.view import ReviewView

@@ -1,29 +1,218 @@
 """Opens the folder of a result, copies the tip, exports and prints the result."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QLineEdit,
+    QMenu,
+    QWidget,
+)
 
-from lightpen.archive.logbook.result_entry import with_entry
-from lightpen.estimation.reports.methods import reported
+from lightpen.archive.logbook import with_entry
+from lightpen.estimation.reports.report_warnings import reported
 from lightpen.local_time import local_now
-from lightpen.model.laboratory import Laboratory
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.calibrations.export_status import with_status
-from lightpen.record.exports.exports import copied_tip, exported_solution, save_new
+from lightpen.model.names import PLACES, Laboratory, is_country
+from lightpen.record.calibrations import read_calibration, with_status
+from lightpen.record.exports import (
+    TABLE_FORMATS,
+    ExportFormat,
+    copied_tip,
+    exported_solution,
+    save_new,
+)
+from lightpen_app.look.languages import listed, worded
+from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
+from lightpen_app.look.theme import GRID
+from lightpen_app.look.words import set_tooltip
 from lightpen_app.print_report.control import PrintReportControl
-from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
-from lightpen_app.steps.review.result_tools import Export, ResultTools
-from lightpen_app.widgets.opened_folder import open_folder
+from lightpen_app.widgets.controls import open_folder
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import FittedWindow
+from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.job import Job, Report
-from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
 if TYPE_CHECKING:
-    from lightpen_app.steps.review.plot_card import NamedPicture
+    from lightpen_app.steps.review.series_plots import NamedPicture
+
+
+LONGEST = 200  # characters
+N_NEEDED, N_FIELDS = 4, 7  # the others may be empty
+
+
+class LaboratoryDialog(FittedWindow, Translated, QDialog):
+    """Dialog for the laboratory; name, e-mail, city and country are required."""
+
+    given = Signal(object)  # Laboratory
+
+    def __init__(self, known: Laboratory | None, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.say(self, self.tr("Calibration laboratory"))
+
+        # Widgets
+        self._edits = [QLineEdit() for _ in range(N_FIELDS)]
+        places = (
+            self.tr("Laboratory"),
+            self.tr("Customer"),
+            self.tr("Branch of the laboratory"),
+            self.tr("Branch of the customer"),
+            self.tr("Elsewhere"),
+        )
+        self._place = self.say_items(QComboBox(), places)
+        texts = (
+            self.tr("Name"),
+            self.tr("E-mail address"),
+            self.tr("City"),
+            self.tr("Country code, two capital letters such as DE"),
+            self.tr("Street (optional)"),
+            self.tr("Post code (optional)"),
+            self.tr("Procedure (optional)"),
+            self.tr("Place of calibration"),
+        )
+        standard = QDialogButtonBox.StandardButton
+        self._buttons = QDialogButtonBox(standard.Ok | standard.Cancel)
+        self.say(self._buttons.button(standard.Ok), self.tr("Save..."))
+        self.say(self._buttons.button(standard.Cancel), self.tr("Cancel"))
+
+        # Layout
+        layout = vertical_layout(self, spacing=2 * GRID, margins=3 * GRID)
+        grid = grid_layout(layout, spacing=(2 * GRID, 2 * GRID))
+        fields = zip((*self._edits, self._place), texts, strict=True)
+        for i, (field, text) in enumerate(fields):
+            self.make_field(grid, field, text, at=divmod(i, 2))
+        layout.addWidget(self._buttons)
+        self.setMinimumWidth(72 * GRID)
+
+        # Connections
+        for edit in self._edits:
+            edit.setMaxLength(LONGEST)
+            edit.textChanged.connect(self._refresh)
+        self._buttons.accepted.connect(self._on_accepted)
+        self._buttons.rejected.connect(self.reject)
+
+        if known is not None:
+            *given, place = astuple(known)
+            for edit, text in zip(self._edits, given, strict=True):
+                edit.setText(text)
+            self._place.setCurrentIndex(PLACES.index(place) if place in PLACES else 0)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        texts = [edit.text().strip() for edit in self._edits[:N_NEEDED]]
+        ok = self._buttons.button(QDialogButtonBox.StandardButton.Ok)
+        ok.setEnabled(all(texts) and is_country(texts[-1]))
+
+    def _on_accepted(self) -> None:
+        texts = (edit.text().strip() for edit in self._edits)
+        place = PLACES[self._place.currentIndex()]
+        self.given.emit(replace(Laboratory(*texts), place=place))
+        self.accept()
+
+
+@dataclass(frozen=True)
+class Export:
+    """Format to save."""
+
+    formats: tuple[ExportFormat, ...]
+    has_plots: bool = False
+
+
+TABLES = TABLE_FORMATS[:3]  # without the text that is pasted
+ALL, PLOTS = Export(TABLES, has_plots=True), Export((), has_plots=True)
+
+
+class ResultTools(Translated, QWidget):
+    """Three buttons; that to save has a menu, also with formats of extensions."""
+
+    folder_requested = Signal()  # open the folder of the swing
+    copy_requested = Signal()  # copy the tip to the clipboard
+    save_requested = Signal(object)  # Export
+    report_requested = Signal()  # show the printed report
+    press_requested = Signal()  # start the press test
+
+    def __init__(self, formats: Sequence[ExportFormat] = ()) -> None:
+        super().__init__()
+        single = [Export((each,)) for each in (*TABLE_FORMATS, *formats)]
+
+        # Widgets
+        self._copy = self.make_button(self.tr("Copy tip"), self.copy_requested)
+        self._save = self.make_button(self.tr("Save..."))
+        self._save.setProperty("menu", True)
+        menu = QMenu(self._save)
+        menu.setToolTipsVisible(True)
+        self._report = self.say(menu.addAction(""), self.tr("Calibration report..."))
+        usual = [each for each in single if each.formats[0].name == "csv"]
+        others = [each for each in single if each not in usual]
+        self._actions = [(export, menu.addAction("")) for export in (*usual, ALL)]
+        self._others = self.say(menu.addMenu(""), self.tr("Other formats"))
+        self._others.setToolTipsVisible(True)
+        self._actions += [
+            (export, self._others.addAction("")) for export in (*others, PLOTS)
+        ]
+        menu.addSeparator()
+        self._folder = self.say(
+            menu.addAction(""),
+            self.tr("Open folder"),
+            tip=self.tr("Open the folder of the swing"),
+        )
+        self._save.setMenu(menu)
+        self._press = self.make_button(self.tr("Press test"), self.press_requested)
+
+        # Layout
+        horizontal_layout(self, (self._copy, 1), (self._save, 1), (self._press, 1))
+
+        # Connections
+        for export, action in self._actions:
+            action.triggered.connect(
+                lambda _=False, export=export: self.save_requested.emit(export)
+            )
+        self._report.triggered.connect(self.report_requested)
+        self._folder.triggered.connect(self.folder_requested)
+
+        self._retranslate()
+
+    def set_why_not(self, why_not: str) -> None:
+        """Disable all with a reason, or enable them."""
+        words = self.tr("Copy x, y, z in mm, separated by tabs")
+        self._copy.set_why_not(why_not, words)
+        words = self.tr("Save results and plots, named by pen, tip and date")
+        self._save.set_why_not(why_not, words)
+
+    def set_report_why_not(self, why_not: str) -> None:
+        """Disable the report with a reason, or enable it."""
+        self._report.setEnabled(not why_not)
+        tooltip = self.tr("Preview, save as PDF, or print")
+        set_tooltip(self._report, why_not or tooltip)
+
+    def set_press_why_not(self, why_not: str) -> None:
+        """Disable the press test with a reason, or enable it."""
+        tooltip = self.tr(
+            "Swing again with firm pressure and compare: shows a stylus that gives way"
+        )
+        self._press.set_why_not(why_not, tooltip)
+
+    def _retranslate(self) -> None:
+        for export, action in self._actions:
+            action.setText(self._name(export) + "...")
+            described = (worded(each.description) for each in export.formats)
+            set_tooltip(action, listed(described))
+
+    def _name(self, export: Export) -> str:
+        if export == ALL:
+            return self.tr("Record, tables and plots")
+        if export == PLOTS:
+            return self.tr("All plots (PNG)")
+        return worded(export.formats[0].label)
+
 
 DrawPlots: TypeAlias = "Callable[[], Sequence[NamedPicture]]"
 

@@ -1,34 +1,114 @@
 """The result of a swing: the tip, its uncertainty, and the change."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QFrame, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.self_check import SelfCheck
-from lightpen.estimation.reports.methods import reported
+from lightpen.estimation.bundle.consistency_test import SelfCheck
+from lightpen.estimation.reports.report_warnings import reported
 from lightpen.estimation.reports.verdict import halves_agree
 from lightpen.model.bending import Bending
-from lightpen.record.results.assessment import SwingAssessment
-from lightpen.record.swings.names import Names
+from lightpen.record.results.acceptance import SwingAssessment
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.solving import Solution
 from lightpen.swing.status import SwingStatus
-from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
-from lightpen_app.look.quantities import AXES, mm_text
-from lightpen_app.look.sentences import listed, worded
+from lightpen_app.look.languages import listed, worded
+from lightpen_app.look.layouts import (
+    fill,
+    grid_layout,
+    horizontal_layout,
+    vertical_layout,
+)
+from lightpen_app.look.phrases import GRADE_MARKS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
-from lightpen_app.look.words import day_text
-from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
-from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.look.words import AXES, day_text, mm_text
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import PageScroll
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.widgets.tables import Figures, NumberTable
 
 if TYPE_CHECKING:
-    from lightpen.comparisons.press_test import PressTest
+    from lightpen.comparisons.pen_over_time import PressTest
+
+
+@dataclass(frozen=True)
+class TipValue:
+    """A point with uncertainty, and its reference value."""
+
+    tip: tuple[float, float, float]  # mm
+    uncertainty: tuple[float, float, float]  # U (k = 2) along x, y and z, mm
+    previous: tuple[str, ...] = ()  # result, mm; empty without one
+    change: tuple[str, ...] = ()  # of the tip since then, with its U (k = 2), mm
+    nominal: tuple[str, ...] = ()  # centre by design, mm; empty without one
+    deviation: tuple[str, ...] = ()  # of the tip from it, mm
+    since: str = ""  # date of the previous result
+
+    def comparisons(self) -> tuple[tuple[str, ...], ...]:
+        """Return the columns beside tip and U."""
+        return self.previous, self.change, self.nominal, self.deviation
+
+
+class TipReadout(QWidget):
+    """Shows a tip to the digit that its uncertainty warrants, a row for each axis."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value: TipValue | None = None
+
+        # Widgets
+        self._names = [text_label(TextSize.BODY, Tone.QUIET) for _ in AXES]
+        self._numbers = [_number_label(TextSize.BODY) for _ in AXES]
+        self._uncertainties = [_number_label(TextSize.SMALL, Tone.QUIET) for _ in AXES]
+
+        # Layout
+        layout = grid_layout(self, spacing=(2 * GRID, 0))
+        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBaseline
+        columns = self._names, self._numbers, self._uncertainties
+        for column, labels in enumerate(columns):
+            for row, label in enumerate(labels):
+                layout.addWidget(label, row, column, right)
+        layout.setColumnStretch(len(columns), 1)
+        for name, axis in zip(self._names, AXES, strict=True):
+            name.setText(axis)
+
+    def value(self) -> TipValue | None:
+        """Return the tip that is shown."""
+        return self._value
+
+    def set_value(self, value: TipValue | None) -> None:
+        """Show another tip, or none."""
+        self._value = value
+        for row, axis in enumerate(AXES):
+            number, uncertainty = self._numbers[row], self._uncertainties[row]
+            if value is None:
+                number.clear()
+                uncertainty.clear()
+                continue
+            number.setText(mm_text(value.tip[row]))
+            within = mm_text(value.uncertainty[row])
+            uncertainty.setText(f"\N{PLUS-MINUS SIGN} {within}")
+            number.setAccessibleName(f"{axis} = {number.text()} mm")
+            uncertainty.setAccessibleName(f"{uncertainty.text()} mm")
+
+    def texts(self) -> tuple[str, ...]:
+        """Return the numbers of x, y and z and their uncertainties, as shown."""
+        labels = zip(self._numbers, self._uncertainties, strict=True)
+        return tuple(f"{number.text()} {u.text()}" for number, u in labels)
+
+
+def _number_label(size: TextSize, tone: Tone = Tone.PLAIN) -> QLabel:
+    label = text_label(size, tone)
+    label.setWordWrap(False)
+    label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    label.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return label
+
 
 SIDE = 3 * GRID // 2  # px, margin: figures fit a window of 800 px
 
@@ -289,3 +369,60 @@ def _with_u(values: FloatArray, u: FloatArray) -> tuple[str, ...]:
 def _in_mm(values: FloatArray) -> tuple[str, ...]:
     """Return lengths in mm."""
     return tuple(map(mm_text, values.tolist()))
+
+
+MOST = 10 * GRID  # px of height; more is scrolled
+
+
+class StatusMessageList(PageScroll):
+    """Shows messages; hidden while there are none."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value: tuple[StatusMessage, ...] = ()
+        self._labels: list[SignLabel] = []
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+        # Widgets
+        self._list = QWidget()
+
+        # Layout
+        self._layout = vertical_layout(self._list, spacing=GRID // 2)
+        self._layout.setSizeConstraint(QVBoxLayout.SizeConstraint.SetMinimumSize)
+        self.setWidget(self._list)
+
+        self.hide()
+
+    def value(self) -> tuple[StatusMessage, ...]:
+        """Return the remarks that are shown."""
+        return self._value
+
+    def set_value(self, value: Sequence[StatusMessage]) -> None:
+        """Show other remarks."""
+        value = tuple(value)
+        if value == self._value:
+            return
+        self._value = value
+        self.setAccessibleName(" ".join(remark.text for remark in value))
+        while len(self._labels) < len(value):
+            label = SignLabel()
+            self._labels.append(label)
+            self._layout.addWidget(label)
+        for i, label in enumerate(self._labels):
+            label.set_value(value[i] if i < len(value) else StatusMessage())
+        self.setVisible(bool(value))
+        self.updateGeometry()
+
+    @override
+    def sizeHint(self) -> QSize:
+        width = max(self.width(), 20 * GRID)
+        height = self._layout.totalHeightForWidth(width)
+        if height < 0:
+            height = self._layout.totalSizeHint().height()
+        return QSize(width, min(height, MOST))
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(20 * GRID, self.sizeHint().height())

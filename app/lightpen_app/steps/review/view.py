@@ -1,6 +1,10 @@
 """View of the step Review: the verdict, the result and its details."""
 
-from PySide6.QtWidgets import QWidget
+from itertools import chain
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QTabWidget, QWidget
 from typing_extensions import override
 
 from lightpen_app.face import Services, export_formats, verify_step
@@ -11,22 +15,154 @@ from lightpen_app.look.layouts import (
     vertical_layout,
 )
 from lightpen_app.look.theme import GRID, TextSize
-from lightpen_app.steps.review.detail_tabs import DetailTabs
-from lightpen_app.steps.review.message_list import StatusMessageList
 from lightpen_app.steps.review.next_tips import NextTipsRow
-from lightpen_app.steps.review.result_panel import ResultPanel, TipSummary
-from lightpen_app.steps.review.result_tools import ResultTools
+from lightpen_app.steps.review.result_export import ResultTools
+from lightpen_app.steps.review.result_panel import (
+    ResultPanel,
+    StatusMessageList,
+    TipSummary,
+)
 from lightpen_app.steps.review.view_state import ReviewPageState
-from lightpen_app.widgets.job_progress import JobProgress
-from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.reason_bar import ReasonBar, usual_reasons
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout
+from lightpen_app.widgets.bars import (
+    JobProgress,
+    QuestionBar,
+    ReasonBar,
+    WithdrawalBar,
+    usual_reasons,
+)
+from lightpen_app.widgets.controls import LazyWidget
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import (
+    PageScroll,
+    ResponsiveLayout,
+    ShrinkingScrollContent,
+)
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.widgets.translated import Translated
-from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
-from lightpen_app.work.save_place import SavePlace
+from lightpen_app.work.chosen_files import SavePlace
 from lightpen_app.work.swing_run import SwingRun
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.review.images_panel import ImagesPanel
+    from lightpen_app.steps.review.plots_panel import PlotsPanel
+    from lightpen_app.steps.review.series_plots import NamedPicture
+
+
+class DetailTabs(QTabWidget):
+    """Shows the solution of a swing; hidden tabs are filled when they are shown."""
+
+    # ImagesPanel: the tab of the images is seen for the first time
+    images_made = Signal(object)
+    # MethodsPanel: the tab of the methods is seen for the first time
+    methods_made = Signal(object)
+    # Message on a saved plot, or on a failure to save it.
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(self, run: SwingRun, place: SavePlace) -> None:
+        super().__init__()
+        self._run = run
+        self._place = place
+        self._images = LazyWidget(_make_images_panel)
+        self._residuals = LazyWidget(_make_residuals_panel)
+        self._methods: LazyWidget[PlotsPanel] = LazyWidget(_make_methods_panel)
+        self._panels: tuple[LazyWidget[ImagesPanel] | LazyWidget[PlotsPanel], ...] = (
+            self._images,
+            self._residuals,
+            LazyWidget(_make_uncertainty_panel),
+            self._methods,
+        )
+        self._tab_of = {panel: PageScroll() for panel in self._panels}
+        for panel, tab in self._tab_of.items():
+            tab.setWidget(ShrinkingScrollContent(panel))
+            self.addTab(tab, "")
+
+        # Connections
+        self._images.made.connect(self.images_made)
+        self._methods.made.connect(self.methods_made)
+        for panel in self._panels:
+            panel.made.connect(self._on_panel_made)
+        self.currentChanged.connect(self.fill)
+
+    def set_names(self, images: str, residuals: str, u: str, methods: str) -> None:
+        """Set the titles of the tabs."""
+        names = images, residuals, u, methods
+        for tab, name in zip(self._tab_of.values(), names, strict=True):
+            self.setTabText(self.indexOf(tab), name)
+
+    def images(self) -> "ImagesPanel | None":
+        """Return the images, once they were seen."""
+        return self._images.content_so_far()
+
+    def fill(self) -> None:
+        """Show the solution in the visible tab, or residuals without a solution."""
+        has_failed = self._run.status.failure is not None
+        residuals = self._tab_of[self._residuals]
+        for tab in self._tab_of.values():
+            self.setTabEnabled(self.indexOf(tab), tab is residuals or not has_failed)
+        if has_failed:
+            self.setCurrentWidget(residuals)
+        for panel, tab in self._tab_of.items():
+            if tab is self.currentWidget():
+                self._show_solution(panel.content())
+
+    def pictures(self) -> "list[NamedPicture]":
+        """Return all plots for saving, also of hidden tabs."""
+        for panel, tab in self._tab_of.items():
+            self._show_solution(panel.content())
+            tab.resize(self.currentWidget().size())
+            tab.grab()  # lays it out as if it was looked at
+        cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
+        return [card.picture() for card in cards if card.is_needed]
+
+    def shut_down(self) -> None:
+        """Cancel running jobs."""
+        for panel in self._panels:
+            content = panel.content_so_far()
+            if content is not None:
+                content.shut_down()
+
+    def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
+        solution, failure = self._run.status.solution, self._run.status.failure
+        setup, residuals = self._run.status.setup, self._residuals.content_so_far()
+        if panel.value() is not solution:
+            limit = None if setup is None else setup.limits.max_uncertainty
+            panel.set_value(solution, limit)
+        if failure is not None and setup is not None and residuals is not None:
+            residuals.set_failed(failure, setup.rig)
+
+    def _on_panel_made(self, panel: "ImagesPanel | PlotsPanel") -> None:
+        for card in panel.cards():
+            card.set_place(self._place)
+        panel.saved.connect(self.saved)
+        panel.failed.connect(self.failed)
+
+
+# Imported here: plots take a fifth of the start time, and the first window has none.
+
+
+def _make_images_panel() -> "ImagesPanel":
+    from lightpen_app.steps.review.images_panel import ImagesPanel
+
+    return ImagesPanel()
+
+
+def _make_residuals_panel() -> "PlotsPanel":
+    from lightpen_app.steps.review.plots_panel import ResidualsPanel
+
+    return ResidualsPanel()
+
+
+def _make_uncertainty_panel() -> "PlotsPanel":
+    from lightpen_app.steps.review.plots_panel import UncertaintyPanel
+
+    return UncertaintyPanel()
+
+
+def _make_methods_panel() -> "PlotsPanel":
+    from lightpen_app.steps.review.plots_panel import MethodsPanel
+
+    return MethodsPanel()
+
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 

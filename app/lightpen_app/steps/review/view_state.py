@@ -5,23 +5,26 @@ from dataclasses import dataclass
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.estimation.reports.verdict import Grade, NextStep
-from lightpen.messages import Message
-from lightpen.model.origin import Origin
+from lightpen.messages import Code, Message
+from lightpen.model.names import Origin
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.capture.state import Phase
 from lightpen.swing.status import Activity, SwingStatus
-from lightpen.swing_messages import Code
-from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import accepted_phrase, grade_text, phase_text, phrase
-from lightpen_app.look.sentences import worded
+from lightpen_app.look.languages import worded
+from lightpen_app.look.phrases import (
+    GRADE_MARKS,
+    accepted_phrase,
+    grade_text,
+    phase_text,
+    phrase,
+)
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import moment_text, shortened
+from lightpen_app.widgets.bars import Question
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.question_bar import Question
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.widgets.state_banner import State
+from lightpen_app.widgets.state_banner import State, StatusMessage
 
 translate = QCoreApplication.translate
 

@@ -19,7 +19,7 @@ from lightpen_app.steps.start.day_state import (
 from lightpen_app.steps.start.day_view import DayView
 from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 REFRESH_MS = 500

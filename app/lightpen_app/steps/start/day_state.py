@@ -6,23 +6,25 @@ from datetime import date, datetime, timedelta
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import Connection
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.local_time import local_time
-from lightpen.model.origin import Origin
-from lightpen.record.library.calibration_status import StationStatus, TipStatus
-from lightpen.record.library.tip_library import ItemKind
+from lightpen.model.names import Origin
+from lightpen.record.library.tip_library import ItemKind, StationStatus, TipStatus
 from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.face import ReadinessItem
-from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import first_missing, grade_text
-from lightpen_app.look.quantities import number_text
+from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import LEAST_SHOWN, PARTED, on_one_line, shortened
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.widgets.status_mark import status_message
+from lightpen_app.look.words import (
+    LEAST_SHOWN,
+    PARTED,
+    number_text,
+    on_one_line,
+    shortened,
+)
+from lightpen_app.widgets.state_banner import StatusMessage, status_message
 
 translate = QCoreApplication.translate
 

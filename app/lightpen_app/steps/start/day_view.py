@@ -1,13 +1,16 @@
 """The day page: tips of the station, and readiness for a swing."""
 
 from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QModelIndex, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLineEdit, QWidget
+from PySide6.QtCore import QEvent, QModelIndex, Signal
+from PySide6.QtGui import QColor, QIcon, QKeyEvent, QStandardItem, QStandardItemModel
+from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QLineEdit, QWidget
 from typing_extensions import override
 
-from lightpen.model.assumptions import COLDEST, WARMEST
+from lightpen.archive.logbook import LazyLogbook
+from lightpen.model.limits import COLDEST, WARMEST
 from lightpen_app.face import ReadinessItem
 from lightpen_app.look.layouts import (
     fill,
@@ -15,15 +18,106 @@ from lightpen_app.look.layouts import (
     set_stacked,
     vertical_layout,
 )
-from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
-from lightpen_app.look.tooltips import set_tooltip
+from lightpen_app.look.theme import (
+    GRID,
+    TextSize,
+    Tone,
+    colors_of,
+    set_tone,
+    text_label,
+)
+from lightpen_app.look.words import set_tooltip
 from lightpen_app.steps.start.day_state import TipRow
-from lightpen_app.steps.start.readiness_line import ReadinessLine
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.controls import ENTER_KEYS, LazyWidget, PushButton
+from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.row_table import RIGHT, RowTable
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage, message_icon
+from lightpen_app.widgets.tables import RIGHT, RowTable
+from lightpen_app.work.job import LatestJob, Report
+
+if TYPE_CHECKING:
+    from lightpen.comparisons.repeatability import Trend
+    from lightpen_app.widgets.trend_panel import TrendPanel
+
+
+class ReadinessLine(QFrame):
+    """Shows station and operator, what is ready, and below it what is not."""
+
+    step_requested = Signal(str)  # where an item is put right
+
+    def __init__(self, n_items: int) -> None:
+        super().__init__()
+        self.setProperty("area", "panel")
+        self._items: tuple[ReadinessItem, ...] = ()
+
+        # Widgets
+        self._place = text_label(TextSize.LEAD)
+        self._buttons = tuple(PushButton(0) for _ in range(n_items))
+        self._reasons = tuple(SignLabel() for _ in range(n_items))
+
+        # Layout
+        margins = (2 * GRID, GRID, 2 * GRID, GRID)
+        layout = vertical_layout(self, margins=margins)
+        self._row = horizontal_layout(layout, (self._place, 1))
+        pairs = (self._buttons[i : i + 2] for i in range(0, n_items, 2))
+        self._pairs = horizontal_layout(self._row)
+        for pair in pairs:
+            horizontal_layout(self._pairs, *pair, 1)
+        for reason in self._reasons:
+            layout.addWidget(reason)
+
+        # Connections
+        for index, button in enumerate(self._buttons):
+            button.setFlat(True)
+            button.clicked.connect(partial(self._on_clicked, index))
+
+    def items(self) -> tuple[ReadinessItem, ...]:
+        """Return the displayed value."""
+        return self._items
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Put the place above the items where there is little width."""
+        for row in (self._row, self._pairs):
+            set_stacked(row, narrow)
+
+    def set_place(self, place: str) -> None:
+        """Show station and operator."""
+        self._place.setText(place)
+
+    def set_items(self, items: Sequence[ReadinessItem]) -> None:
+        """Show other items; those not ready with name and reason."""
+        if tuple(items) == self._items:
+            return
+        self._items = tuple(items)
+        for button in self._buttons[len(items) :]:
+            button.hide()
+        for item, button, reason in zip(
+            items, self._buttons, self._reasons, strict=False
+        ):
+            text = item.name if item.is_amber else item.message.text
+            button.setText(text)
+            button.setIcon(message_icon(item.message, self))
+            button.setAccessibleDescription(item.message.text)
+            set_tooltip(button, item.message.text if item.is_amber else "")
+            set_tone(button, item.message.tone)
+            reason.set_value(item.message if item.is_amber else StatusMessage())
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._restyle()
+
+    def _restyle(self) -> None:
+        """Draw the signs in the present colours."""
+        for item, button in zip(self._items, self._buttons, strict=False):
+            icon = message_icon(item.message, self) if item.message.text else QIcon()
+            button.setIcon(icon)
+
+    def _on_clicked(self, index: int) -> None:
+        if index < len(self._items):
+            self.step_requested.emit(self._items[index].step)
+
 
 N_ITEMS = 4  # of the readiness line
 N_COLUMNS = 6
@@ -256,3 +350,59 @@ class DayView(Translated, QWidget):
     @override
     def _retranslate(self) -> None:
         self._fill()
+
+
+LEAST_TREND = 2  # calibrations; of one there is nothing to see but its figures
+
+
+class LargeScreenPanel(QWidget):
+    """Shows the trend of a tip that has one."""
+
+    def __init__(self, logbook: LazyLogbook) -> None:
+        super().__init__()
+        self._logbook = logbook
+        self._job = LatestJob(self)
+
+        # Widgets
+        self._trend = LazyWidget(_make_trend)
+
+        # Layout
+        vertical_layout(self, self._trend, spacing=-1)
+        self._trend.hide()
+
+    def set_value(self, pen: str, tip: str, *, is_simulated: bool) -> None:
+        """Show another tip; one without a name has no trend."""
+        self.shut_down()
+        if not (pen and tip):
+            self._show(None)
+            return
+        logbook = self._logbook
+
+        def read(_: Report) -> "Trend":
+            # Imported here: with the archive it takes 0.25 s.
+            from lightpen.archive.history import EntryFilter
+            from lightpen.comparisons.repeatability import trend_of
+
+            wanted = EntryFilter(pen=pen, tip=tip, is_simulated=is_simulated)
+            return trend_of(logbook.opened().database, wanted)
+
+        # History shows why it failed.
+        self._job.start(read, self._show, lambda _: self._show(None))
+
+    def shut_down(self) -> None:
+        """Cancel running jobs."""
+        self._job.cancel()
+
+    def _show(self, trend: "Trend | None") -> None:
+        has_trend = trend is not None and len(trend.entries) >= LEAST_TREND
+        if trend is not None and has_trend:
+            self._trend.content().set_value(trend)
+        self._trend.setVisible(has_trend)
+
+
+def _make_trend() -> "TrendPanel":
+    # Imported here: plots take a fifth of the start time, and the first window has
+    # none.
+    from lightpen_app.widgets.trend_panel import TrendPanel
+
+    return TrendPanel()

@@ -13,13 +13,10 @@ from lightpen.arrays import FloatArray
 from lightpen_app.look.layouts import fill, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.controls import ENTER_KEYS, PushButton
+from lightpen_app.widgets.fields import ChoiceField, Translated
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.widgets.status_mark import message_icon
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.state_banner import StatusMessage, message_icon
 
 NO_REMARK = StatusMessage()
 

@@ -12,7 +12,7 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.model.limits import LEAST_IMAGES, MOST_IMAGES, SwingLimits
 from lightpen.record.library.tip_library import SWUNG, ItemKind
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import MissingInput
 from lightpen_app.look.layouts import grid_layout, horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID
@@ -23,9 +23,8 @@ from lightpen_app.steps.start.fields import (
     PointField,
     StationField,
 )
-from lightpen_app.widgets.labelled import add_labelled
+from lightpen_app.widgets.fields import Translated, add_labelled
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.translated import Translated
 
 LARGEST_BALL = 100.0  # mm
 

@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.messages import printable
 from lightpen.record.results.acceptance import conclude_accepted
-from lightpen.record.results.opening import swing_folder
+from lightpen.record.results.result_folder import swing_folder
 from lightpen.record.swings.interrupted import (
     InterruptedSwings,
     discard_damaged,
@@ -18,10 +18,10 @@ from lightpen.record.swings.interrupted import (
     find_unfinished,
 )
 from lightpen.record.swings.reading import recorded_names, recorded_origin
-from lightpen.swing.resuming import Resumable, read_resumable
+from lightpen.swing.swing_recorder import Resumable, read_resumable
 from lightpen_app.face import InterruptedWork, Service
+from lightpen_app.look.languages import listed, worded
 from lightpen_app.look.phrases import missing_input_text, origin_text
-from lightpen_app.look.sentences import listed, worded
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.work.job import Job, LatestJob, Report
 from lightpen_app.work.workbench import Workbench

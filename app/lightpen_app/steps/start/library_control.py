@@ -1,13 +1,16 @@
 """The tip library at the step Start: lists, dialog and barcodes."""
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent, QWindow
 from PySide6.QtWidgets import QWidget
+from typing_extensions import override
 
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.library.library_changes import (
     Author,
     add_item,
@@ -21,14 +24,139 @@ from lightpen.record.library.tip_library import (
     Library,
     ListedTip,
 )
+from lightpen.swing.preparation import NO_SOURCE, Preparation, SourceKind
+from lightpen_app.look.phrases import missing_input_text
 from lightpen_app.look.words import shortened
-from lightpen_app.steps.start.barcode import BarcodeListener
 from lightpen_app.steps.start.fields import ItemChoice
-from lightpen_app.steps.start.form import NamesForm
+from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog, RequestedChange
-from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.status_mark import status_message
+from lightpen_app.steps.start.limits_dialog import AssumptionsPanel
+from lightpen_app.widgets.bars import Question, QuestionBar
+from lightpen_app.widgets.controls import ENTER_KEYS, WidgetMixin
+from lightpen_app.widgets.state_banner import status_message
+from lightpen_app.work.selection import Selection
 from lightpen_app.work.workbench import Workbench
+
+PACE_MS = 50  # from one key of a scanner to the next at most; a hand takes longer
+PATIENCE_MS = 60  # without a key that end a scan
+SHORTEST = 3  # characters; a hand may hit two keys at once
+MODIFIERS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
+SHIFTS = (Qt.Key.Key_Shift, Qt.Key.Key_CapsLock)
+
+
+class BarcodeListener(QObject):
+    """Intercepts a barcode and its Enter in a window, wherever the focus is.
+
+    Keys are held back for an imperceptible moment and forwarded unless they are a
+    barcode. The windowing system stamps their times, so keys that waited for a busy
+    program are not mistaken for a scanner's.
+    """
+
+    scanned = Signal(str)  # the characters of a barcode
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._window: QWindow | None = None
+        self._held: list[QKeyEvent] = []
+        self._last_ms = 0
+        self._hands_on = False
+        self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
+
+        # Connections
+        self._patience.timeout.connect(self._release)
+
+    def listen(self, window: QWindow | None) -> None:
+        """Listen to the keys of another window, or of none."""
+        if self._window is not None:
+            self._release()
+            self._window.removeEventFilter(self)
+        self._window = window
+        if window is not None:
+            window.installEventFilter(self)
+
+    def takes(self, event: QEvent) -> bool:
+        """Accept a key of a barcode before it is taken for a shortcut."""
+        if not (isinstance(event, QKeyEvent) and self.is_continuation(event)):
+            return False
+        event.accept()
+        return True
+
+    def is_continuation(self, event: QKeyEvent) -> bool:
+        """Return whether a key continues the held-back ones."""
+        pressed = event.timestamp()
+        return bool(self._held) and pressed - self._last_ms <= PACE_MS
+
+    @override
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if self._hands_on or not isinstance(event, QKeyEvent):
+            return False
+        if event.type() != QEvent.Type.KeyPress or event.key() in SHIFTS:
+            return False
+        if self._held and not self.is_continuation(event):
+            self._release()
+        if event.key() in ENTER_KEYS:
+            return self._ends_with(event)
+        if not _is_of_barcode(event) or (event.text() == " " and not self._held):
+            self._release()
+            return False
+        self._held.append(event.clone())
+        self._last_ms = event.timestamp()
+        self._patience.start()
+        return True
+
+    def _ends_with(self, event: QKeyEvent) -> bool:
+        """Report the barcode ended by Enter, or pass the keys on."""
+        code = "".join(each.text() for each in self._held)
+        if len(code) < SHORTEST:
+            self._release()
+            return False
+        self._patience.stop()
+        self._held.clear()
+        self.scanned.emit(code.strip())
+        return True
+
+    def _release(self) -> None:
+        """Pass the held-back keys on."""
+        self._patience.stop()
+        held, self._held = self._held, []
+        self._hands_on = True
+        for each in held:
+            if self._window is not None:
+                QCoreApplication.sendEvent(self._window, each)
+        self._hands_on = False
+
+
+class HearsBarcodes(WidgetMixin):
+    """Mixin before the base of a widget: listens to barcodes while it is shown."""
+
+    barcodes: BarcodeListener
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.barcodes.listen(self.window().windowHandle())
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self.barcodes.listen(None)
+
+    @override
+    def event(self, event: QEvent) -> bool:
+        """Keep the keys of a barcode from triggering shortcuts."""
+        if event.type() == QEvent.Type.ShortcutOverride:
+            return self.barcodes.takes(event) or super().event(event)
+        return super().event(event)
+
+
+def _is_of_barcode(event: QKeyEvent) -> bool:
+    text = event.text()
+    return (
+        len(text) == 1
+        and text.isprintable()
+        and not event.isAutoRepeat()
+        and not event.modifiers() & ~MODIFIERS
+    )
 
 
 class LibraryControl(QObject):
@@ -167,3 +295,154 @@ def _changed(
     if asked.is_new:
         return add_item(folder, item, by, now)
     return change_item(folder, item, by, now, asked.before)
+
+
+TYPING_PAUSE_MS = 400  # after which what was typed is taken over
+
+
+class EntryPresenter(QObject):
+    """Fills the fields from the selection and applies entries."""
+
+    edited = Signal()  # something is being typed; it may be unfinished
+
+    def __init__(
+        self,
+        selection: Selection,
+        library: LibraryControl,
+        names: NamesForm,
+        limits: LimitsForm,
+        assumed: AssumptionsPanel,
+    ) -> None:
+        super().__init__(names)
+        self._selection, self._library = selection, library
+        self._names, self._limits, self._assumed = names, limits, assumed
+        self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
+
+        # Connections
+        names.value_edited.connect(self._on_edited)
+        names.value_changed.connect(self._take_names)
+        names.station_changed.connect(self._on_station_changed)
+        names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
+        library.chosen.connect(self._on_item_chosen)
+        library.unknown_declined.connect(self._on_unknown_declined)
+        limits.value_changed.connect(self._on_limits_changed)
+        assumed.value_changed.connect(self._on_assumed_changed)
+        self._typing.timeout.connect(self._take_names)
+        selection.changed.connect(self._on_selected)
+
+        self._show(selection.preparation)
+
+    def typed(self) -> Preparation:
+        """Return the selection with the names being typed."""
+        return replace(self._selection.preparation, names=self._names.value())
+
+    def why_not_on(self) -> str:
+        """Return the missing input, or that the tip is retired."""
+        typed = self.typed()
+        missing = typed.start_missing_inputs()
+        tip = self._library.tip(typed.names.tip)
+        if missing:
+            return missing_input_text(missing[0])
+        if tip is None or not tip.is_retired:
+            return ""
+        return QCoreApplication.translate(
+            "StartPage",
+            "Tip {0} is retired. Choose another tip, or reactivate it in the tip "
+            "library.",
+        ).format(shortened(tip.id))
+
+    def _on_edited(self) -> None:
+        self._typing.start()
+        self.edited.emit()
+
+    def _take_names(self) -> None:
+        """Apply all names but the station's, which may be incomplete."""
+        self._typing.stop()
+        now = self._selection.preparation
+        names = replace(self._names.value(), station=now.names.station)
+        if names == now.names:
+            return
+        is_other = names.tip != now.names.tip
+        renamed, listed = now.renamed(names), self._library.tip(names.tip)
+        is_bare = renamed.names.ball_diameter is None
+        if is_other and listed is not None and is_bare:
+            renamed = renamed.with_listed(listed)
+        self._selection.set_preparation(renamed)
+
+    def _on_item_chosen(self, kind: ItemKind, name: str) -> None:
+        """Apply a selected pen, tip or cone; a tip with its properties."""
+        self._take_names()
+        now = self._selection.preparation
+        tip = self._library.tip(name)
+        if kind is ItemKind.TIP and tip is not None:
+            self._selection.set_preparation(now.with_listed(tip))
+        elif kind is ItemKind.PEN:
+            names = replace(now.names, pen=name)
+            self._selection.set_preparation(replace(now, names=names))
+        else:
+            names = replace(now.names, cone=name)
+            self._selection.set_preparation(replace(now, names=names))
+
+    def _on_unknown_declined(self) -> None:
+        """Ask for the tip again: the barcode belongs to another one."""
+        self._take_names()
+        now = self._selection.preparation
+        self._selection.set_preparation(now.renamed(replace(now.names, tip="")))
+
+    def _on_station_changed(self, name: str) -> None:
+        """Bring back a known station; a new one takes over the present choices."""
+        self._take_names()
+        now = self._selection.preparation
+        if name in self._selection.stations():
+            self._selection.choose_station(name)
+        else:
+            if now.names.station and now.source.kind == SourceKind.SIMULATED:
+                now = now.with_source(NO_SOURCE)  # only the station before simulates
+            now = replace(now, names=replace(now.names, station=name))
+            self._selection.set_preparation(now)
+        self._names.set_stations(self._selection.stations())
+
+    def _on_nominal_tip_changed(self) -> None:
+        now, point = self._selection.preparation, self._names.nominal_tip()
+        self._selection.set_preparation(replace(now, nominal_tip=point))
+
+    def _on_limits_changed(self) -> None:
+        now, limits = self._selection.preparation, self._limits.value()
+        self._selection.set_preparation(replace(now, limits=limits))
+
+    def _on_assumed_changed(self) -> None:
+        now, assumed = self._selection.preparation, self._assumed.value()
+        self._selection.set_preparation(now.with_assumptions(assumed))
+
+    def settle(self) -> None:
+        """Apply pending input."""
+        self._names.settle()
+        self._limits.settle()
+        self._take_names()
+        station = self._names.value().station
+        if station != self._selection.preparation.names.station:
+            self._on_station_changed(station)
+
+    def _on_selected(self, before: Preparation) -> None:
+        self._show(self._selection.preparation, before)
+
+    def _show(self, now: Preparation, before: Preparation | None = None) -> None:
+        """Update the fields that differ; others may be in use."""
+        if before is None or now.names != before.names:
+            self._typing.stop()
+            names = now.names
+            if before is not None and names.station == before.names.station:
+                names = replace(names, station=self._names.value().station)
+            self._names.set_value(names)
+        if before is None or now.names.station != before.names.station:
+            self._names.set_stations(self._selection.stations())
+        if now.limits != self._limits.value():
+            self._limits.set_value(now.limits)
+        self._limits.set_guarded(self._selection.supervision.is_guarded)
+        if now.assumptions_today != self._assumed.value():
+            self._assumed.set_value(now.assumptions_today)
+        if before is None or now.nominal_tip is not before.nominal_tip:
+            self._names.set_nominal_tip(now.nominal_tip)
+        if before is None or now.pen_file is not before.pen_file:
+            pen = None if now.pen_file is None else now.pen_file.pen
+            self._names.set_tip_of_file(None if pen is None else pen.nominal_tip)

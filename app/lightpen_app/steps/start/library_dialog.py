@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.local_time import local_now
-from lightpen.record.library.calibration_status import StationStatus, TipStatus
 from lightpen.record.library.supervision import Signature
 from lightpen.record.library.tip_library import (
     MADE,
@@ -25,21 +24,19 @@ from lightpen.record.library.tip_library import (
     AnyItem,
     ItemKind,
     ListedTip,
+    StationStatus,
+    TipStatus,
 )
 from lightpen_app.look.layouts import horizontal_layout, vertical_layout
 from lightpen_app.look.theme import GRID, TextSize, colors_of, text_label
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.start.item_form import ItemForm, kept_picture
-from lightpen_app.steps.start.tip_picture import TipPicture
-from lightpen_app.widgets.fitted_window import FittedWindow
+from lightpen_app.steps.start.item_form import ItemForm, TipPicture, kept_picture
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import EnterEdit, SupervisorFields, Translated
+from lightpen_app.widgets.fitting import FittedWindow
 from lightpen_app.widgets.number_field import is_refusing
-from lightpen_app.widgets.path_field import EnterEdit
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.row_table import RIGHT, ROW_HEIGHT, RowTable
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.status_mark import status_message
-from lightpen_app.widgets.supervisor_fields import SupervisorFields
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage, status_message
+from lightpen_app.widgets.tables import RIGHT, ROW_HEIGHT, RowTable
 
 LEAST_ROWS = 7
 WIDTHS = (11, 16, 12, 11, 15, 20)  # of the columns but the last, in GRID

@@ -9,24 +9,21 @@ from lightpen.swing.preparation import MissingInput, Preparation
 from lightpen_app.face import Services, verify_step
 from lightpen_app.look.layouts import fill, vertical_layout
 from lightpen_app.look.theme import GRID
-from lightpen_app.steps.start.barcode import HearsBarcodes
 from lightpen_app.steps.start.day_control import DayControl
-from lightpen_app.steps.start.day_view import DayView
-from lightpen_app.steps.start.entries import EntryPresenter
+from lightpen_app.steps.start.day_view import DayView, LargeScreenPanel
 from lightpen_app.steps.start.interrupted_control import InterruptedControl
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
-from lightpen_app.steps.start.large_screen_panel import LargeScreenPanel
-from lightpen_app.steps.start.last_result import LastResultPresenter
-from lightpen_app.steps.start.library_control import LibraryControl
+from lightpen_app.steps.start.library_control import (
+    EntryPresenter,
+    HearsBarcodes,
+    LibraryControl,
+)
 from lightpen_app.steps.start.limits_dialog import LimitsControl
-from lightpen_app.steps.start.result_panel import LastResultPanel
-from lightpen_app.steps.start.setup_view import SetupView
-from lightpen_app.steps.start.welcome_control import WelcomeControl
-from lightpen_app.steps.start.welcome_view import WelcomeView
+from lightpen_app.steps.start.result_panel import LastResultPanel, LastResultPresenter
+from lightpen_app.steps.start.setup_view import SetupView, WelcomeControl, WelcomeView
+from lightpen_app.widgets.bars import QuestionBar
+from lightpen_app.widgets.fitting import PageScroll, ResponsiveLayout
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.page_scroll import PageScroll
-from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.responsive_layout import ResponsiveLayout
 from lightpen_app.work.selection import is_trial_ready
 from lightpen_app.work.workbench import Workbench
 

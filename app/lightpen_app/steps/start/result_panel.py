@@ -4,32 +4,39 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QGroupBox, QLabel, QWidget
 
 from lightpen.local_time import local_time
 from lightpen.model.limits import DueRule
-from lightpen.record.library.calibration_status import TipStatus
+from lightpen.model.names import Origin
 from lightpen.record.library.supervision import Signature
+from lightpen.record.library.tip_library import TipStatus
 from lightpen.record.results.results import Result
-from lightpen_app.look.grades import GRADE_MARKS
+from lightpen.swing.preparation import Preparation
 from lightpen_app.look.layouts import (
     fill,
     grid_layout,
     horizontal_layout,
     vertical_layout,
 )
-from lightpen_app.look.phrases import grade_text
-from lightpen_app.look.quantities import AXES, mm_text
+from lightpen_app.look.phrases import GRADE_MARKS, first_missing, grade_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
-from lightpen_app.look.words import PARTED, moment_text, shortened
-from lightpen_app.widgets.origin_mark import origin_message
-from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.responsive_layout import SizeClass
-from lightpen_app.widgets.sign_label import SignLabel, StatusMessage
-from lightpen_app.widgets.status_mark import status_message
-from lightpen_app.widgets.translated import Translated
-from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
+from lightpen_app.look.words import AXES, PARTED, mm_text, moment_text, shortened
+from lightpen_app.steps.start.day_view import LargeScreenPanel
+from lightpen_app.widgets.bars import Question, QuestionBar, WithdrawalBar
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.fitting import SizeClass
+from lightpen_app.widgets.state_banner import (
+    SignLabel,
+    StatusMessage,
+    origin_message,
+    status_message,
+)
+from lightpen_app.work.job import LatestJob
+from lightpen_app.work.library_watch import LibraryWatch
+from lightpen_app.work.selection import Selection
+from lightpen_app.work.swing_run import SwingRun
 
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
 SIZES = (  # of age, words and figures, where there is little room, plenty, and more
@@ -300,3 +307,104 @@ def _cell(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:
     flags = Qt.TextInteractionFlag.TextSelectableByMouse
     label.setTextInteractionFlags(flags)
     return label
+
+
+class LastResultPresenter(QObject):
+    """Shows the last result in one panel, its swing in another."""
+
+    verification_requested = Signal()  # verify the displayed tip
+
+    def __init__(
+        self,
+        selection: Selection,
+        run: SwingRun,
+        library: LibraryWatch,
+        panel: LastResultPanel,
+        large: LargeScreenPanel,
+    ) -> None:
+        super().__init__(panel)
+        self._selection, self._run, self._library = selection, run, library
+        self._panel, self._large = panel, large
+        self._lookup = LatestJob(self)
+
+        # Connections
+        selection.changed.connect(self._on_selected)
+        library.changed.connect(self.show_status)
+        run.result_changed.connect(self.look_up)
+        panel.take_back_requested.connect(self._on_take_back_requested)
+        panel.verification_requested.connect(self.verification_requested)
+
+        self.show_status()
+
+    def look_up(self) -> None:
+        """Read the current result."""
+        self._look_up(lambda result: None)
+
+    def show_trend(self) -> None:
+        """Show the trend of the tip if there is room."""
+        pen, tip, is_simulated = _key(self._selection.preparation)
+        if not self._large.isHidden():
+            self._large.set_value(pen, tip, is_simulated=is_simulated)
+
+    def shut_down(self) -> None:
+        """Stop."""
+        self._large.shut_down()
+        self._lookup.cancel()
+
+    def _look_up(self, use: Callable[[Result | None], None]) -> None:
+        self.shut_down()
+        self.show_trend()
+        pen, tip, is_simulated = _key(self._selection.preparation)
+        if not (pen and tip):
+            self._panel.set_value(LastResult(is_named=False))
+            return
+        archive = self._run.archive
+
+        def show(result: Result | None) -> None:
+            self._panel.set_value(LastResult(result, is_simulated=is_simulated))
+            use(result)
+
+        self._lookup.start(
+            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated),
+            show,
+            self._on_failed,
+            crashed=lambda: self._on_failed(self.tr("Last calibration not available")),
+        )
+
+    def _fill_in(self, result: Result | None) -> None:
+        if result is not None:
+            completed = self._selection.preparation.completed(result)
+            self._selection.set_preparation(completed)
+
+    def _on_failed(self, sentence: str) -> None:
+        self._panel.set_value(LastResult(fault=sentence))
+
+    def _on_selected(self, before: Preparation) -> None:
+        self.show_status()
+        if _key(self._selection.preparation) != _key(before):
+            self._look_up(self._fill_in)
+
+    def show_status(self) -> None:
+        """Mark the selected tip by its status."""
+        now, library = self._selection.preparation, self._library
+        self._panel.set_guarded(self._selection.supervision.is_guarded)
+        status = library.statuses.of_tip(now.names.pen, now.names.tip)
+        self._panel.set_status(None if now.origin is Origin.SIMULATED else status)
+        due = self._selection.limits.due
+        self._panel.set_rule(library.library.rule_of(now.names.tip, due))
+        self._panel.set_why_unverified(first_missing(now.missing_inputs()))
+
+    def _on_take_back_requested(
+        self, result: Result, reason: str, signature: Signature | None
+    ) -> None:
+        operator = self._selection.preparation.names.operator
+        self._run.runner.ask(
+            lambda workflow: workflow.solving.revoke(
+                result, operator, reason, signature
+            )
+        )
+
+
+def _key(preparation: Preparation) -> tuple[str, str, bool]:
+    names = preparation.names
+    return names.pen, names.tip, preparation.origin is Origin.SIMULATED

@@ -1,16 +1,114 @@
-"""Set up station: permanent entries."""
+"""The first view of a new user, and the set-up of a station."""
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QWidget
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
 
-from lightpen_app.look.layouts import horizontal_layout, set_stacked, vertical_layout
-from lightpen_app.look.theme import GRID
-from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
-from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
+import numpy as np
+from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import Posture
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.layouts import (
+    fill,
+    horizontal_layout,
+    set_stacked,
+    vertical_layout,
+)
+from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.words import breakable
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.translated import Translated
+from lightpen_app.steps.start.limits_dialog import AssumptionsPanel
+from lightpen_app.widgets.controls import PushButton, open_folder
+from lightpen_app.widgets.fields import Translated
+from lightpen_app.widgets.pen_in_space import (
+    DisplayedPosture,
+    PenInSpace,
+    body_outline,
+    seen_from_behind,
+)
+from lightpen_app.widgets.state_banner import SignLabel, StatusMessage
+from lightpen_app.work.job import Notifications
+from lightpen_app.work.selection import TRIAL, is_trial_ready
 from lightpen_app.work.workbench import Workbench
+
+
+class DataFolderPanel(Translated, QGroupBox):
+    """Shows and opens the data folder, and other windows that use it."""
+
+    change_requested = Signal()  # choose another folder
+
+    def __init__(self, folder: Path, notifications: Notifications) -> None:
+        super().__init__()
+        self.say(self, self.tr("Data folder"))
+        self._folder = folder
+        self._notices = notifications
+        self._n_others = 0
+        self._fault = ""
+
+        # Widgets
+        self._path = text_label(TextSize.SMALL, Tone.QUIET)
+        self._path.setText(breakable(str(folder)))
+        self._open = self.say(
+            PushButton(),
+            self.tr("Open folder"),
+            name=self.tr("Open the data folder"),
+            tip=self.tr("Location of swings and results"),
+        )
+        self._change = self.say(
+            PushButton(),
+            self.tr("Change..."),
+            name=self.tr("Choose another data folder"),
+            tip=self.tr(
+                "Save swings and results in another folder from the next start."
+            ),
+        )
+        self._others = SignLabel()
+        self._doubt = SignLabel()
+
+        # Layout
+        layout = vertical_layout(self)
+        fill(layout, self._path)
+        horizontal_layout(layout, self._open, self._change, 1)
+        fill(layout, self._doubt, self._others)
+
+        # Connections
+        self._open.clicked.connect(self._on_open_clicked)
+        self._change.clicked.connect(self.change_requested)
+
+        self._retranslate()
+
+    def set_others(self, n_others: int) -> None:
+        """Show the number of other windows that use the folder."""
+        self._n_others = n_others
+        self._retranslate()
+
+    def set_fault(self, fault: str) -> None:
+        """Show why the folder cannot be written; an empty text ends it."""
+        self._fault = fault
+        self._retranslate()
+
+    def _on_open_clicked(self) -> None:
+        self._notices.show_status(open_folder(self._folder))
+
+    def _retranslate(self) -> None:
+        self._change.setProperty("inviting", bool(self._fault))
+        self._change.style().polish(self._change)
+        doubt = StatusMessage.fault(breakable(self._fault))
+        self._doubt.set_value(doubt if self._fault else StatusMessage())
+        remark = StatusMessage()
+        if self._n_others:
+            text = self.tr(
+                "The program is open in other windows using the same data folder "
+                "({0}). Results are shared."
+            ).format(self._n_others)
+            remark = StatusMessage.warning(text)
+        self._others.set_value(remark)
 
 
 class SetupView(Translated, QWidget):
@@ -76,3 +174,225 @@ class SetupView(Translated, QWidget):
     def set_why_not_done(self, why_not: str) -> None:
         """Show the missing inputs of the day page."""
         self._done.set_why_not(why_not)
+
+
+LEAST_HEIGHT, LARGEST_HEIGHT = 10 * GRID, 22 * GRID  # px, of a picture
+WORDS_HEIGHT = 21 * GRID  # px, with the margins
+LEANING = Posture(math.radians(25), math.radians(200), math.radians(15))
+RIGHT = Posture(math.radians(25), 0.0, math.radians(-15))
+COLUMNS = (0, (0, 60, 120, 180), -30), (-25, (20, 90, 160), 0), (25, (35, 105, 170), 0)
+LEDS = np.array([(x, y, z) for x, column, z in COLUMNS for y in column], np.float64)
+PEN = Pen(LEDS, np.tile([0.0, 0.0, 1.0], (len(LEDS), 1)))
+SHOWN = DisplayedPosture(PEN, np.array([0.0, -90.0, -25.0]), LEANING, RIGHT)
+Draw: TypeAlias = Callable[[QPainter, QRectF, Colors], None]
+
+
+class WelcomeView(Translated, QWidget):
+    """Offers a trial, recorded images, or the set-up of a station."""
+
+    trial_requested = Signal()  # calibrate a simulated pen
+    images_chosen = Signal(str)  # folder of recorded images
+    station_requested = Signal()  # set up a station
+
+    def __init__(self, *, offers_trial: bool) -> None:
+        super().__init__()
+
+        # Widgets
+        pen = PenInSpace()
+        pen.set_value(SHOWN)
+        self.trial = _Card(pen)
+        self._images = _Card(_Drawing(_draw_images))
+        self._station = _Card(_Drawing(_draw_station))
+
+        # Layout
+        layout = vertical_layout(self)
+        self._cards = (self.trial,) * offers_trial + (self._images, self._station)
+        self.first: QWidget = self._cards[0]
+        cards = ((each, 1) for each in self._cards)
+        horizontal_layout(layout, *cards, spacing=3 * GRID)
+        layout.addStretch(1)
+
+        # Connections
+        self.trial.clicked.connect(self.trial_requested)
+        self._images.clicked.connect(self._on_images_clicked)
+        self._station.clicked.connect(self.station_requested)
+
+        self._retranslate()
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Use smaller pictures where there is little width."""
+        for card in self._cards:
+            card.set_narrow(narrow)
+
+    def _on_images_clicked(self) -> None:
+        dialog = QFileDialog(self, self.tr("Folder of the recorded images"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.fileSelected.connect(self.images_chosen)
+        dialog.open()
+
+    def lead(self) -> str:
+        """Return what the program does."""
+        return self.tr(
+            "The tip rests in a cone while the pen is tilted to all sides; a camera "
+            "observes the LEDs of the pen. The only point of the pen that does not "
+            "move is the tip centre."
+        )
+
+    def _retranslate(self) -> None:
+        self.trial.set_words(
+            self.tr("Try it with a simulated pen"),
+            self.tr("The whole procedure without pen, camera or any entry."),
+        )
+        self._images.set_words(
+            self.tr("Calibrate from recorded images"),
+            self.tr("Choose a folder. Files of camera and LEDs in it are found."),
+        )
+        self._station.set_words(
+            self.tr("Set up my station"),
+            self.tr("Enter pen and tip, and choose the camera."),
+        )
+
+
+class _Card(PushButton):
+    """A large button: picture, title and words."""
+
+    def __init__(self, picture: QWidget) -> None:
+        super().__init__()
+        expanding = QSizePolicy.Policy.Expanding
+        picture.setSizePolicy(expanding, expanding)
+        self._picture = picture
+        self._title = text_label(TextSize.LEAD)
+        self._words = text_label(TextSize.BODY, Tone.QUIET)
+        vertical_layout(self, picture, self._title, self._words, 1, margins=2 * GRID)
+        for each in (picture, self._title, self._words):
+            each.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    def set_words(self, title: str, words: str) -> None:
+        """Set title and words."""
+        self.setAccessibleName(title)
+        self._title.setText(title)
+        self._words.setText(words)
+
+    def set_narrow(self, narrow: bool) -> None:
+        """Set the size of the picture, and by it the card's."""
+        height = LEAST_HEIGHT if narrow else LARGEST_HEIGHT
+        self._picture.setFixedHeight(height)
+        self.setFixedHeight(height + WORDS_HEIGHT)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(20 * GRID, self.minimumHeight())
+
+
+class _Drawing(QWidget):
+    """A picture drawn in the colours of the window."""
+
+    def __init__(self, draw: Draw) -> None:
+        super().__init__()
+        self._draw = draw
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self._draw(painter, QRectF(self.rect()), colors_of(self.palette()))
+
+
+def _draw_images(painter: QPainter, box: QRectF, colors: Colors) -> None:
+    """Draw a pile of three images with the LEDs of the pen."""
+    size = 0.66 * min(box.width() / 1.3, box.height())
+    frame = QRectF(0.0, 0.0, 1.3 * size, size)
+    frame.moveCenter(box.center())
+    for step in (-1, 0, 1):
+        image = frame.translated(0.14 * size * step, 0.14 * size * step)
+        painter.setPen(QPen(QColor(colors.raised), 2))
+        painter.setBrush(QColor(colors.muted))
+        painter.drawRect(image)
+    _draw_leds(painter, image, colors.raised)
+
+
+def _draw_station(painter: QPainter, box: QRectF, colors: Colors) -> None:
+    """Draw a camera on its stand that sees the LEDs of the pen."""
+    size = min(box.width() / 2.2, box.height())
+    center = box.center()
+    camera = QRectF(center.x() - size, center.y() - 0.3 * size, 0.42 * size, 0.3 * size)
+    lens = QPointF(camera.right() + 0.08 * size, camera.center().y())
+    pen = QRectF(center.x() + 0.15 * size, box.top(), 0.8 * size, box.height())
+    painter.setPen(QPen(QColor(colors.muted), 0.04 * size))
+    for foot in (-0.2, 0.0, 0.2):
+        bottom = QPointF(camera.center().x() + foot * size, center.y() + 0.45 * size)
+        painter.drawLine(QPointF(camera.center().x(), camera.bottom()), bottom)
+    painter.setPen(QPen(QColor(colors.edge), 1, Qt.PenStyle.DashLine))
+    for corner in (pen.topLeft(), pen.bottomLeft()):
+        painter.drawLine(lens, corner + QPointF(0.2 * size, 0.0))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colors.muted))
+    painter.drawRoundedRect(camera, 4, 4)
+    painter.drawEllipse(lens, 0.1 * size, 0.12 * size)
+    _draw_leds(painter, pen, colors.raised, body=colors.muted)
+
+
+def _draw_leds(painter: QPainter, box: QRectF, color: str, body: str = "") -> None:
+    """Draw the LEDs of the pen in the middle of a box, and its body in a colour."""
+    leds = seen_from_behind(SHOWN, LEANING) * (1, -1)
+    middle, extent = (leds.max(axis=0) + leds.min(axis=0)) / 2, np.ptp(leds, axis=0)
+    scale = 0.7 * float(min(np.array([box.width(), box.height()]) / extent))
+    leds = (leds - middle) * scale + box.center().toTuple()
+    if body:
+        pen = QPen(QColor(body), 14)
+        pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+        painter.setPen(pen)
+        painter.setBrush(QColor(body))
+        painter.drawPolygon(body_outline(leds))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(color))
+    for x, y in leds.tolist():
+        painter.drawEllipse(QPointF(x, y), 4, 4)
+
+
+class WelcomeControl(QObject):
+    """Begins a trial or a station."""
+
+    trial_ready = Signal()
+    trial_awaited = Signal()  # until its camera delivers an image
+    station_begun = Signal()
+
+    def __init__(
+        self, workbench: Workbench, view: WelcomeView, parent: QObject
+    ) -> None:
+        super().__init__(parent)
+        self._selection, self._run = workbench.selection, workbench.run
+        self._camera, self._view = workbench.camera, view
+
+        # Connections
+        view.trial_requested.connect(
+            lambda: workbench.files.use_trial(self._begin_trial)
+        )
+        view.images_chosen.connect(self._begin_station)
+        view.station_requested.connect(self._begin_station)
+        workbench.run.changed.connect(self.refresh)
+
+    def refresh(self) -> None:
+        """Show whether a trial can begin."""
+        is_on = self._run.status.state is not None
+        why_not = self.tr("A swing is in progress.") if is_on else ""
+        self._view.trial.set_why_not(why_not)
+
+    def _begin_trial(self) -> None:
+        if not self._camera.live.is_open:
+            self.trial_awaited.emit()
+            self._camera.open()
+        elif is_trial_ready(self._selection.preparation) and self._view.isVisible():
+            self.trial_ready.emit()
+
+    def _begin_station(self, images: str = "") -> None:
+        """Set up a station, with recorded images or without a source."""
+        names = self._selection.preparation.names
+        if names.station in ("", TRIAL.station):
+            self._selection.begin_station()
+        if images:
+            source = SourceChoice(SourceKind.RECORDED, images)
+            chosen = self._selection.preparation.with_source(source)
+            self._selection.set_preparation(chosen)
+        self.station_begun.emit()

@@ -4,9 +4,9 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import Connection
 from lightpen.swing.capture.state import SwingEvent, SwingEventKind
-from lightpen.swing.image_sources import SourceKind
+from lightpen.swing.preparation import SourceKind
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.face import Services
 from lightpen_app.look.layouts import vertical_layout
@@ -27,9 +27,9 @@ from lightpen_app.steps.swing.page_state import (
 )
 from lightpen_app.steps.swing.simulator_controls import SwingSimulatorControls
 from lightpen_app.steps.swing.view import SwingView
+from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.page import MainAction, Page
-from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to its display; states in between are skipped

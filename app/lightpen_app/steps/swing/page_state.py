@@ -7,26 +7,28 @@ from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QObject
 
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import Connection
 from lightpen.model.limits import SwingLimits
+from lightpen.swing.capture.guidance import Shortfall, measure_shortfall, missing
 from lightpen.swing.capture.kept_images import AcceptedImages
 from lightpen.swing.capture.rules import stillness
-from lightpen.swing.capture.shortfall import Shortfall, measure_shortfall, missing
 from lightpen.swing.capture.state import Pause, Phase, SwingEventKind
 from lightpen.swing.status import SwingStatus
 from lightpen.swing.workflow import SwingWorkflow
 from lightpen_app.look.phrases import phrase
 from lightpen_app.look.sounds import Sound
-from lightpen_app.look.time_left import TimeLeft
-from lightpen_app.steps.swing.live_detection import LiveDetectionView
-from lightpen_app.steps.swing.remaining_images import RemainingImages
-from lightpen_app.steps.swing.view_state import SwingViewState
+from lightpen_app.look.words import TimeLeft
+from lightpen_app.steps.swing.view_state import (
+    LiveDetectionView,
+    RemainingImages,
+    SwingViewState,
+)
 from lightpen_app.steps.swing.words import SwingWords
+from lightpen_app.widgets.bars import Question
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page import MainAction
 from lightpen_app.widgets.pen_in_space import DisplayedPosture
-from lightpen_app.widgets.question_bar import Question
-from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_app.work.live_view import LiveView
 from lightpen_app.work.swing_run import SwingRun
 

@@ -1,16 +1,81 @@
 """View state of the step Swing, as a value for the widgets."""
 
+from collections import deque
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
+from typing import Self
 
-from lightpen.cameras.worker_events import Connection
+from PySide6.QtCore import QObject
+
+from lightpen.cameras.protocol import Connection
 from lightpen.estimation.reports.verdict import Verdict
-from lightpen.model.origin import Origin
-from lightpen.model.posture import FIRST_LEAN, UPRIGHT, Posture, posture_of
-from lightpen.swing.capture.shortfall import Shortfall, turn_range
+from lightpen.live.pipeline import LiveImage
+from lightpen.model.names import Origin
+from lightpen.model.rigid import FIRST_LEAN, UPRIGHT, Posture, posture_of
+from lightpen.swing.capture.guidance import Shortfall, turn_range
 from lightpen.swing.capture.state import Phase, SwingSetup, SwingState
-from lightpen_app.steps.swing.remaining_images import RemainingImages
 from lightpen_app.widgets.posture_dial import DialValue
+from lightpen_app.work.live_view import DisplayedImage
+from lightpen_app.work.swing_run import SwingRun
+
+# Of the images to go: from so many on, rounded up to this.
+STEPS = ((30, 10), (10, 5), (-1, 1))
+LEAST_ERROR = 2  # images; a smaller change of the estimate is not shown
+
+
+@dataclass(frozen=True)
+class RemainingImages:
+    """Displayed number of images, in all and remaining.
+
+    The estimate is renewed with each image and fluctuates. The displayed number in all
+    stays until it is wrong by more than the accuracy of the estimate.
+    """
+
+    # Images at the end; the remaining ones are rounded to the accuracy of the estimate.
+    n_in_all: int
+    n_kept: int  # present images
+    n_before: int  # remaining images at the last change of ``n_in_all``
+    fraction: float  # of all images; decreases only when images are excluded
+    # Whether the last change increased the number, although none were excluded.
+    has_risen: bool = False
+
+    @property
+    def n_images(self) -> int:
+        """Remaining images."""
+        return self.n_in_all - self.n_kept
+
+    @classmethod
+    def first(cls, n_more: int, n_kept: int) -> Self:
+        """Return the first displayed number of a swing."""
+        n_images = in_true_steps(n_more)
+        n_in_all = n_kept + n_images
+        return cls(n_in_all, n_kept, n_images, n_kept / max(n_in_all, 1))
+
+    def after(self, n_more: int, n_kept: int) -> Self:
+        """Return the displayed number after the next estimate."""
+        now = self.first(n_more, n_kept)
+        if n_kept < self.n_kept:
+            return now
+        is_enough = n_kept + min(n_more, 1) <= self.n_in_all
+        error = abs(n_kept + n_more - self.n_in_all)
+        if is_enough and error <= max(_step(n_more), LEAST_ERROR):
+            fraction = n_kept / max(self.n_in_all, 1)
+            now = replace(self, n_kept=n_kept, fraction=fraction)
+        else:
+            now = replace(now, has_risen=now.n_before > self.n_before)
+        return replace(now, fraction=max(now.fraction, self.fraction))
+
+
+def in_true_steps(n_more: int) -> int:
+    """Return the number rounded up to the accuracy of the estimate."""
+    step = _step(n_more)
+    return ceil(n_more / step) * step
+
+
+def _step(n_more: int) -> int:
+    return next(step for least, step in STEPS if n_more > least)
+
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
 
@@ -128,3 +193,65 @@ def _dial(moment: SwingViewState) -> DialValue:
         turns=turn_range(moment.setup.pen, state.kept.rotations),
         heading=-(state.heading or 0.0),
     )
+
+
+RATE_S = 2.0  # over which the images are counted
+N_LAST = 20  # images that decide whether the spots match the pen
+MOST = 0.8  # of them
+MISSED = 2  # LEDs, more than a finger and a stray light explain
+
+
+class LiveDetectionView(QObject):
+    """Shows the live detection beside its swing."""
+
+    def __init__(self, run: SwingRun, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._run = run
+        self._seen: LiveImage | None = None
+        self._arrivals: deque[tuple[float, int]] = deque()  # time, number of the image
+        self._unfit: deque[bool] = deque(maxlen=N_LAST)
+
+    def take(self, shown: DisplayedImage) -> None:
+        """Process one more image."""
+        self._seen = shown.seen
+        self._unfit.append(self._is_unfit(shown.seen))
+        frame = shown.seen.frame
+        time = frame.host_ts_ns * 1e-9
+        if self._arrivals:
+            before, number = self._arrivals[-1]
+            if not 0 < time - before < RATE_S or frame.seq <= number:
+                self._arrivals.clear()  # of another stream
+        self._arrivals.append((time, frame.seq))
+        while time - self._arrivals[0][0] > RATE_S:
+            self._arrivals.popleft()
+
+    def words(self) -> str:
+        """Return the content of the last image in a few words; empty without one."""
+        seen, setup = self._seen, self._run.status.setup
+        if seen is None or setup is None:
+            return ""
+        if not setup.camera.fits(seen.frame.image):
+            return self.tr("Image size does not match this swing.")
+        if seen.detection is None or not seen.detection.has_pose:
+            text = self.tr("Bright spots: {0}, {1} fps")
+            return text.format(len(seen.spots), round(self.rate()))
+        n_leds = seen.detection.n_leds
+        text = self.tr("{0} of {1} LEDs, {2} fps")
+        return text.format(n_leds, setup.pen.n_leds, round(self.rate()))
+
+    def has_unfit_spots(self) -> bool:
+        """Return whether enough spots are seen that do not match the pen."""
+        return sum(self._unfit) >= MOST * N_LAST
+
+    def _is_unfit(self, seen: LiveImage) -> bool:
+        setup, found = self._run.status.setup, seen.detection
+        if setup is None or found is None or len(seen.spots) < setup.pen.n_leds:
+            return False
+        return not found.has_pose or found.n_leds <= setup.pen.n_leds - MISSED
+
+    def rate(self) -> float:
+        """Return the frame rate, 1/s."""
+        if len(self._arrivals) < 2:
+            return 0.0
+        (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
+        return (last - first) / (end - start)

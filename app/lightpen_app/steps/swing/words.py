@@ -10,13 +10,13 @@ from lightpen.detection.labelling.causes import UNKNOWN_CAUSE
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
 from lightpen.estimation.reports.verdict import Grade, NextStep, Verdict
-from lightpen.messages import Message, message
+from lightpen.messages import SHOW_PEN, Code, Message, message
+from lightpen.swing.capture.guidance import out_of_reach
 from lightpen.swing.capture.rules import COUNTDOWN, SLIP_REPORTED, has_just_slipped
-from lightpen.swing.capture.shortfall import out_of_reach
 from lightpen.swing.capture.state import Pause, Phase, SwingState
-from lightpen.swing_messages import SHOW_PEN, Code
-from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.languages import worded
 from lightpen_app.look.phrases import (
+    GRADE_MARKS,
     Instruction,
     accepted_phrase,
     grade_text,
@@ -25,17 +25,14 @@ from lightpen_app.look.phrases import (
     phase_text,
     phrase,
 )
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.time_left import time_left_text
-from lightpen_app.look.words import PARTED
+from lightpen_app.look.words import PARTED, time_left_text
 from lightpen_app.steps.swing.view_state import ENDED, SwingViewState
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.pen_in_space import DisplayedPosture
 from lightpen_app.widgets.posture_dial import DialValue
-from lightpen_app.widgets.sign_label import StatusMessage
-from lightpen_app.widgets.state_banner import State
+from lightpen_app.widgets.state_banner import State, StatusMessage
 
 PRESSED = (  # shown where the tip is to be pressed into the cone
     Code.SEAT_TIP,

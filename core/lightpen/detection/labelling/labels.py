@@ -19,11 +19,15 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.labelling.constellation import (
+    FAR,
     FEWEST_LEDS,
     MIN_CERTAIN_LEDS,
+    UNWHOLE,
     Constellation,
+    SpotArrays,
     certain_leds,
     constellation_of,
+    spot_arrays,
 )
 from lightpen.detection.labelling.hypotheses import (
     SearchEffort,
@@ -39,12 +43,6 @@ from lightpen.detection.labelling.matching import (
     log_false_alarms,
     match,
     settle,
-)
-from lightpen.detection.labelling.spot_arrays import (
-    FAR,
-    UNWHOLE,
-    SpotArrays,
-    spot_arrays,
 )
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera

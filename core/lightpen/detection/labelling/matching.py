@@ -1,7 +1,7 @@
 """Matching of pose hypotheses with the spots of images, refined and scored.
 
 Everything is batched over candidates, each a pose supposed for one image, and done in
-the pinhole pixels of `lightpen.detection.labelling.spot_arrays`.
+the pinhole pixels of `lightpen.detection.labelling.constellation`.
 """
 
 from collections.abc import Sequence
@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.labelling.constellation import Constellation
-from lightpen.detection.labelling.spot_arrays import SpotArrays
+from lightpen.detection.labelling.constellation import Constellation, SpotArrays
 from lightpen.model.ellipse import conic_centers, conic_images
 from lightpen.model.rigid import rotation_from_vector, with_turns
 

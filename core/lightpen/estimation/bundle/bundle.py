@@ -27,7 +27,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.component_search import find_components
-from lightpen.estimation.bundle.image_fields import FieldName, ImageField
+from lightpen.estimation.bundle.image_fields import FieldName, ImageField, SeatModes
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -38,7 +38,6 @@ from lightpen.estimation.bundle.linearised import (
     eliminate,
 )
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.seat_modes import SeatModes
 from lightpen.estimation.bundle.unknowns import (
     NO_COMPONENTS,
     Components,
@@ -47,7 +46,7 @@ from lightpen.estimation.bundle.unknowns import (
 )
 from lightpen.estimation.contact.joint import inliers
 from lightpen.estimation.variance_components import RandomEffect, find_jitter
-from lightpen.model.information import inverse
+from lightpen.model.coverage import inverse
 
 CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding

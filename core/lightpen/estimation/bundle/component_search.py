@@ -19,7 +19,7 @@ from lightpen.estimation.variance_components import (
     find_beside,
     find_component,
 )
-from lightpen.model.information import inverse
+from lightpen.model.coverage import inverse
 
 ROUNDS = 3  # of finding each component beside the others
 

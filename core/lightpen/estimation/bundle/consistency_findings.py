@@ -16,7 +16,7 @@ from lightpen.estimation.bundle.priors import Prior, Priors
 from lightpen.messages import Message, message
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, of_camera
+from lightpen.model.rigid import Rig, of_camera
 
 VAGUE = 0.2  # of a value, U (k = 2): centres alone may give a negative diameter
 RELEASED = 10.0  # standard deviation of a released prior, times the deviation found

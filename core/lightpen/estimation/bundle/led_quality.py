@@ -9,8 +9,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.contact.joint import ContactModel, JointFit
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
-from lightpen.model.rigid import fit_rigid
+from lightpen.model.rigid import Rig, fit_rigid
 
 DISPLACED = 0.03  # mm; smaller errors are taken up by the fit
 STANDS_OUT = 5.0  # times the median displacement of all LEDs

@@ -13,7 +13,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import disc_residuals
 from lightpen.estimation.contact.joint import TURN_RIDGE
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
+from lightpen.model.rigid import Rig
 
 N_TURN = 3
 N_CONE = 3

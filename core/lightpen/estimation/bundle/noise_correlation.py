@@ -23,8 +23,7 @@ from lightpen.estimation.bundle.bundle import Bundle
 from lightpen.estimation.bundle.component_search import find_components
 from lightpen.estimation.bundle.linearised import N_CONE, N_TURN, CameraView, eliminate
 from lightpen.estimation.bundle.unknowns import Components, Unknowns
-from lightpen.model.information import inverse
-from lightpen.model.quantiles import normal_quantile
+from lightpen.model.coverage import inverse, normal_quantile
 
 
 class WhitenedEquations(NamedTuple):

@@ -11,12 +11,12 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
+from lightpen.model.coverage import normal_quantile
 from lightpen.model.ellipse import disc_images
+from lightpen.model.limits import Assumptions
 from lightpen.model.pen import Pen
-from lightpen.model.quantiles import normal_quantile
-from lightpen.model.rig import Rig
+from lightpen.model.rigid import Rig
 
 # Diameter of the LED discs from the areas of their images.
 #

@@ -12,7 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.image_fields import FieldComponent, ImageField, held
+from lightpen.estimation.bundle.image_fields import (
+    MODE_COUNTS,
+    FieldComponent,
+    ImageField,
+    SeatModes,
+    held,
+)
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -21,10 +27,9 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.seat_modes import MODE_COUNTS, SeatModes
 from lightpen.estimation.variance_components import Component, RandomEffect
-from lightpen.model.effective_tip import effective_tip
-from lightpen.model.information import EXACT, inverse, known_by
+from lightpen.model.coverage import EXACT, inverse, known_by
+from lightpen.model.pen import effective_tip
 from lightpen.model.rigid import rotation_from_vector, skew
 
 NONE = Component(0.0, 0.0)

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.detection.rig_pose import derivatives_in_rig
+from lightpen.detection.rig_observations import derivatives_in_rig
 from lightpen.detection.robust_residuals import (
     NOISE_FLOOR,
     cauchy_weights,
@@ -35,10 +35,9 @@ from lightpen.detection.robust_residuals import (
 )
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
-from lightpen.model.information import inverse
+from lightpen.model.coverage import inverse
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
 
 LEAST_SIGMA = 0.005  # px, for outliers; centres of dim discs are hardly better
 OUTLIER = 5.0  # standard deviations; a normal vector in 2-D exceeds it in 4e-6

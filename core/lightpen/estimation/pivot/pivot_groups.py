@@ -18,9 +18,7 @@ from lightpen.estimation.pivot.pivot import (
     contact_matrix,
     in_deviations,
 )
-from lightpen.model.coverage import MIN_SPREAD, posture_spread
-from lightpen.model.information import EXACT
-from lightpen.model.quantiles import chi_quantile
+from lightpen.model.coverage import EXACT, MIN_SPREAD, chi_quantile, posture_spread
 
 # Covariance of a least-squares fit with residuals correlated from pose to pose.
 #

@@ -15,12 +15,17 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.bundle.image_fields import FieldName
 from lightpen.estimation.reports.verdict import Grade, NextStep
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.formats.json_records import FileRecord, ProgramName
-from lightpen.formats.own_json import Length, Vector, ZonedTime
-from lightpen.formats.stored_messages import StoredMessage, StoredValue
-from lightpen.model.assumptions import Assumptions
-from lightpen.model.method import Method
-from lightpen.model.origin import Origin
+from lightpen.formats.own_json import (
+    FileRecord,
+    Length,
+    ProgramName,
+    StoredMessage,
+    StoredValue,
+    Vector,
+    ZonedTime,
+)
+from lightpen.model.limits import Assumptions
+from lightpen.model.names import Method, Origin
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]
 Place: TypeAlias = Annotated[int, Meta(ge=1, le=10**9)]  # from 1

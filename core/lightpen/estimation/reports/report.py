@@ -40,24 +40,23 @@ from lightpen.estimation.reports.calibration_record import (
     VerdictLimits,
     VerdictRecord,
 )
-from lightpen.estimation.reports.methods import (
+from lightpen.estimation.reports.report_warnings import (
+    count_dropped,
     reported,
     result_of,
     two_stage_difference,
+    warnings_of,
 )
-from lightpen.estimation.reports.report_warnings import count_dropped, warnings_of
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.budget import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.estimation.uncertainty.second_cone import SecondCone
-from lightpen.formats.hashes import Inputs
-from lightpen.formats.json_records import THIS_PROGRAM, file_entry, plain
-from lightpen.formats.stored_messages import StoredMessage
+from lightpen.formats.opened_files import Inputs
+from lightpen.formats.own_json import THIS_PROGRAM, StoredMessage, file_entry, plain
 from lightpen.local_time import local_now
-from lightpen.model.coverage import DIRECTION_NAMES
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR, DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
-from lightpen.model.method import METHODS, Method
+from lightpen.model.names import METHODS, Method
 
 
 def calibration_record(

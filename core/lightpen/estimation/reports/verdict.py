@@ -12,22 +12,27 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.bundle.led_quality import DISPLACED
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.contact.single_images import USUAL_SIGMA
-from lightpen.estimation.reports.methods import reported, two_stage_difference
-from lightpen.estimation.reports.report_warnings import late_cameras, rejected_centres
+from lightpen.estimation.reports.report_warnings import (
+    late_cameras,
+    rejected_centres,
+    reported,
+    two_stage_difference,
+)
 from lightpen.estimation.uncertainty.budget import (
     IMAGES_SHRINK,
     ContributionName,
     SplitHalfCheck,
 )
-from lightpen.messages import Message, message
-from lightpen.model.coverage import dial_counts
-from lightpen.model.limits import SwingLimits
-from lightpen.swing_messages import (
+from lightpen.messages import (
     NO_TEMPERATURE,
     Code,
+    Message,
     file_uncertain,
+    message,
     too_little_tilt,
 )
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import SwingLimits
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 FAR_MOVED = 3.0  # times the limit of U: corrected motion of cone or camera

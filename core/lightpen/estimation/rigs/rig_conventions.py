@@ -20,8 +20,7 @@ from lightpen.estimation.contact.single_images import PosedImages
 from lightpen.estimation.rigs.rig_poses import InitialExtrinsics
 from lightpen.messages import COMMA, Message, message
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
-from lightpen.model.rigid import vector_from_rotation
+from lightpen.model.rigid import Rig, vector_from_rotation
 
 USUAL_ANGLE = np.radians(5.0)  # by which a camera may have been bumped
 USUAL_SHARE = 0.1  # of its distance from the reference

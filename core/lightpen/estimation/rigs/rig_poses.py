@@ -8,15 +8,202 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.pose import Poses
+from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.single_images import PosedImages
-from lightpen.estimation.rigs.synchrony import (
-    PenRotations,
-    TimeLag,
-    measure_lag,
-    require_same_moments,
+from lightpen.estimation.pivot.pivot import median_distance
+from lightpen.model.rigid import (
+    Rig,
+    nearest_rotation,
+    rotation_from_vector,
+    vector_from_rotation,
 )
-from lightpen.model.rig import Rig
-from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
+
+# Check that the cameras of a rig took their images at the same moments.
+#
+# Two fixed cameras see the same rotation of the pen. A camera that takes its images
+# later sees a moving pen rotated further by lag times speed; images that are paired
+# with wrong moments show arbitrary rotations.
+
+
+MIN_PAIRS = 6  # moments that two cameras see
+NEAR = 4.0  # times the median turn: pairs by which the cameras are judged
+ROUNDS = 3
+APART = 8.0  # times the median turn: images of other moments
+MANY = 0.25  # of the moments; more show a wrong pairing
+MAX_SHIFT = 10  # images by which the order of one camera may be off
+EXPLAINED = 0.3  # of the scatter of a wrong order, that the right one leaves
+UNEXPLAINED = 5.0  # times what the poses are uncertain by
+UNSTEADY = 0.02  # rad; scatter of poses that no camera file causes
+SLOW = 0.3  # rad from one image to the next, up to which a motion counts as even
+MIN_SLOW = 20  # images of such motion that determine a lag
+SIGNIFICANT = 5.0  # standard deviations
+NOTICEABLE = 2e-4  # rad: 0.04 mm at the far end of a pen
+
+
+@dataclass(frozen=True, eq=False)
+class PenRotations:
+    """Rotations of the pen at N moments, as one camera or several saw them."""
+
+    rotations: FloatArray  # (N, 3, 3)
+    variances: FloatArray  # (N,), of the three axes of each together, rad^2
+    known: BoolArray  # (N,), whether there is one
+
+    @classmethod
+    def of(cls, images: PosedImages) -> "PenRotations":
+        """Return the rotations by the images of one camera."""
+        n, chosen = len(images.reasons), images.chosen
+        poses = images.poses.of(images.kept)
+        rotations, variances = np.tile(np.eye(3), (n, 1, 1)), np.zeros(n)
+        known = np.zeros(n, dtype=bool)
+        rotations[chosen] = poses.rotations
+        variances[chosen] = np.trace(poses.covariances[:, :3, :3], axis1=1, axis2=2)
+        known[chosen] = True
+        return cls(rotations, variances, known)
+
+    def shifted(self, n_moments: int) -> "PenRotations":
+        """Return them shifted by a number of images."""
+        known = np.roll(self.known, n_moments)
+        known[: max(n_moments, 0)] = False
+        known[len(known) + min(n_moments, 0) :] = False
+        return PenRotations(
+            np.roll(self.rotations, n_moments, axis=0),
+            np.roll(self.variances, n_moments),
+            known,
+        )
+
+    def completed(self, other: "PenRotations", rotation: FloatArray) -> "PenRotations":
+        """Return these; a camera rotated by ``rotation`` fills the gaps."""
+        new = other.known & ~self.known
+        return PenRotations(
+            np.where(new[:, None, None], rotation.T @ other.rotations, self.rotations),
+            np.where(new, other.variances, self.variances),
+            self.known | new,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RelativeRotation:
+    """Relative rotation of two cameras at P common moments."""
+
+    rotation: FloatArray  # (3, 3), from the first camera to the second
+    pairs: IntArray  # (P,), the common moments
+    # (P, 3), rotation vector of each moment's deviation, frame of the first, rad.
+    off: FloatArray
+    usual: float  # length of these expected from the poses' uncertainty, rad
+
+    @property
+    def scatter(self) -> float:
+        """Median disagreement, rad."""
+        return float(np.median(np.linalg.norm(self.off, axis=1)))
+
+    @property
+    def apart(self) -> IntArray:
+        """Moments at which the cameras did not see the same posture."""
+        far = max(APART * max(self.scatter, self.usual), NOTICEABLE)
+        return np.asarray(self.pairs[np.linalg.norm(self.off, axis=1) > far])
+
+
+@dataclass(frozen=True)
+class TimeLag:
+    """Time lag of a camera."""
+
+    # `value` and `sigma`: lag in image intervals, and its standard deviation.
+    value: float
+    sigma: float
+    turn: float  # rotation of the pen in this time in the usual motion, rad
+
+    @property
+    def is_noticeable(self) -> bool:
+        """Whether it is significant and relevant beside the noise of a pose."""
+        return (
+            abs(self.value) > SIGNIFICANT * self.sigma and abs(self.turn) > NOTICEABLE
+        )
+
+
+def relative_turn(one: PenRotations, other: PenRotations) -> RelativeRotation:
+    """Return the relative rotation of the other camera, robust against outliers."""
+    pairs = np.flatnonzero(one.known & other.known)
+    each = other.rotations[pairs] @ np.swapaxes(one.rotations[pairs], 1, 2)
+    rotation = nearest_rotation(np.median(each, axis=0))
+    for _ in range(ROUNDS):
+        far = np.linalg.norm(vector_from_rotation(rotation.T @ each), axis=1)
+        rotation = nearest_rotation(each[far <= NEAR * np.median(far)].mean(axis=0))
+    variances = one.variances[pairs] + other.variances[pairs]
+    return RelativeRotation(
+        rotation=rotation,
+        pairs=pairs,
+        off=vector_from_rotation(rotation.T @ each),
+        usual=float(np.sqrt(np.median(variances) / 3)) * median_distance(),
+    )
+
+
+def require_same_moments(
+    one: PenRotations, other: PenRotations, name: str
+) -> RelativeRotation:
+    """Return the relative rotation of the other camera, if the images are simultaneous.
+
+    Raises `CalibrationError` if not, or if too few moments are seen by both.
+    """
+    n_pairs = int(np.sum(one.known & other.known))
+    if n_pairs < MIN_PAIRS:
+        raise CalibrationError(
+            "rig.few-pairs",
+            n_pairs=n_pairs,
+            n_moments=len(one.known),
+            camera=name,
+            needed=MIN_PAIRS,
+        )
+    found = relative_turn(one, other)
+    if found.scatter > UNEXPLAINED * found.usual or len(found.apart) > MANY * n_pairs:
+        _refuse_other_order(one, other, name)
+    if found.scatter > UNSTEADY or len(found.apart) > MANY * n_pairs:
+        raise CalibrationError(
+            "rig.other-moments",
+            camera=name,
+            n_apart=int(np.sum(np.linalg.norm(found.off, axis=1) > UNSTEADY)),
+            n_pairs=n_pairs,
+        )
+    return found
+
+
+def measure_lag(one: PenRotations, found: RelativeRotation) -> TimeLag | None:
+    """Estimate the time lag of the other camera.
+
+    None where the pen turns too far between two images to tell.
+    """
+    inner = found.pairs[(found.pairs > 0) & (found.pairs < len(one.known) - 1)]
+    inner = inner[one.known[inner - 1] & one.known[inner + 1]]
+    before, after = one.rotations[inner - 1], one.rotations[inner + 1]
+    speeds = vector_from_rotation(after @ np.swapaxes(before, 1, 2)) / 2
+    off = found.off[np.isin(found.pairs, inner)]
+    slow = np.linalg.norm(speeds, axis=1) < SLOW
+    slow &= np.linalg.norm(off, axis=1) <= NEAR * max(found.scatter, NOTICEABLE)
+    if slow.sum() < max(MIN_SLOW, 0.5 * len(found.pairs)):
+        return None
+    speeds, off = speeds[slow], off[slow]
+    total = float(np.sum(speeds**2))
+    value = float(np.sum(speeds * off)) / total
+    left = float(np.sum((off - value * speeds) ** 2)) / (off.size - 1)
+    return TimeLag(
+        value=value,
+        sigma=float(np.sqrt(left / total)),
+        turn=value * float(np.sqrt(total / len(speeds))),
+    )
+
+
+def _refuse_other_order(one: PenRotations, other: PenRotations, name: str) -> None:
+    """Refuse images that fit if all are paired some moments earlier or later."""
+    scatters = {}
+    for shift in range(-MAX_SHIFT, MAX_SHIFT + 1):
+        moved = other.shifted(shift)
+        if np.sum(one.known & moved.known) >= MIN_PAIRS:
+            scatters[shift] = relative_turn(one, moved).scatter
+    best = min(scatters, key=lambda shift: scatters[shift])
+    if not best or scatters[best] > EXPLAINED * scatters[0]:
+        return
+    raise CalibrationError(
+        "rig.other-order", camera=name, own=max(-best, 0) + 1, others=max(best, 0) + 1
+    )
 
 
 class RigPoses(NamedTuple):

@@ -46,21 +46,18 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.adjustment import Adjustment
+from lightpen.estimation.bundle.adjustment import Adjustment, SearchedField
 from lightpen.estimation.bundle.bundle import Bundle
-from lightpen.estimation.bundle.field_search import SearchedField
-from lightpen.estimation.bundle.image_fields import FieldName
+from lightpen.estimation.bundle.image_fields import MODE_COUNTS, FieldName
 from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.priors import Priors
-from lightpen.estimation.bundle.seat_modes import MODE_COUNTS
 from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.estimation.contact.joint import JointFit
-from lightpen.estimation.uncertainty.disc_normals import (
+from lightpen.estimation.uncertainty.second_cone import (
     covariance_of_turn,
     effect_of_normals,
 )
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.model.quantiles import chi_square_quantile
+from lightpen.model.coverage import COVERAGE_FACTOR, chi_square_quantile
 
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3

@@ -16,10 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.adjustment import shrunk_priors
+from lightpen.estimation.bundle.adjustment import (
+    SearchedField,
+    search_fields,
+    shrunk_priors,
+)
 from lightpen.estimation.bundle.bundle import Bundle, jitter_matrices, jitter_of
 from lightpen.estimation.bundle.component_search import find_components
-from lightpen.estimation.bundle.field_search import SearchedField, search_fields
+from lightpen.estimation.bundle.image_fields import seat_modes_of
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     BundleState,
@@ -28,7 +32,6 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import Priors, priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.bundle.unknowns import NO_COMPONENTS, Unknowns
 from lightpen.estimation.contact.joint import JointFit
 from lightpen.estimation.uncertainty.budget import (
@@ -39,11 +42,10 @@ from lightpen.estimation.uncertainty.budget import (
     center_errors,
     contributions_of,
 )
-from lightpen.model.assumptions import Assumptions
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
-from lightpen.model.information import inverse
+from lightpen.model.coverage import COVERAGE_FACTOR, inverse
+from lightpen.model.limits import Assumptions
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
+from lightpen.model.rigid import Rig
 
 T = TypeVar("T", bound=np.generic)
 

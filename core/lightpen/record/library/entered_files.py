@@ -8,7 +8,7 @@ the note in the user account. All others are not entered: they are passed over.
 
 import sqlite3
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from itertools import count
@@ -20,28 +20,91 @@ import msgspec
 from msgspec import Struct
 
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import create_whole
-from lightpen.messages import printable
-from lightpen.record.library.numbered_files import (
-    make_folder,
-    newest_number,
-    numbered_file,
+from lightpen.formats.files import (
+    FOLDER,
+    create_whole,
+    strerror,
+    sync_folder,
+    unreadable,
 )
-from lightpen.record.library.signing.account import (
+from lightpen.messages import printable
+from lightpen.record.library.signing import (
+    LIMITS,
+    UNAPPROVED,
+    ChainKeys,
     OwedFile,
+    SigningKey,
     approval_of,
     forget_owed,
     head_file,
     is_approved,
+    known_station_name,
     owe,
     owed_files,
     remember_chain,
     remembered_chain,
     remembered_head,
+    station_name,
 )
-from lightpen.record.library.signing.chain_keys import LIMITS, UNAPPROVED, ChainKeys
-from lightpen.record.library.signing.keys import SigningKey
-from lightpen.record.library.signing.station import known_station_name, station_name
+
+# A folder of JSON files that are written once, each named by its number in order.
+#
+# Numbers increase by one, so the order does not depend on clocks. Of two programs that
+# try the same number, one gets it and the other the next. An empty ``000007.missing``
+# reserves the number of a lost file.
+
+
+MISSING = ".missing"
+
+
+def numbered_file(folder: Path, number: int) -> Path:
+    """Return the file of a number."""
+    return folder / f"{number:06d}.json"
+
+
+def newest_number(folder: Path) -> int:
+    """Return the number of the newest file, lost ones counted; 0 without any."""
+    return max(map(number_of, _paths_in(folder)), default=0)
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder and its parents."""
+    try:
+        new = [each for each in folder.parents if not each.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        for each in (folder, *new):
+            sync_folder(each.parent)
+    except OSError as error:
+        raise FileError(
+            "results.no-folder", folder=folder, reason=strerror(error)
+        ) from error
+
+
+def numbered_files(folder: Path) -> list[Path]:
+    """Return the files, the newest first; others are left alone."""
+    files = [p for p in _paths_in(folder) if p.suffix == ".json" and number_of(p)]
+    return sorted(files, key=lambda file: (number_of(file), file.name), reverse=True)
+
+
+def reserve_number(lost: Path) -> None:
+    """Reserve the number of a lost file."""
+    make_folder(lost.parent)
+    with suppress(NameTakenError):
+        create_whole(lost.with_suffix(MISSING), b"")
+
+
+def _paths_in(folder: Path) -> list[Path]:
+    try:
+        paths = list(folder.iterdir()) if folder.is_dir() else []
+    except OSError as error:
+        raise unreadable(folder, FOLDER, error) from error
+    return [path for path in paths if path.suffix in (".json", MISSING)]
+
+
+def number_of(file: Path) -> int:
+    """Return the place of a file in the order; 0 for a foreign file."""
+    return int(file.stem) if file.stem.isdecimal() else 0
+
 
 ARCHIVE = "archive.sqlite"
 ROLLED_BACK = "archive.rolled-back"

@@ -13,16 +13,14 @@ from msgspec import structs
 from lightpen.errors import FileError, NameTakenError, UsageError
 from lightpen.formats.files import MEGABYTE, create_whole, read_bytes
 from lightpen.formats.image_headers import read_image_header
-from lightpen.formats.json_records import json_bytes
-from lightpen.formats.own_json import with_checksum
-from lightpen.formats.stored_format import FORMAT
+from lightpen.formats.own_json import FORMAT, json_bytes, with_checksum
 from lightpen.messages import Message, message, printable
 from lightpen.model.limits import MOST_DAYS, MOST_SWINGS
-from lightpen.record.library.entered_files import write_counted
-from lightpen.record.library.numbered_files import (
+from lightpen.record.library.entered_files import (
     make_folder,
     newest_number,
     numbered_file,
+    write_counted,
 )
 from lightpen.record.library.supervision import (
     Signature,

@@ -11,35 +11,181 @@ beyond the limit of U is accepted by a supervisor only.
 """
 
 import logging
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
-from datetime import datetime
+from dataclasses import dataclass, field, replace
+from datetime import date, datetime
+from itertools import chain
+
+import numpy as np
 
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.report import calibration_record
-from lightpen.estimation.reports.verdict import Grade, Verdict
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.messages import printable
-from lightpen.record.library.signing.keys import SigningKey
+from lightpen.estimation.reports.report_warnings import reported, warnings_of
+from lightpen.estimation.reports.verdict import (
+    Change,
+    Grade,
+    Verdict,
+    change_doubt,
+    change_since,
+    distance_from_nominal,
+    judge,
+    judge_change,
+    judge_unknown,
+    repeats,
+)
+from lightpen.formats.own_json import StoredMessage
+from lightpen.local_time import local_time
+from lightpen.messages import Code, Message, message, printable, too_little_tilt
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import StationLimits, SwingLimits
+from lightpen.model.names import Origin
+from lightpen.record.library.signing import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
     require_supervisor,
 )
-from lightpen.record.results.assessment import SwingAssessment, assess
+from lightpen.record.library.tip_library import (
+    KIND_WORDS,
+    SWUNG,
+    ItemKind,
+    Library,
+    ListedTip,
+)
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import InterruptedSwings
 from lightpen.record.swings.reading import (
     Record,
+    is_of_recording,
     is_press_test,
     open_record,
+    recorded_limits,
     recorded_names,
     recorded_origin,
 )
 from lightpen.record.swings.solving import Solution, record_inputs
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.swing_messages import Code
+
+
+@dataclass(frozen=True, eq=False)
+class SwingAssessment:
+    """Assessment of a solved swing."""
+
+    verdict: Verdict
+    last: Result | None  # of this pen and tip; None if none can be read
+    change: Change | None
+    doubts: tuple[Message, ...]  # besides the verdict, the worst first
+    max_change: float | None = None  # limit of the tip, mm, if it has one
+    limits: SwingLimits = field(default_factory=SwingLimits)
+    names: Names = field(default_factory=Names)  # as the library or `last` spells them
+
+
+def assess(
+    archive: FolderArchive, record: Record, solution: Solution
+) -> SwingAssessment:
+    """Judge a solved swing by itself and beside the current result."""
+    names, origin = recorded_names(record), recorded_origin(record)
+    limits, limit, last, unknown = recorded_limits(record), None, None, None
+    library = Library()
+    try:
+        limits = _limits_in_force(archive, names, limits)
+        library = archive.library()
+        listed = library.tip(names.tip)
+        limit = None if listed is None else listed.max_change_mm
+        is_simulated = origin is Origin.SIMULATED
+        last = archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
+    except (FileError, AcceptanceError) as error:
+        unknown = error.message
+    verdict, found = judge(solution.calibration, limits), reported(solution.calibration)
+    if unknown is not None:
+        verdict = judge_unknown(verdict, unknown)
+    change, doubt = None, None
+    if last is not None:
+        date = f"{local_time(last.accepted):%Y-%m-%d}"
+        change = change_since(
+            found.tip_pen,
+            found.expanded_uncertainty[:3],
+            last.tip_pen,
+            last.uncertainty,
+        )
+        doubt = change_doubt(change, date, limit)
+        verdict = judge_change(verdict, change, date, limit)
+    all_doubts = chain(
+        [] if unknown is None else [message(Code.LAST_UNKNOWN, why=unknown)],
+        [] if doubt is None else [doubt],
+        overdue_items(library, names, local_time(record.header.created).date()),
+        _far_from_nominal(solution),
+        _bare_sides(solution, limits) if is_of_recording(record) else [],
+        warnings_of(solution.calibration),
+    )
+    doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
+    return SwingAssessment(
+        verdict, last, change, doubts, limit, limits, _spelled(names, library, last)
+    )
+
+
+def _spelled(names: Names, library: Library, last: Result | None) -> Names:
+    """Return names as the library spells them, or else the current result."""
+    before = names if last is None else last.names
+    pen, tip, cone = (
+        library.item(kind, name)
+        for kind, name in zip(SWUNG, (names.pen, names.tip, names.cone), strict=True)
+    )
+    return replace(
+        names,
+        pen=before.pen if pen is None else pen.id,
+        tip=before.tip if tip is None else tip.id,
+        cone=names.cone if cone is None else cone.id,
+    )
+
+
+def _limits_in_force(
+    archive: FolderArchive, names: Names, recorded: SwingLimits
+) -> SwingLimits:
+    """Return the limits set for a station now; without any, those of the swing.
+
+    Those of the swing are in a file that anybody can edit, and may be older.
+    """
+    chosen = StationLimits(swing=recorded)
+    now = archive.supervision().limits_at(names.station, chosen).swing
+    return replace(now, spacing=recorded.spacing, min_per_field=recorded.min_per_field)
+
+
+def overdue_items(library: Library, names: Names, day: date) -> Iterator[Message]:
+    """Return the items that were overdue on the day of the swing."""
+    for item in (
+        library.item(ItemKind.PEN, names.pen),
+        library.item(ItemKind.TIP, names.tip),
+        library.item(ItemKind.CONE, names.cone),
+    ):
+        if item is not None and item.is_overdue(day):
+            yield message(
+                "doubt.overdue",
+                kind=KIND_WORDS[item.kind],
+                id=item.id,
+                due=str(item.due),
+            )
+
+
+def _far_from_nominal(solution: Solution) -> list[Message]:
+    nominal = solution.source.pen.nominal_tip
+    distance = distance_from_nominal(reported(solution.calibration).tip_pen, nominal)
+    if distance is None:
+        return []
+    return [message("doubt.far-from-nominal", distance=distance)]
+
+
+def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Message]:
+    """Return the directions without images in recorded swings."""
+    counts = dial_counts(solution.calibration.joint.rotations)[1:].sum(axis=0)
+    bare = np.flatnonzero(counts == 0)
+    if not (len(bare) and limits.min_per_field):
+        return []
+    return [too_little_tilt(limits.min_per_field * len(bare), map(int, bare))]
+
 
 BEYOND_LIMIT = {
     *(Code.UNCERTAIN, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED),
@@ -199,3 +345,46 @@ def _require_same_images(record: Record, solution: Solution) -> None:
     is_same = record.all_numbers.tolist() == solution.numbers.tolist()
     if not is_same or set(record.excluded) != set(solution.excluded):
         raise FileError("acceptance.changed", folder=record.folder)
+
+
+MOST = 4  # tips that a pen has in use, as a rule
+
+
+@dataclass(frozen=True, eq=False)
+class NextTip:
+    """A tip to be calibrated next: its last result with the pen, its entry, if any."""
+
+    pen: str
+    tip: str
+    last: Result | None
+    listed: ListedTip | None
+
+
+def next_tips(archive: FolderArchive, present: Result) -> tuple[NextTip, ...]:
+    """Return the other tips of a pen: current ones, the oldest first, then others.
+
+    Those of the library that were never calibrated with the pen follow, unless it is a
+    simulated one. Retired tips are left out; results that cannot be read are passed
+    over.
+    """
+    pen, is_simulated = present.names.pen, present.is_simulated
+    library, found = Library(), list[NextTip]()
+    with suppress(FileError):
+        library = archive.library()
+    with suppress(FileError):
+        known = archive.tips(pen, is_simulated=is_simulated)
+        tips = [tip for tip in known if tip != present.names.tip]
+        for tip in [tip for tip in tips if not library.has_retired(tip)][:MOST]:
+            with suppress(FileError):
+                last = archive.in_force(pen, tip, is_simulated=is_simulated)
+                if last is not None:
+                    found.append(NextTip(pen, tip, last, library.tip(tip)))
+        if not is_simulated:
+            new = [tip for tip in library.tips if tip not in known]
+            found = [
+                *(NextTip(pen, tip, None, library.tips[tip]) for tip in reversed(new)),
+                *found,
+            ]
+    others = [each for each in found if each.tip != present.names.tip]
+    in_use = [each for each in others if not library.has_retired(each.tip)]
+    return tuple(reversed(in_use))[:MOST]

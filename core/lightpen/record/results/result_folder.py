@@ -20,9 +20,9 @@ from lightpen.record.library.entered_files import (
     EnteredFiles,
     add_numbered,
     entered_files,
+    numbered_files,
 )
-from lightpen.record.library.numbered_files import numbered_files
-from lightpen.record.library.signing.keys import SigningKey
+from lightpen.record.library.signing import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
@@ -40,6 +40,7 @@ from lightpen.record.results.results import (
     result_bytes,
     withdrawal_bytes,
 )
+from lightpen.record.swings.reading import is_record
 
 RECORDS, RESULTS = "records", "results"
 SIMULATED = "simulated"  # folder of the files and results of the simulated pen
@@ -257,3 +258,36 @@ def _may_be(stated: str | None, name: str) -> bool:
 def _is_same(one: Result, other: Result) -> bool:
     """Return whether two results are of the same acceptance."""
     return (one.accepted, one.record) == (other.accepted, other.record)
+
+
+# Opening a swing from outside the program, by any file that belongs to it.
+#
+# A record is a folder, and no system opens a folder with a program of its own choice:
+# in each lies a small file whose name does. A result leads to the swing that it comes
+# from.
+
+
+def swing_folder(path: Path) -> Path:
+    """Return the folder of a swing by itself, a file in it, or a result.
+
+    Raises `FileError` if the path leads to no swing.
+    """
+    place = path.absolute()
+    for folder in (place, place.parent):
+        if is_record(folder):
+            return folder
+    data = data_folder_of(place)
+    if data is not None:
+        recorded = FolderArchive(data).read(place).record
+        if is_record(recorded):
+            return recorded
+        raise FileError("opening.swing-moved", file=path, folder=recorded)
+    raise FileError("opening.no-swing", path=path)
+
+
+def data_folder_of(result: Path) -> Path | None:
+    """Return the data folder that a file is a result of; None if it is in none."""
+    place = result.absolute()
+    if place.parent.name != RESULTS or place.suffix != ".json":
+        return None
+    return place.parents[2 if place.parents[1].name == SIMULATED else 1]

@@ -23,28 +23,26 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
 from lightpen.estimation.reports.verdict import Change, Grade
-from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
+    FORMAT,
     DamagedError,
     Digest,
+    LaterFormatError,
+    StoredMessage,
     Vector,
     ZonedTime,
     in_shape,
+    json_bytes,
     parse_checked,
     parse_own_json,
+    parse_stored,
+    require_format,
     require_path,
     require_usual,
     with_checksum,
 )
-from lightpen.formats.stored_format import (
-    FORMAT,
-    LaterFormatError,
-    parse_stored,
-    require_format,
-)
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.model.origin import Origin
-from lightpen.record.swings.names import Names
+from lightpen.model.names import Origin
+from lightpen.record.swings.header import Names
 
 CALIBRATION = b',\n  "calibration": '  # ends the head; JSON has no line end in a text
 END = b"\n}\n"

@@ -5,7 +5,10 @@ files it names. Header and copies each have their checksum.
 """
 
 import json
+import re
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Self
@@ -17,24 +20,52 @@ from msgspec.structs import replace
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
-from lightpen.formats.files import MEGABYTE, read_bytes
-from lightpen.formats.json_records import Plain
+from lightpen.formats.files import MEGABYTE, is_reserved, read_bytes
 from lightpen.formats.own_json import (
+    FORMAT,
     DamagedError,
     Digest,
+    LaterFormatError,
     Length,
+    Plain,
     Vector,
     ZonedTime,
+    parse_stored,
     require_path,
     require_usual,
     with_checksum,
 )
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.rig_files import RIG_FILE
-from lightpen.formats.stored_format import FORMAT, LaterFormatError, parse_stored
 from lightpen.messages import Message, message
-from lightpen.model.limits import SwingLimits
-from lightpen.record.swings.assumed import recorded_assumptions
+from lightpen.model.limits import USUAL, Assumptions, SwingLimits
+from lightpen.model.names import Method
+
+PREFIX = "assumed_"
+
+
+def assumption_entries(assumptions: Assumptions) -> dict[str, Plain]:
+    """Return assumptions as settings of a record."""
+    return {PREFIX + name: value for name, value in asdict(assumptions).items()}
+
+
+def recorded_assumptions(settings: Mapping[str, Plain]) -> Assumptions:
+    """Return the assumptions among settings; defaults for missing ones.
+
+    Raises `ValueError` if one makes no sense.
+    """
+    values = asdict(USUAL)
+    for name in values:
+        value = settings.get(PREFIX + name)
+        if isinstance(value, int | float):
+            values[name] = float(value)
+    return Assumptions(**values)
+
+
+def recorded_method(settings: Mapping[str, Plain]) -> Method:
+    """Return the method of the reported tip among settings."""
+    return "two-stage" if settings.get("method") == "two-stage" else "joint"
+
 
 HEADER = "header.json"
 HEADER_LIMIT = MEGABYTE
@@ -202,3 +233,32 @@ def number_in(settings: Mapping[str, Plain], key: str, usual: float) -> float:
     """Return a number of a record's settings, or its default."""
     value = settings.get(key)
     return value if isinstance(value, int | float) else usual
+
+
+UNFIT = re.compile(r"[^\w.-]+")  # for the name of a folder
+LONGEST_WORD = 24  # characters; of up to 4 bytes, of the 255 that a name may have
+
+
+@dataclass(frozen=True)
+class Names:
+    """Station, operator, serial number of the pen, tip, cone and ball diameter, mm."""
+
+    station: str = ""
+    operator: str = ""
+    pen: str = ""
+    tip: str = ""
+    cone: str = ""
+    ball_diameter: float | None = None
+
+
+def folder_name(names: Names, now: datetime) -> str:
+    """Return the name of a swing's folder, by the time, the pen and the tip."""
+    pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
+    words = (f"{now:%Y%m%d-%H%M%S}", pen, tip)
+    # Windows leaves dots at the end of a name out, and then finds the folder no more.
+    return not_reserved(UNFIT.sub("-", "_".join(filter(None, words))).rstrip("."))
+
+
+def not_reserved(name: str) -> str:
+    """Return a file name, changed where Windows takes it for a device: ``nul.x``."""
+    return f"_{name}" if is_reserved(name) else name

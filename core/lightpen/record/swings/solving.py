@@ -6,27 +6,148 @@ depend on which images are used; excluding one solves again without reading imag
 """
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from hashlib import sha256
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.cameras.features import pixel_format_named
 from lightpen.detection.observations import Observations, leave_out, observe_images
 from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_observations import observe_rig_images
-from lightpen.errors import CalibrationError
+from lightpen.errors import CalibrationError, FileError
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
-from lightpen.estimation.contact.camera_motion import steadied
 from lightpen.estimation.contact.joint import ContactModel, reduce
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, with_content
-from lightpen.formats.pairing import Pairing
-from lightpen.model.method import Method
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector
-from lightpen.record.swings.reading import Record
-from lightpen.record.swings.recorded_source import RecordSource, source
+from lightpen.estimation.contact.single_images import steadied
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.decoding import IMAGE_FILE, MAX_FILE_SIZE, decode_image
+from lightpen.formats.files import is_simulated, read_bytes
+from lightpen.formats.images import IMAGE_FOLDER, ImageSource
+from lightpen.formats.observation_files import Pairing
+from lightpen.formats.opened_files import Inputs, RigInputs, all_hashed, with_content
+from lightpen.formats.pen_files import read_pen
+from lightpen.formats.rig_files import read_rig
+from lightpen.model.camera import Camera
+from lightpen.model.limits import USUAL, Assumptions
+from lightpen.model.names import Method, Origin
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
+from lightpen.record.swings.header import (
+    CAMERA_STEM,
+    PEN_STEM,
+    RIG_STEM,
+    camera_stem,
+    copy_name,
+    recorded_assumptions,
+    recorded_method,
+)
+from lightpen.record.swings.reading import (
+    Record,
+    image_name,
+    is_record,
+    open_record,
+    recorded_origin,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordSource:
+    """Inputs of a calibration."""
+
+    folder: Path
+    images: ImageSource  # in the order of capture; loading raises `FileError`
+    camera: Camera
+    pen: Pen
+    masks: tuple[FloatArray, ...]  # (M, 3), stray light: x, y, radius, px
+    camera_files: tuple[Path, ...]
+    pen_file: Path
+    assumptions: Assumptions = USUAL
+    method: Method = "joint"
+    origin: Origin | None = None
+    units: str | None = None  # as of `Header`
+    led_diameter: float | None = None  # as in `Header`
+    rig: Rig | None = None
+    rig_file: Path | None = None
+    other_images: tuple[ImageSource, ...] = ()
+
+
+def source(record: Record) -> RecordSource:
+    """Return the input of the calibration of a record."""
+    header = record.header
+    camera_file = record.folder / copy_name(CAMERA_STEM, header.camera_file)
+    pen_file = record.folder / copy_name(PEN_STEM, header.pen_file)
+
+    rig_file, rig = None, None
+    camera_files: tuple[Path, ...] = (camera_file,)
+    if header.rig is not None:
+        rig_file = record.folder / copy_name(RIG_STEM, header.rig.rig_file)
+        camera_files += tuple(
+            record.folder / copy_name(camera_stem(c), file)
+            for c, file in enumerate(header.rig.camera_files, start=1)
+        )
+        rig = read_rig(rig_file, camera_files).rig
+    images = [_images_of(record, c) for c in range(len(camera_files))]
+    return RecordSource(
+        folder=record.folder,
+        images=images[0],
+        camera=read_camera(camera_file) if rig is None else rig.cameras[0],
+        pen=read_pen(
+            pen_file, header.units, header.led_diameter_mm, header.nominal_tip
+        ),
+        masks=header.masks,
+        camera_files=camera_files,
+        pen_file=pen_file,
+        assumptions=recorded_assumptions(header.settings),
+        method=recorded_method(header.settings),
+        origin=recorded_origin(record),
+        units=header.units,
+        led_diameter=header.led_diameter_mm,
+        rig=rig,
+        rig_file=rig_file,
+        other_images=tuple(images[1:]),
+    )
+
+
+def _images_of(record: Record, c: int) -> ImageSource:
+    """Return the images of the c-th camera."""
+    files = tuple(record.folder / image_name(i.number, c) for i in record.images)
+    hashes = [
+        image.sha256 if c == 0 else image.others[c - 1].sha256
+        for image in record.images
+    ]
+
+    def loaders() -> Iterator[Callable[[], Image]]:
+        for file, digest in zip(files, hashes, strict=True):
+            yield partial(_load, file, digest)
+
+    names = tuple(file.name for file in files)
+    return ImageSource(names, files, loaders, _full_scale(record, c))
+
+
+def _full_scale(record: Record, c: int) -> int | None:
+    """Return the full scale of the c-th camera's pixel format; None: not known."""
+    prefix = "" if c == 0 else "second_"
+    settings = record.header.settings
+    name = str(settings.get(f"{prefix}pixel_format", ""))
+    is_container = settings.get(f"{prefix}source") == Origin.RECORDED
+    pixel_format = pixel_format_named(name)
+    if pixel_format is None or (is_container and pixel_format.bits == 16):
+        return None
+    return pixel_format.full_scale
+
+
+def _load(file: Path, digest: str) -> Image:
+    data = read_bytes(file, IMAGE_FILE, MAX_FILE_SIZE)
+    if sha256(data).hexdigest() != digest:
+        raise FileError("record.image-changed", name=file.name)
+    return decode_image(data, file.name)
+
 
 TURNS = 8  # steps by which an image that is left out is turned into the fit
 
@@ -236,3 +357,59 @@ def _turned_to_fit(
 def _reason(text: str) -> Reason:
     known = (Reason.SLIPPED, Reason.OUTSIDE)
     return Reason(text) if text in known else Reason.TAKEN_OUT
+
+
+CAMERA_FILES = ("camera.yaml", "camera.yml", "camera.json", "camera.xml")
+CAMERA_SUFFIXES = tuple(Path(name).suffix for name in CAMERA_FILES)
+PEN_FILES = ("leds.csv", "pen.json", "leds.json", "pen.csv")
+
+
+@dataclass(frozen=True)
+class FilesBeside:
+    """Files beside recorded images that probably belong to them, if any."""
+
+    camera: Path | None = None
+    pen: Path | None = None
+
+
+def files_beside(place: str) -> FilesBeside:
+    """Return the camera and pen file in the folder of recorded images, or of a swing.
+
+    The place is a folder, pattern or video; or a camera file, which is offered itself.
+    """
+    with suppress(OSError, ValueError, FileError):
+        chosen = folder = Path(place)
+        if not folder.is_dir():
+            folder = folder.parent
+        if chosen.suffix.lower() in CAMERA_SUFFIXES and chosen.is_file():
+            camera = None if chosen.name in PEN_FILES else chosen
+            return FilesBeside(camera, _first(folder, PEN_FILES))
+        if folder.name == IMAGE_FOLDER:
+            folder = folder.parent
+        if is_record(folder):
+            header = open_record(folder).header
+            return FilesBeside(
+                folder / copy_name("camera", header.camera_file),
+                folder / copy_name("pen", header.pen_file),
+            )
+        return FilesBeside(_first(folder, CAMERA_FILES), _first(folder, PEN_FILES))
+    return FilesBeside()
+
+
+def is_simulated_recording(place: str) -> bool:
+    """Return whether images, or those of a recorded swing, were simulated."""
+    folder = Path(place)
+    if is_simulated(folder):
+        return True
+    with suppress(OSError, ValueError, FileError):
+        if folder.name == IMAGE_FOLDER:
+            folder = folder.parent
+        return is_record(folder) and (
+            recorded_origin(open_record(folder)) is Origin.SIMULATED
+        )
+    return False
+
+
+def _first(folder: Path, names: tuple[str, ...]) -> Path | None:
+    files = (folder / name for name in names)
+    return next((file for file in files if file.is_file()), None)

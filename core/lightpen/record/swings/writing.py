@@ -10,7 +10,7 @@ from io import FileIO
 from itertools import chain, count
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import IO, Self
 
 import numpy as np
 
@@ -19,29 +19,79 @@ from lightpen.cameras.protocol import Stats
 from lightpen.errors import FileError
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import sync_folder, why_unwritten, write_whole
-from lightpen.formats.part_files import sweep_parts
-from lightpen.record.swings.header import HEADER, Header, header_bytes, header_copies
-from lightpen.record.swings.journal import (
+from lightpen.formats.part_files import NO_LOCKS, locked, sweep_parts, unlock
+from lightpen.record.swings.header import (
+    HEADER,
+    Header,
+    Names,
+    folder_name,
+    header_bytes,
+    header_copies,
+)
+from lightpen.record.swings.reading import (
     JOURNAL,
+    OPENER,
     ExcludedLine,
     ImageLine,
     Line,
     MoreLine,
     OutLine,
+    Record,
     SecondaryImage,
     VerdictLine,
-    line_bytes,
-    sound_length,
-)
-from lightpen.record.swings.lock import lock_journal, unlock_journal
-from lightpen.record.swings.names import Names, folder_name
-from lightpen.record.swings.reading import (
-    OPENER,
-    Record,
     image_name,
     images_folder,
+    line_bytes,
     open_record,
+    sound_length,
 )
+
+# One program at a time writes to a record.
+#
+# The lock is one of the operating system on the open journal: it goes when the process
+# ends, however it ends, and there is no file of its own that could be left behind. It
+# keeps writers from each other; reading needs no lock and is never kept out. A network
+# disk without locks is written to without this protection.
+
+
+PATIENCE = 0.5  # s, wait for a reader or a closing process to release the lock
+
+
+def lock_journal(journal: IO[bytes], folder: Path) -> None:
+    """Keep other writers out until the journal is unlocked, or the process ends.
+
+    Raises `FileError` if another program writes to the record.
+    """
+    if not _is_taken_over(journal.fileno(), shared=False):
+        raise FileError("record.locked", folder=folder)
+
+
+def unlock_journal(journal: IO[bytes]) -> None:
+    """Let other writers in."""
+    try:
+        unlock(journal.fileno())
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether a program writes to the record of a journal."""
+    with path.open("rb") as journal:
+        if not _is_taken_over(journal.fileno(), shared=True):
+            return True
+        unlock_journal(journal)
+    return False
+
+
+def _is_taken_over(descriptor: int, shared: bool) -> bool:
+    try:
+        return locked(descriptor, shared=shared, patience_s=PATIENCE)
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            return True
+        raise
+
 
 OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
 

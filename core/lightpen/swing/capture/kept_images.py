@@ -1,27 +1,178 @@
 """The accepted images of a swing, and the running fit to them."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.pose import fit_poses
+from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.contact.joint import ContactModel, JointFit, fit_contact
-from lightpen.estimation.pivot.pivot import median_distance, outlier_distance
+from lightpen.estimation.pivot.pivot import (
+    contact_matrix,
+    contact_residuals,
+    in_deviations,
+    median_distance,
+    outlier_distance,
+    tip_covariances,
+)
+from lightpen.estimation.rigs.rig_poses import poses_in_rig
 from lightpen.estimation.uncertainty.prediction import (
     UNKNOWN_UNCERTAINTY,
     PredictedUncertainty,
     UncertaintyPrediction,
     predict_uncertainty,
 )
-from lightpen.model.assumptions import USUAL, Assumptions
-from lightpen.model.coverage import MIN_SPREAD, posture_spread
+from lightpen.model.coverage import MIN_SPREAD, chi_quantile, posture_spread
+from lightpen.model.limits import USUAL, Assumptions
 from lightpen.model.pen import Pen
-from lightpen.model.quantiles import chi_quantile
-from lightpen.model.rig import Rig
-from lightpen.swing.capture.rig_sighting import fit_moments
-from lightpen.swing.capture.seat import Seat, fit_seat, tip_distances
+from lightpen.model.rigid import Rig
+
+# Tip and cone by a few poses, and distances of poses from them.
+#
+# The equations are those of `estimation.pivot.pivot`, R_i tip_pen + t_i = cone_cam,
+# weighed by the covariances of the poses. Prior knowledge of the tip is added, so that
+# a second of hardly moving poses already gives the cone point.
+
+
+NOMINAL_SIGMA = 3.0  # mm, of a tip about its design
+UNKNOWN_SIGMA = 200.0  # mm, of a tip about the LEDs
+CONE_SIGMA = 1e4  # mm, of the cone before anything is seen
+SEATING = 0.01  # mm, by which the tip may move in a good cone
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """Tip and cone with their covariance."""
+
+    tip_pen: FloatArray  # (3,), mm
+    cone_cam: FloatArray  # (3,), mm
+    covariance: FloatArray  # (6, 6), of (tip_pen, cone_cam), mm^2
+
+
+def tip_prior(pen: Pen) -> tuple[FloatArray, float]:
+    """Return the prior of the tip, (3,), mm, and its standard deviation."""
+    if pen.nominal_tip is None:
+        return pen.leds.mean(axis=0), UNKNOWN_SIGMA
+    return pen.nominal_tip, NOMINAL_SIGMA
+
+
+def fit_seat(
+    pen: Pen, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
+) -> Seat:
+    """Fit tip and cone to poses and to a prior of the tip; see `tip_distances`."""
+    expected, sigma = tip_prior(pen)
+    spread = tip_covariances(rotations, covariances, expected) + SEATING**2 * np.eye(3)
+    A = contact_matrix(rotations)
+    AtW = np.swapaxes(A, 1, 2) @ np.linalg.inv(spread)
+    center = (rotations @ expected + translations).mean(axis=0)
+    missing = center - (rotations @ expected + translations)
+    prior = np.diag([sigma**-2] * 3 + [CONE_SIGMA**-2] * 3)
+    H = (AtW @ A).sum(axis=0) + prior
+    step = np.linalg.solve(H, (AtW @ missing[..., None]).sum(axis=0)[:, 0])
+    return Seat(expected + step[:3], center + step[3:], np.linalg.inv(H))
+
+
+def tip_offsets(
+    seat: Seat, rotations: FloatArray, translations: FloatArray
+) -> FloatArray:
+    """Return the tip by each pose minus the cone, camera frame, (N, 3), mm."""
+    return contact_residuals(rotations, translations, seat.tip_pen, seat.cone_cam)
+
+
+def tip_distances(
+    seat: Seat, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
+) -> FloatArray:
+    """Return the distances (N,) of the tip from the cone, in standard deviations.
+
+    They are 1.73 on average where the tip rests in the cone. The poses cam_from_pen are
+    rotations (N, 3, 3) and translations (N, 3), mm; their covariances (N, 6, 6) are of
+    (theta, dt), rad and mm.
+    """
+    offsets = tip_offsets(seat, rotations, translations)
+    A = contact_matrix(rotations)
+    spread = tip_covariances(rotations, covariances, seat.tip_pen)
+    spread = spread + A @ seat.covariance @ np.swapaxes(A, 1, 2)
+    return in_deviations(offsets, spread + SEATING**2 * np.eye(3))
+
+
+class SimultaneousPoses(NamedTuple):
+    """Poses rig_from_pen at N moments."""
+
+    rotations: FloatArray  # (N, 3, 3)
+    translations: FloatArray  # (N, 3), mm
+    cofactors: FloatArray  # (N, 6, 6), covariances for a noise of 1 px, rad and mm
+    sigmas: FloatArray  # (N,), standard deviation of one image coordinate, px
+
+
+def seen_by_rig(rig: Rig, pen: Pen, detection: PenDetection) -> PenDetection:
+    """Return a detection with the pose by another camera where the first has none.
+
+    It is the detection of the first camera, with the simultaneous ones of the others.
+    Unchanged if the first camera shows enough of the pen, or none does.
+    """
+    for c, seen in enumerate((detection, *detection.others)):
+        if seen.has_pose and seen.n_leds >= certain_leds(pen) and not seen.is_blurred:
+            return detection if c == 0 else _posed_by(rig, detection, c)
+    return detection
+
+
+def fit_moments(
+    rig: Rig,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    translations: FloatArray,
+) -> SimultaneousPoses:
+    """Fit the pose of each moment to the LEDs in one camera, as when captured.
+
+    The fit to pixels (N, C, L, 2), NaN where an LED was not seen, starts at rotations
+    (N, 3, 3) and translations (N, 3), mm, of rig_from_pen.
+    """
+    n_seen = np.isfinite(pixels[..., 0]).sum(axis=2)
+    enough = n_seen >= certain_leds(pen)
+    cameras = np.where(enough.any(axis=1), enough.argmax(axis=1), n_seen.argmax(axis=1))
+    n_moments = len(pixels)
+    found = SimultaneousPoses(
+        rotations.copy(),
+        translations.copy(),
+        np.zeros((n_moments, 6, 6)),
+        np.zeros(n_moments),
+    )
+    for c, camera in enumerate(rig.cameras):
+        at = np.flatnonzero(cameras == c)
+        if not len(at):
+            continue
+        R, t = rig.rotations[c], rig.translations[c]
+        start = R @ rotations[at], translations[at] @ R.T + t
+        poses = fit_poses(camera, pen, pixels[at, c], *start)
+        cofactors = poses.covariances / poses.sigma**2
+        by_rig = poses_in_rig(rig, c, poses.rotations, poses.translations, cofactors)
+        found.rotations[at], found.translations[at], found.cofactors[at] = by_rig
+        found.sigmas[at] = poses.sigma
+    return found
+
+
+def _posed_by(rig: Rig, detection: PenDetection, c: int) -> PenDetection:
+    """Return the detection with the pose by the c-th camera."""
+    seen = detection.others[c - 1]
+    R, t, cofactors = poses_in_rig(
+        rig, c, seen.rotation[None], seen.translation[None], seen.cofactors[None]
+    )
+    return replace(
+        detection,
+        reason=Reason.NONE,
+        rotation=R[0],
+        translation=t[0],
+        cofactors=cofactors[0],
+        sigma=seen.sigma,
+        posed_by=c,
+    )
+
 
 MIN_JOINT = 8  # images of the first joint fit
 LEAVING = 0.01  # probability that an image is excluded though the tip rests

@@ -1,11 +1,19 @@
-"""``lightpen measure``: measure a part by a plan, or points alone."""
+"""``lightpen measure`` and ``lightpen verify``: parts by a plan, checks of the tip."""
 
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import add_ball, add_json, add_verdict
+from lightpen.commands.arguments import (
+    above_zero,
+    add_ball,
+    add_json,
+    add_limits,
+    add_verdict,
+    finite,
+    not_negative,
+)
 from lightpen.commands.console import (
     DONE,
     printing,
@@ -15,24 +23,41 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.entering import add_entering, keep_record
+from lightpen.commands.pen_health import add_verify_pen, add_verify_press
+from lightpen.comparisons.assessment import VERIFY_AGAIN, check
 from lightpen.errors import FileError, UsageError
-from lightpen.formats.file_format import FileFormat
-from lightpen.formats.files import write_whole
+from lightpen.formats.files import FileFormat, write_whole
+from lightpen.messages import message
+from lightpen.model.artefacts import REFERENCE, Artefact, ArtefactKind, Side
 from lightpen.model.limits import rule_in_words
 from lightpen.record.swings.reading import is_record
 from lightpen_extensions.measure.commands.touched import (
     MeasuredRuns,
+    add_runs,
     add_touch_inputs,
+    given_runs,
     measure_runs,
 )
-from lightpen_extensions.measure.measuring.exports import EXPORTS
 from lightpen_extensions.measure.measuring.plan import Plan
 from lightpen_extensions.measure.measuring.plan_checks import read_plan
+from lightpen_extensions.measure.measuring.report import EXPORTS
 from lightpen_extensions.measure.probing.drift_reference import judged_with
-from lightpen_extensions.measure.reports.summaries import found_text, touches_text
+from lightpen_extensions.measure.reports import found_text, touches_text
 from lightpen_extensions.measure.tasks.part import PART
 from lightpen_extensions.measure.tasks.probed_point import point_entries
-from lightpen_extensions.measure.tasks.task import Runs, VerificationChoices, rule_of
+from lightpen_extensions.measure.tasks.registry import (
+    TASKS,
+    AnyTask,
+    measure_artefacts,
+    size_table,
+)
+from lightpen_extensions.measure.tasks.task import (
+    Found,
+    ResultTable,
+    Runs,
+    VerificationChoices,
+    rule_of,
+)
 
 POINTS = "points"
 
@@ -179,3 +204,187 @@ def _places(plan: Plan, given: Sequence[str]) -> dict[str, str]:
         if name not in found:
             raise FileError("measuring.no-touches", name=name)
     return {name: found[name] for name in names}
+
+
+RING_SIDES = {"bore": Side.INSIDE, "boss": Side.OUTSIDE}
+FACE_SIDES = {"outer": Side.OUTSIDE, "inner": Side.INSIDE}
+
+
+def add_verify(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen verify`` and its tasks."""
+    kinds = parser.add_subparsers(required=True, metavar="TASK")
+    for task in TASKS:
+        _add_task(kinds.add_parser(task.command, help=task.summary), task)
+    _add_circle(kinds.add_parser("circle", help="a ring of certified radius"))
+    _add_length(kinds.add_parser("length", help="a certified length"))
+    add_verify_pen(kinds.add_parser("pen", help="LED stability over several swings"))
+    add_verify_press(
+        kinds.add_parser("press", help="a swing with firm pressure against a usual one")
+    )
+
+
+def _add_task(parser: argparse.ArgumentParser, task: AnyTask) -> None:
+    parser.set_defaults(run=_verify_task, task=task, ball_diameter=None)
+    add_runs(parser, task.run_help)
+    if task.compares_nominal_tip:
+        parser.add_argument(
+            "--nominal-tip",
+            type=finite,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help="nominal tip centre, pen frame, mm",
+        )
+    if task.counts_drift:
+        _add_drift(parser)
+    _add_common(parser, *task.limits)
+
+
+def _add_circle(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_verify_artefact, kind=ArtefactKind.RING, sides=RING_SIDES)
+    parser.set_defaults(temperature=REFERENCE, temperature_uncertainty=0.0)
+    parser.set_defaults(expansion=0.0)
+    add_runs(parser, "once round the ring")
+    _add_size(parser, "--radius", "certified radius", "--surface")
+    _add_common(parser, "radius", "form")
+
+
+def _add_length(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(
+        run=_verify_artefact, kind=ArtefactKind.LENGTH, sides=FACE_SIDES
+    )
+    add_runs(parser, "both ends of the length at one place")
+    help_ = f"certified length at {REFERENCE:g} degrees Celsius, of all runs or of each"
+    _add_size(parser, "--length", help_, "--faces")
+    parser.add_argument(
+        "--temperature",
+        type=finite,
+        default=REFERENCE,
+        metavar="CELSIUS",
+        help=f"temperature of the artefact ({REFERENCE:g})",
+    )
+    parser.add_argument(
+        "--temperature-uncertainty",
+        type=not_negative,
+        default=1.0,
+        metavar="K",
+        help="U (k = 2) of the temperature (1)",
+    )
+    parser.add_argument(
+        "--expansion",
+        type=not_negative,
+        default=0.0,
+        metavar="PPM/K",
+        help="coefficient of thermal expansion of the artefact, such as 11.5 for steel "
+        "(0: none)",
+    )
+    _add_common(parser, "length", "length_per_m")
+
+
+def _add_size(
+    parser: argparse.ArgumentParser, argument: str, meaning: str, surface: str
+) -> None:
+    """Add a certified size with its U, and the surface that the ball touches."""
+    parser.set_defaults(size_option=argument)
+    parser.add_argument(
+        argument,
+        dest="sizes",
+        type=above_zero,
+        nargs="+",
+        required=True,
+        metavar="MM",
+        help=meaning,
+    )
+    parser.add_argument(
+        "--certified-uncertainty",
+        type=not_negative,
+        default=0.0,
+        metavar="MM",
+        help="U (k = 2) of the certified value",
+    )
+    sides = parser.get_default("sides")
+    parser.add_argument(
+        surface,
+        dest="surface",
+        choices=tuple(sides),
+        default=next(iter(sides)),
+        help="what was probed; only with --ball-diameter",
+    )
+    add_ball(parser, "ball diameter, if surfaces were touched, no groove nor cones")
+    _add_drift(parser)
+
+
+def _add_drift(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--drift",
+        type=Path,
+        metavar="DRIFT.json",
+        help="record of `verify drift` from the same session; U includes the drift",
+    )
+
+
+def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
+    add_touch_inputs(parser, "calibration to verify")
+    add_limits(parser, *limits)
+    add_json(parser)
+    add_verdict(parser)
+    add_entering(parser)
+
+
+@printing
+def _verify_task(given: argparse.Namespace) -> int:
+    task: AnyTask = given.task
+    measured = given_runs(given, is_pooled=task.is_pooled)
+    found = task.measure(measured.touches, measured.conditions, VerificationChoices())
+    tables = task.tables(found, measured.conditions)
+    return _concluded(given, measured, task, found, tables)
+
+
+@printing
+def _verify_artefact(given: argparse.Namespace) -> int:
+    measured = given_runs(given)
+    n_runs = len(measured.runs)
+    if len(given.sizes) not in (1, n_runs):
+        raise UsageError(
+            "cli.number-of-each-run",
+            option=given.size_option,
+            n_given=len(given.sizes),
+            n_runs=n_runs,
+        )
+    artefacts = [
+        Artefact(
+            given.kind,
+            size,
+            given.certified_uncertainty,
+            given.sides[given.surface] if given.ball_diameter else Side.CENTRE,
+            given.temperature,
+            given.temperature_uncertainty,
+            given.expansion,
+        )
+        for size in (given.sizes * n_runs)[:n_runs]
+    ]
+    found = measure_artefacts(
+        str(given.kind), artefacts, measured.touches, measured.conditions
+    )
+    return _concluded(given, measured, PART, found, [size_table(found)])
+
+
+def _concluded(
+    given: argparse.Namespace,
+    measured: MeasuredRuns,
+    task: AnyTask,
+    found: Found,
+    tables: Sequence[ResultTable],
+) -> int:
+    """Print, keep and return what was found."""
+    judged = judged_with(found.assessment, measured.lamp_drift)
+    if judged.is_accepted and measured.n_of_calibration:
+        n_own = measured.n_of_calibration
+        judged = check(message("verification.own-images", n=n_own), VERIFY_AGAIN)
+    rule = rule_in_words(measured.conditions.limits)
+    remarks = measured.instrument.remarks
+    print(shown(found_text(tables, judged, measured.rejected, rule, remarks)))
+    measured.print_lamp_drift(judged)
+    entries = task.entries(found, measured.instrument)
+    record = measured.record(given, task.kind, entries, judged, rule)
+    keep_record(given, record, measured.calibration, measured.origin)
+    return verdict_status(given, judged.grade)

@@ -18,35 +18,25 @@ from lightpen.commands.console import (
     shown,
 )
 from lightpen.commands.entering import limits_in_force
-from lightpen.comparisons.assessment import VerificationAssessment
-from lightpen.comparisons.recorded_tasks import read_drift
+from lightpen.comparisons.assessment import VerificationAssessment, read_drift
 from lightpen.comparisons.records import verification_record
 from lightpen.detection.observations import Observations, Report, observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.hashes import InputFile, all_hashed, hashed
-from lightpen.formats.json_records import file_entry
+from lightpen.formats.opened_files import InputFile, all_hashed, hashed
+from lightpen.formats.own_json import file_entry
 from lightpen.formats.pen_files import read_pen
 from lightpen.messages import Message
-from lightpen.model.assumptions import BALL_UNCERTAINTY
-from lightpen.model.origin import Origin
+from lightpen.model.limits import BALL_UNCERTAINTY
+from lightpen.model.names import Origin
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.tip_bending import bending_of
-from lightpen.record.folder.verifications import conditions_entries
+from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
+from lightpen.record.folder import conditions_entries
 from lightpen_extensions.measure.probing.current_tip import cone_before
 from lightpen_extensions.measure.probing.drift_reference import (
     LampDrift,
     LampObservations,
     lamp_drift_entries,
-)
-from lightpen_extensions.measure.probing.image_locations import (
-    ImageLocation,
-    PenCameras,
-    RecordedConditions,
-    RecordedTouch,
-    read_viewers,
-    touch_place,
 )
 from lightpen_extensions.measure.probing.probing import (
     FAST,
@@ -56,10 +46,16 @@ from lightpen_extensions.measure.probing.probing import (
     ProbingRules,
 )
 from lightpen_extensions.measure.probing.sources import (
+    ImageLocation,
+    PenCameras,
     ProbingRun,
+    RecordedConditions,
+    RecordedTouch,
     instrument_of,
     lamp_drift_of,
     observe_place,
+    read_viewers,
+    touch_place,
     touches_of,
 )
 from lightpen_extensions.measure.storage.session_files import (

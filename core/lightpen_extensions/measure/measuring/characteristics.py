@@ -21,14 +21,18 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.artefacts import Side
-from lightpen.model.expanded_uncertainty import COVERAGE
-from lightpen.model.information import symmetric_root
+from lightpen.model.coverage import COVERAGE, symmetric_root
 from lightpen_extensions.measure.measuring import constructions
-from lightpen_extensions.measure.measuring.compensation import TouchedSurface
+from lightpen_extensions.measure.measuring.alignment import Quantity, derive
+from lightpen_extensions.measure.measuring.compensation import (
+    Criterion,
+    TouchedSurface,
+    fit_zone,
+)
 from lightpen_extensions.measure.measuring.features import AXIS, PLACE, Feature
+from lightpen_extensions.measure.measuring.next_touch import PartTouches
 from lightpen_extensions.measure.measuring.plan import CharacteristicKind as Of
 from lightpen_extensions.measure.measuring.plan import Nominal, PlannedCharacteristic
-from lightpen_extensions.measure.measuring.quantities import Quantity, derive
 from lightpen_extensions.measure.measuring.surfaces import (
     AXIAL,
     CENTRED,
@@ -36,8 +40,6 @@ from lightpen_extensions.measure.measuring.surfaces import (
     RADIAL,
     FeatureKind,
 )
-from lightpen_extensions.measure.measuring.touches import PartTouches
-from lightpen_extensions.measure.measuring.zones import Criterion, fit_zone
 
 N_DRAWS = 4000
 PARALLEL = 5.0  # degrees, between axes that are meant to be parallel

@@ -10,14 +10,17 @@ from msgspec import structs
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.model.artefacts import Side
-from lightpen.model.decision_rules import Decision, conformity_probability, decide
+from lightpen.model.coverage import Decision, conformity_probability, decide
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.measure.measuring import constructions
 from lightpen_extensions.measure.measuring.alignment import (
     Alignment,
+    Quantity,
     align_321,
     align_points,
+    derive,
+    quantity_of,
 )
 from lightpen_extensions.measure.measuring.characteristics import (
     DEVIATIONS,
@@ -26,19 +29,23 @@ from lightpen_extensions.measure.measuring.characteristics import (
     evaluate,
 )
 from lightpen_extensions.measure.measuring.compensation import (
+    Criterion,
     Evidence,
     Normal,
     ProbedFeature,
     TouchedSurface,
     along_touches,
+    fit_zone,
     surface_of,
 )
+from lightpen_extensions.measure.measuring.constructions import recognise, recognised
 from lightpen_extensions.measure.measuring.features import (
     AXIS,
     PLACE,
     Feature,
     fit_feature,
 )
+from lightpen_extensions.measure.measuring.next_touch import PartTouches
 from lightpen_extensions.measure.measuring.plan import (
     NEVER,
     CharacteristicKind,
@@ -48,15 +55,7 @@ from lightpen_extensions.measure.measuring.plan import (
     PlannedConstruction,
     PlannedFeature,
 )
-from lightpen_extensions.measure.measuring.quantities import (
-    Quantity,
-    derive,
-    quantity_of,
-)
-from lightpen_extensions.measure.measuring.recognition import recognise, recognised
 from lightpen_extensions.measure.measuring.surfaces import NAMES, SURFACES, FeatureKind
-from lightpen_extensions.measure.measuring.touches import PartTouches
-from lightpen_extensions.measure.measuring.zones import Criterion, fit_zone
 
 OTHER_KIND = 0.05  # of the extent of points: farther off they show another kind
 FLAT_POINTS = 0.005  # of that extent: points as flat do not determine solids

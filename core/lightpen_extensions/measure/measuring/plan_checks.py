@@ -21,6 +21,7 @@ from lightpen_extensions.measure.measuring.characteristics import (
     NEEDS_DATUM,
     is_defined,
 )
+from lightpen_extensions.measure.measuring.compensation import Criterion
 from lightpen_extensions.measure.measuring.constructions import constructor
 from lightpen_extensions.measure.measuring.plan import (
     FARTHEST,
@@ -32,7 +33,6 @@ from lightpen_extensions.measure.measuring.plan import (
 )
 from lightpen_extensions.measure.measuring.plan import CharacteristicKind as Of
 from lightpen_extensions.measure.measuring.surfaces import NAMES, SURFACES, FeatureKind
-from lightpen_extensions.measure.measuring.zones import Criterion
 
 PLAN = message("measuring.plan")
 MAX_SIZE = 1_000_000  # bytes

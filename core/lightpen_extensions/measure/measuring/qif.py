@@ -14,8 +14,7 @@ import numpy as np
 
 from lightpen import __version__
 from lightpen.arrays import FloatArray
-from lightpen.model.decision_rules import Decision
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR, Decision
 from lightpen_extensions.measure.measuring.characteristics import Measured
 from lightpen_extensions.measure.measuring.features import AXIS, PLACE
 from lightpen_extensions.measure.measuring.part import (

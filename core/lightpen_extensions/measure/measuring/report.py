@@ -7,15 +7,27 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from lightpen.messages import Message, message
+from lightpen.arrays import FloatArray
+from lightpen.formats.files import FileFormat
+from lightpen.formats.tables import csv_table
+from lightpen.local_time import local_now
+from lightpen.messages import Message, message, printable
 from lightpen.model.artefacts import SIDES, Side
-from lightpen.model.decision_rules import Decision
+from lightpen.model.coverage import Decision
+from lightpen_extensions.measure.measuring.alignment import Quantity
 from lightpen_extensions.measure.measuring.characteristics import Measured
-from lightpen_extensions.measure.measuring.compensation import Evidence
+from lightpen_extensions.measure.measuring.compensation import Evidence, TouchedSurface
+from lightpen_extensions.measure.measuring.features import (
+    AXIS,
+    PLACE,
+    Feature,
+    frame_about,
+)
 from lightpen_extensions.measure.measuring.part import (
     CharacteristicResult,
     MeasuredPart,
 )
+from lightpen_extensions.measure.measuring.qif import qif_text
 from lightpen_extensions.measure.measuring.surfaces import (
     NAMES,
     ROUND,
@@ -176,3 +188,124 @@ def _result_entries(result: CharacteristicResult) -> dict[str, Any]:
         "decision": None if result.decision is None else result.decision.value,
         "probability_of_conformity": result.probability,
     }
+
+
+# Measured parts for other programs, in one table of formats.
+#
+# CSV has a row for each characteristic, Q-DAS (AQDEF) a value for each, and QIF 3.0
+# [1]_ the results with their tolerances.
+#
+# References
+# ----------
+# .. [1] ISO 23952:2020, "Automation systems and integration. Quality information
+#    framework (QIF)".
+
+
+N_DECIMALS = 6
+
+
+def _csv(part: MeasuredPart) -> str:
+    head = ["characteristic", "quantity", "features", "unit", "nominal", "lower_limit"]
+    head += ["upper_limit", "actual", "deviation", "expanded_uncertainty"]
+    head += ["decision", "probability_of_conformity"]
+    rows: list[list[object]] = [list(head)]
+    for result in part.results:
+        planned = result.planned
+        limits = ["" if np.isinf(x) else x for x in (result.lower, result.upper)]
+        rows.append(
+            [
+                *(planned.label, planned.quantity.value, " ".join(planned.of)),
+                *(planned.unit, planned.nominal, *limits),
+                *(result.value.value, result.deviation, result.value.uncertainty),
+                "" if result.decision is None else result.decision.value,
+                result.probability,
+            ]
+        )
+    return csv_table([["" if x is None else x for x in row] for row in rows])
+
+
+def _qdas(part: MeasuredPart) -> str:
+    """Return the plan's characteristics and their values as Q-DAS."""
+    name, when = printable(part.plan.name), f"{local_now():%d.%m.%Y/%H:%M:%S}"
+    lines = [f"K0100 {len(part.results)}", f"K1001 {name}", f"K1002 {name}"]
+    for i, result in enumerate(part.results, start=1):
+        planned = result.planned
+        lines += [f"K2001/{i} {i}", f"K2002/{i} {printable(planned.label)}"]
+        lines += [f"K2022/{i} {N_DECIMALS}", f"K2142/{i} {planned.unit}"]
+        if planned.nominal is not None:
+            lines.append(f"K2101/{i} {planned.nominal:.{N_DECIMALS}f}")
+        ends = result.lower, result.upper
+        for key, limit in zip(("K2110", "K2111"), ends, strict=True):
+            if np.isfinite(limit):
+                lines.append(f"{key}/{i} {limit:.{N_DECIMALS}f}")
+        lines.append(f"K2900/{i} U (k=2) {result.value.uncertainty:.{N_DECIMALS}f}")
+    for i, result in enumerate(part.results, start=1):
+        lines += [f"K0001/{i} {result.value.value:.{N_DECIMALS}f}", f"K0002/{i} 0"]
+        lines.append(f"K0004/{i} {when}")
+    return "\n".join(lines) + "\n"
+
+
+EXPORTS = (
+    FileFormat("csv", message("part.csv"), ".csv", _csv),
+    FileFormat("qdas", message("part.qdas"), ".dfq", _qdas),
+    FileFormat("qif", message("part.qif"), ".qif", qif_text),
+)
+
+
+N_ROUND = 73  # points of a closed circle
+MARK = 1.0  # mm, half size of the cross of a point, and of an untouched feature
+CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
+
+
+def outline_of(one: Measured) -> list[FloatArray]:
+    """Return the lines (M, 3) of a feature, mm, in the frame of the camera."""
+    values = one.surface.quantity.values
+    origin, axis, sizes = values[PLACE], values[AXIS], values[6:]
+    frame = frame_about(axis)
+    reach = _reach(one)
+    along = [-reach * axis, reach * axis]
+    match one.kind:
+        case FeatureKind.POINT:
+            return [origin + np.outer([-MARK, MARK], each) for each in np.eye(3)]
+        case FeatureKind.LINE:
+            return [origin + np.array(along)]
+        case FeatureKind.PLANE:
+            return [origin + reach * np.array(CORNERS) @ frame[:, :2].T]
+        case FeatureKind.CIRCLE:
+            return [_ring(origin, frame, sizes[0])]
+        case FeatureKind.SPHERE:
+            turned = (np.roll(np.eye(3), k, axis=0) for k in range(3))
+            return [_ring(origin, each, sizes[0]) for each in turned]
+        case FeatureKind.CYLINDER:
+            return [_ring(origin + each, frame, sizes[0]) for each in along]
+        case FeatureKind.CONE:
+            slope = np.tan(sizes[1])
+            radii = (max(sizes[0] + sign * reach * slope, 0.0) for sign in (-1, 1))
+            pairs = zip(along, radii, strict=True)
+            return [_ring(origin + each, frame, radius) for each, radius in pairs]
+
+
+def of_centres(fit: Feature, points: FloatArray) -> Measured:
+    """Return the feature of ball centres (N, 3) without an uncertainty, to be drawn."""
+    values = Quantity(fit.values, np.zeros((len(fit.values), 0)))
+    centres = Quantity(points.ravel(), np.zeros((points.size, 0)))
+    surface = TouchedSurface(fit.kind, values, Side.OUTSIDE, Evidence.NONE)
+    return Measured(surface, values, fit, centres)
+
+
+def _ring(center: FloatArray, frame: FloatArray, radius: float) -> FloatArray:
+    turn = np.linspace(0, 2 * np.pi, N_ROUND)
+    return np.asarray(
+        center + radius * np.column_stack([np.cos(turn), np.sin(turn)]) @ frame[:, :2].T
+    )
+
+
+def _reach(one: Measured) -> float:
+    """Return the half extent of the points, along an axis or in all directions."""
+    if one.points is None:
+        return MARK
+    points = one.points.values.reshape(-1, 3)
+    away = points - points.mean(axis=0)
+    if one.kind is not FeatureKind.PLANE:
+        away = away @ one.surface.quantity.values[AXIS, None]
+    return float(np.linalg.norm(away, axis=1).max())

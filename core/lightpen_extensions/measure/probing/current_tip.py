@@ -5,24 +5,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.errors import UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.hashes import InputFile, hashed
+from lightpen.formats.opened_files import InputFile, hashed
 from lightpen.messages import printable
 from lightpen.model.bending import ASSUMED_BENDING, Bending
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.tip_bending import bending_of
+from lightpen.model.names import Origin
+from lightpen.record.calibrations import CalibrationFile, bending_of, read_calibration
 from lightpen.record.results.result_folder import FolderArchive
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
-from lightpen_extensions.measure.probing.image_locations import (
+from lightpen_extensions.measure.probing.sources import (
     PenCameras,
+    instrument_of,
     viewers_of_camera,
     viewers_of_rig,
 )
-from lightpen_extensions.measure.probing.sources import instrument_of
 
 
 @dataclass(frozen=True, eq=False)

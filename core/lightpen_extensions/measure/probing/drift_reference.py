@@ -25,11 +25,11 @@ from lightpen.comparisons.assessment import (
 from lightpen.detection.fixed_lamps import lamps_among, masked_lights, other_lights
 from lightpen.detection.observations import Observations
 from lightpen.detection.pen_detection import PenDetection
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
 from lightpen.model.camera import Camera
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.limits import VerificationLimits
 
 BLOCK = 8  # images, at least

@@ -24,7 +24,7 @@ from lightpen.estimation.pivot.pivot import (
     tip_covariances,
 )
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.posture import angles_between
+from lightpen.model.rigid import angles_between
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbingFrame,
     RejectedFrame,

@@ -9,6 +9,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.pen_detection import PenDetection
+from lightpen.detection.pixel_box import RegionOfInterest
+from lightpen.detection.rig_observations import see_together
 from lightpen.errors import LightpenError, UsageError
 from lightpen.messages import printable
 from lightpen.record.results.result_folder import FolderArchive
@@ -19,20 +23,24 @@ from lightpen_extensions.measure.probing.current_tip import (
     read_tip_in_force,
 )
 from lightpen_extensions.measure.probing.drift_reference import (
+    LampDrift,
     LampObservations,
     lamps_in,
 )
-from lightpen_extensions.measure.probing.image_locations import touch_place
-from lightpen_extensions.measure.probing.sources import observe_place
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.probing.probing import ProbingPhase, approach_of
+from lightpen_extensions.measure.probing.sources import observe_place, touch_place
+from lightpen_extensions.measure.session import (
     SessionSetup,
     SessionState,
+    SessionTransition,
+    advance_session,
     run_again,
     setup_of,
     touch_again,
     with_drift,
 )
 from lightpen_extensions.measure.storage.session_record import (
+    SessionRecord,
     VerificationCheckpoint,
     point_image_name,
     written_since,
@@ -121,3 +129,48 @@ def _frame(image: RecordedImage) -> ProbingFrame:
         image.rotation,
         image.translation,
     )
+
+
+class LivePoints:
+    """Takes the images of one verification after another."""
+
+    def __init__(self) -> None:
+        self._lamps = LampObservations()
+
+    def begin(self, lamps: LampObservations) -> None:
+        """Begin another verification, with the lamps observed so far."""
+        self._lamps = lamps
+
+    def lamp_drift(self, setup: SessionSetup) -> LampDrift | None:
+        """Return the drift of fixed lamps."""
+        cameras = setup.instrument.rig.cameras
+        return self._lamps.lamp_drift(cameras, setup.choices.limits)
+
+    def take(
+        self,
+        images: SessionRecord,
+        setup: SessionSetup,
+        state: SessionState,
+        frame: Frame,
+        detection: PenDetection,
+        region: RegionOfInterest,
+    ) -> SessionTransition:
+        """Process an image and return the transition of the verification.
+
+        An image of a point is put on the disk before it counts.
+        """
+        touching, rules = state.touching, setup.rules
+        is_holding = touching.phase is ProbingPhase.HOLDING
+        if is_holding:
+            self._lamps = self._lamps.with_frame(frame, detection, region)
+        seen = see_together(setup.instrument.rig, setup.instrument.pen, detection)
+        name, n_held = str(frame.seq), len(touching.held)
+        may_count = is_holding and n_held >= rules.n_settling
+        if may_count and seen.has_pose and not seen.is_blurred:
+            tip_cam = seen.rotation @ setup.instrument.tip_pen + seen.translation
+            name = images.keep(frame, seen, approach_of(touching, tip_cam))
+        if n_held + 1 >= rules.n_settling + rules.n_frames:  # a point may end
+            setup = with_drift(setup, self.lamp_drift(setup))
+        transition = advance_session(setup, state, name, seen)
+        images.follow(state, transition)
+        return transition

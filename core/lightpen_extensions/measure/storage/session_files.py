@@ -22,30 +22,29 @@ from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.files import unreadable
-from lightpen.formats.hashes import InputFile, all_hashed, hashed
-from lightpen.formats.json_records import file_entry, plain, record_heading
-from lightpen.model.origin import Origin
-from lightpen.record.folder.outcome import TrialOutcome
-from lightpen.record.folder.verifications import (
+from lightpen.formats.opened_files import InputFile, all_hashed, hashed
+from lightpen.formats.own_json import file_entry, plain, record_heading
+from lightpen.model.names import Origin
+from lightpen.record.folder import (
     CONCLUSION,
+    TrialOutcome,
     conditions_entries,
     keep_verification,
     verifications_folder,
 )
-from lightpen.record.library.signing.keys import SigningKey
+from lightpen.record.library.signing import SigningKey
 from lightpen.record.library.supervision import (
     Signature,
     Supervision,
     require_supervisor,
 )
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
 from lightpen_extensions.measure.probing.current_tip import CurrentTip
 from lightpen_extensions.measure.probing.drift_reference import lamp_drift_entries
-from lightpen_extensions.measure.probing.image_locations import PenCameras
-from lightpen_extensions.measure.session.session import SessionSetup
-from lightpen_extensions.measure.session.status import VerificationStatus
+from lightpen_extensions.measure.probing.sources import PenCameras
+from lightpen_extensions.measure.session import SessionSetup, VerificationStatus
 from lightpen_extensions.measure.storage.resuming import ResumedVerification
 from lightpen_extensions.measure.storage.session_record import (
     DAMAGED,

@@ -29,7 +29,7 @@ from lightpen.formats.files import (
     unreadable,
     write_whole,
 )
-from lightpen.formats.hashes import hashed
+from lightpen.formats.opened_files import hashed
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
@@ -41,18 +41,15 @@ from lightpen.formats.own_json import (
 )
 from lightpen.formats.part_files import sweep_parts
 from lightpen.messages import Message, message
-from lightpen.model.origin import Origin
-from lightpen.record.folder.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
-from lightpen.record.library.numbered_files import numbered_files
+from lightpen.model.names import Origin
+from lightpen.record.folder import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.record.library.entered_files import numbered_files
 from lightpen.record.results.result_folder import SIMULATED
-from lightpen.record.swings.header import Header
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.lock import is_locked
-from lightpen.record.swings.names import Names
-from lightpen.record.swings.reading import image_name, open_record
-from lightpen.record.swings.writing import RecordWriter, SecondaryView
+from lightpen.record.swings.header import Header, Names
+from lightpen.record.swings.reading import JOURNAL, image_name, open_record
+from lightpen.record.swings.writing import RecordWriter, SecondaryView, is_locked
 from lightpen_extensions.measure.probing.probing import ProbingEventKind, ProbingPhase
-from lightpen_extensions.measure.session.session import SessionState, SessionTransition
+from lightpen_extensions.measure.session import SessionState, SessionTransition
 from lightpen_extensions.measure.tasks.task import VerificationChoices
 
 SESSION, DAMAGED = "session.json", ".damaged"

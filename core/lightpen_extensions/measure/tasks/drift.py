@@ -28,11 +28,9 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
-from lightpen.model.decision_rules import Decision
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR, Decision, chi_square_quantile
 from lightpen.model.limits import VerificationLimits
-from lightpen.model.posture import angles_between
-from lightpen.model.quantiles import chi_square_quantile
+from lightpen.model.rigid import angles_between
 from lightpen_extensions.measure.tasks.fixed_point import (
     ELSEWHERE,
     LIFTED,

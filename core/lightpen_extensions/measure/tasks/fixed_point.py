@@ -26,12 +26,16 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot.pivot import in_deviations
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
-from lightpen.model.coverage import posture_spread
-from lightpen.model.decision_rules import Decision
-from lightpen.model.expanded_uncertainty import COVERAGE, COVERAGE_FACTOR
-from lightpen.model.information import symmetric_root
+from lightpen.model.coverage import (
+    COVERAGE,
+    COVERAGE_FACTOR,
+    Decision,
+    chi_quantile,
+    chi_square_quantile,
+    posture_spread,
+    symmetric_root,
+)
 from lightpen.model.limits import VerificationLimits
-from lightpen.model.quantiles import chi_quantile, chi_square_quantile
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,
     joint_covariance,

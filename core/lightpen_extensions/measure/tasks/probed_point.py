@@ -20,7 +20,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import Poses
 from lightpen.detection.reasons import Reason
-from lightpen.detection.rig_pose import derivatives_in_rig, fit_rig_poses
+from lightpen.detection.rig_observations import derivatives_in_rig, fit_rig_poses
 from lightpen.detection.robust_residuals import disc_residuals, normal_equations
 from lightpen.estimation.pivot.pivot import (
     in_deviations,
@@ -29,8 +29,7 @@ from lightpen.estimation.pivot.pivot import (
     tip_covariances,
 )
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.posture import UPRIGHT_AXIS
-from lightpen.model.rigid import nearest_rotation, skew
+from lightpen.model.rigid import UPRIGHT_AXIS, nearest_rotation, skew
 
 KNOWN_FREEDOM = 30  # degrees of freedom of the noise of the calibration
 SEATING = 0.002  # mm, standard uncertainty of where a tip comes to rest in a good cone

@@ -15,10 +15,9 @@ from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, Number, message
-from lightpen.model.assumptions import BALL_UNCERTAINTY
-from lightpen.model.decision_rules import Decision
-from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen.record.folder.verifications import MEASURED_PART
+from lightpen.model.coverage import Decision
+from lightpen.model.limits import BALL_UNCERTAINTY, VerificationLimits, rule_in_words
+from lightpen.record.folder import MEASURED_PART
 from lightpen_extensions.measure.measuring.plan import Plan, PlannedFeature
 from lightpen_extensions.measure.tasks.probed_point import NO_DRIFT, ProbedPoint
 

@@ -1,20 +1,4 @@
-"""Error of the tip by points in one cone, and the error that they would detect.
-
-A point that is computed with a tip that is off by ``-d`` in the pen lies off by
-``-R d``. Let ``r`` be the points less their mean, and ``a`` the error of the mean:
-
-    r = e - R d + a,    cov(e) = covariance of all points with what they share
-
-Generalised least squares gives d with its covariance C, which contains the uncertainty
-of the calibrated tip. ``d^T C^-1 d`` is chi-square with three degrees of freedom if the
-tip is as calibrated. Its quantile is the threshold, and the non-central distribution
-gives the error that exceeds it with 95 % probability along the worst direction [1]_.
-
-References
-----------
-.. [1] W. Baarda, "A testing procedure for use in geodetic networks", Netherlands
-   Geodetic Commission, 1968: minimal detectable bias by the power of a test.
-"""
+"""The error of the tip by points in one cone, and the pen's scale by lengths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,16 +12,17 @@ from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import (
     CALIBRATE_AGAIN,
     RELEVANT,
+    Scale,
     VerificationAssessment,
     check,
     refused,
 )
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import Message, message
-from lightpen.model.decision_rules import Decision
-from lightpen.model.expanded_uncertainty import COVERAGE_FACTOR
+from lightpen.model.coverage import COVERAGE_FACTOR, Decision, chi_square_quantile
 from lightpen.model.limits import VerificationLimits
-from lightpen.model.quantiles import chi_square_quantile
+from lightpen_extensions.measure.measuring.part import MeasuredPart
+from lightpen_extensions.measure.measuring.plan import CharacteristicKind
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, joint_covariance
 
 BY_CHANCE = 0.01  # probability that a correct tip looks wrong
@@ -179,3 +164,39 @@ def tip_entries(found: TipEvidence) -> dict[str, Any]:
             found.detectable if found.detectable < inf else None
         ),
     }
+
+
+# The scale of the pen by certified lengths.
+#
+# An error of the pen's scale leaves no residual and moves nothing that stands still; a
+# length shows it. So lengths, with their covariance, determine the scale.
+
+
+def scale_of(
+    part: MeasuredPart, points: Sequence[ProbedPoint], instrument: Instrument
+) -> Scale | None:
+    """Return the scale from prior and lengths (least squares); None without lengths."""
+    lengths = [
+        (each.value.value - (each.planned.nominal or 0.0), each.planned.certified, each)
+        for each in part.results
+        if each.planned.quantity is CharacteristicKind.LENGTH and each.quantity
+    ]
+    rows = [e.quantity.by_inputs[0] for *_, e in lengths if e.quantity is not None]
+    known = np.array([u for _, u, _ in lengths if u is not None])
+    if not rows or len(known) < len(rows):
+        return None
+    errors, by_inputs = np.array([error for error, *_ in lengths]), np.array(rows)
+    by_instrument = by_inputs[:, :-1] @ np.concatenate([p.sensitivity for p in points])
+    leds = instrument.pen.leds - instrument.pen.leds.mean(axis=0)
+    of_scale = np.zeros(len(instrument.covariance))
+    of_scale[instrument.parameters.leds] = (leds / np.sum(leds**2)).ravel()
+    shared = by_instrument @ instrument.covariance @ of_scale
+    spread = by_inputs @ part.touches.inputs @ by_inputs.T
+    spread += np.outer(known, known) / COVERAGE_FACTOR**2
+    gain = np.linalg.solve(spread, shared)
+    before = float(of_scale @ instrument.covariance @ of_scale)
+    return Scale(
+        factor=1.0 - float(gain @ errors),
+        uncertainty=COVERAGE_FACTOR * max(before - float(gain @ shared), 0.0) ** 0.5,
+        uncertainty_before=COVERAGE_FACTOR * before**0.5,
+    )

@@ -21,15 +21,14 @@ from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import read_camera
 from lightpen.live.pipeline import LiveImage
 from lightpen.model.camera import Camera
-from lightpen.record.folder.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
-from lightpen.record.folder.outcome import TrialOutcome
-from lightpen_app.look.pooling import pooled
-from lightpen_app.widgets.job_progress import JobProgress
-from lightpen_app.widgets.sign_label import SignLabel
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen.record.folder import CAMERA_CALIBRATIONS, CameraTrial, TrialOutcome
+from lightpen_app.look.figures import pooled
+from lightpen_app.widgets.bars import JobProgress
+from lightpen_app.widgets.state_banner import SignLabel
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
-from lightpen_app_extensions.boards.board_view import BoardView
-from lightpen_app_extensions.boards.board_window import BoardWindow
+from lightpen_app_extensions.boards.view import BoardView
+from lightpen_app_extensions.boards.window import BoardWindow
 from lightpen_extensions.boards.boards import Board, BoardKind, parse_board
 from lightpen_extensions.boards.simulated_boards import (
     HeldBoard,
@@ -38,7 +37,7 @@ from lightpen_extensions.boards.simulated_boards import (
     simulate_board_poses,
 )
 from lightpen_extensions.simulator.hand import Operator
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 
 if TYPE_CHECKING:
     from tests.app.conftest import HoldBack
@@ -265,7 +264,7 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
 @pytest.fixture
 def slow_disk(hold_back: "HoldBack") -> Event:
     """Camera files are saved once this is set."""
-    return hold_back("lightpen_app_extensions.boards.board_calibration.save_camera")
+    return hold_back("lightpen_app_extensions.boards.view.save_camera")
 
 
 @pytest.mark.slow
@@ -378,9 +377,7 @@ def test_a_calibration_that_is_cancelled_leaves_the_one_before(
     window.read_folder(folder)
     qtbot.waitUntil(lambda: views_listed(window) == 7)
     before = remark(window)
-    may_begin = hold_back(
-        "lightpen_app_extensions.boards.board_calibration.find_images"
-    )
+    may_begin = hold_back("lightpen_app_extensions.boards.view.find_images")
     (progress,) = window.findChildren(JobProgress)
     assert not progress.isVisible()
 

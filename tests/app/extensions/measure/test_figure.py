@@ -5,13 +5,17 @@ import pytest
 from PySide6.QtGui import QImage
 from pytestqt.qtbot import QtBot
 
-from lightpen.model.decision_rules import Decision
-from lightpen.model.posture import Posture
+from lightpen.model.coverage import Decision
+from lightpen.model.rigid import Posture
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone, colors_of
-from lightpen_app_extensions.measure.band_chart import BandChart, value_text
-from lightpen_app_extensions.measure.check_list import CheckList, CheckRow
-from lightpen_app_extensions.measure.figure import dial_of
+from lightpen_app_extensions.measure.check_list import (
+    BandChart,
+    CheckList,
+    CheckRow,
+    value_text,
+)
+from lightpen_app_extensions.measure.part_view import dial_of
 from lightpen_extensions.measure.tasks.task import Band
 
 

@@ -6,15 +6,14 @@ from PySide6.QtCore import QCoreApplication, QThreadPool
 from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 
-from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import GRADE_MARKS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import SilentSounds
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.check_list import ROW, CheckList, CheckRow
-from lightpen_app_extensions.measure.pen_panel import PenPanel
 from lightpen_app_extensions.measure.service import MeasureService
-from lightpen_app_extensions.measure.verify_page import VerifyPage
+from lightpen_app_extensions.measure.verify_page import PenPanel, VerifyPage
 
 
 def words(panel: PenPanel) -> str:

@@ -4,8 +4,8 @@ from datetime import UTC, datetime
 
 import pytest
 
-from lightpen.archive.chains.entries import Event, Kind
-from lightpen.record.swings.names import Names
+from lightpen.archive.chains import Event, Kind
+from lightpen.record.swings.header import Names
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.measure.service import MeasureService
 

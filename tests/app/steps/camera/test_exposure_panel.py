@@ -6,8 +6,7 @@ from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraCapabilities, CameraSettings, Range
-from lightpen.detection.auto_exposure import AutoExposure, ExposureState
-from lightpen.detection.inspection import Exposure
+from lightpen.detection.inspection import AutoExposure, Exposure, ExposureState
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel
 
 

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.theme import DARK
-from lightpen_app.steps.camera.focus_meter import N_TRACED, FocusMeter
+from lightpen_app.steps.camera.live_panel import N_TRACED, FocusMeter
 
 
 @pytest.fixture

@@ -28,24 +28,21 @@ from tests.app.undressed import undressed
 from tests.faulty_camera import FaultyCamera
 
 from lightpen.cameras.pairing import not_synchronised
-from lightpen.cameras.protocol import CameraSettings, Frame, sealed
+from lightpen.cameras.protocol import CameraSettings, Connection, Frame, sealed
 from lightpen.cameras.source import FoundDevice
-from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
-from lightpen.formats.camera_file_writing import write_camera
+from lightpen.formats.rig_files import write_camera
 from lightpen.live.pipeline import LiveImage
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.sounds import SilentSounds
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
-from lightpen_app.steps.camera.exposure_bar import ExposureBar
-from lightpen_app.steps.camera.focus_meter import FocusMeter
-from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
-from lightpen_app.steps.camera.live_panel import LivePanel
+from lightpen_app.steps.camera.exposure_panel import ExposureBar
+from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel, PartDialog
+from lightpen_app.steps.camera.live_panel import FocusMeter, LivePanel
 from lightpen_app.steps.camera.page import CameraPage
-from lightpen_app.steps.camera.part_dialog import PartDialog
 from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel

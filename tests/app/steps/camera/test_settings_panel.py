@@ -18,11 +18,10 @@ from lightpen.cameras.protocol import (
 )
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import on_one_line
-from lightpen_app.steps.camera.setting_field import SettingField
-from lightpen_app.steps.camera.settings_panel import SettingsPanel
-from lightpen_app.widgets.choice_field import ChoiceField
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.steps.camera.settings_panel import SettingField, SettingsPanel
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import ChoiceField
+from lightpen_app.widgets.state_banner import SignLabel
 
 CAPS = CameraCapabilities(
     width=640,

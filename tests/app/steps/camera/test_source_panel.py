@@ -9,13 +9,12 @@ from pytestqt.qtbot import QtBot
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import SOURCES, source_named
 from lightpen.messages import message
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice
+from lightpen.swing.preparation import NO_SOURCE, SourceChoice
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
-from lightpen_app.steps.camera.device_field import DeviceField
-from lightpen_app.steps.camera.source_panel import SourcePanel
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.steps.camera.source_panel import DeviceField, SourcePanel
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.state_banner import SignLabel
 
 FOUND = (
     FoundDevice("21877692", "Basler acA2440 (21877692)"),

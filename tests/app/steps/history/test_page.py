@@ -28,11 +28,11 @@ from pytestqt.qtbot import QtBot
 from tests.accepted_tip import accept_tip
 from typing_extensions import override
 
-from lightpen.archive.chains.entries import Event, Kind
-from lightpen.archive.chains.growth import append
-from lightpen.archive.checks.check import ArchiveCheckResult, check_archive
-from lightpen.archive.logbook.lazy_logbook import LazyLogbook
-from lightpen.archive.store.database import Database
+from lightpen.archive.chains import Event, Kind
+from lightpen.archive.checks import ArchiveCheckResult, check_archive
+from lightpen.archive.growth import append
+from lightpen.archive.logbook import LazyLogbook
+from lightpen.archive.store import Database
 from lightpen.comparisons.assessment import (
     USE_TIP,
     VERIFY_AGAIN,
@@ -44,24 +44,22 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import DueRule, StationLimits
-from lightpen.model.origin import Origin
-from lightpen.record.folder.verifications import keep_verification
+from lightpen.model.names import Origin
+from lightpen.record.folder import keep_verification
 from lightpen.record.library.entered_files import ARCHIVE
 from lightpen.record.library.library_changes import Author, add_item
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import save_limits
+from lightpen.record.library.supervision import Signature, save_limits
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.swing.preparation import Preparation
 from lightpen_app.face import Service
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.look.words import unbroken
-from lightpen_app.print_report.preview import PrintReportWindow
+from lightpen_app.print_report.control import PrintReportWindow
 from lightpen_app.steps.history.archive_panel import ArchivePanel
-from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
     PEN,
@@ -75,16 +73,16 @@ from lightpen_app.steps.history.history_table import (
     X,
 )
 from lightpen_app.steps.history.page import HistoryPage
-from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.widgets.date_field import DateField
+from lightpen_app.steps.history.selection_panel import DuePanel, SelectionPanel
+from lightpen_app.widgets.fields import DateField
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.number_table import NumberTable
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import SignLabel
+from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
-from lightpen_extensions.plant.replication import Replicator
+from lightpen_extensions.plant.server import Replicator
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
@@ -543,7 +541,7 @@ def test_a_note_is_entered_while_the_archive_is_checked(
         is_entered.wait()
         return check_archive(database, folder, report)
 
-    place = "lightpen_app.steps.history.archive_control.check_archive"
+    place = "lightpen_app.steps.history.archive_panel.check_archive"
     monkeypatch.setattr(place, check_slowly)
     desk.enter(1)
     desk.open()
@@ -650,7 +648,7 @@ def test_a_check_that_is_cancelled_leaves_the_one_before(
     desk.until(lambda: panel.checked() is not None)
     before = panel.checked()
     desk.until(lambda: not panel.progress.is_running)
-    may_begin = hold_back("lightpen_app.steps.history.archive_control.check_archive")
+    may_begin = hold_back("lightpen_app.steps.history.archive_panel.check_archive")
 
     desk.click("Check the archive")
     assert panel.progress.is_running

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from lightpen.pen_check.draft import PenDraft
-from lightpen_app.steps.leds.led_table import MISFIT, LedTable
+from lightpen_app.steps.leds.table_panel import MISFIT, LedTable
 from lightpen_extensions.simulator.swings import paper_pen
 
 DRAFT = PenDraft.of(paper_pen())

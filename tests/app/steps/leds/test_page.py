@@ -25,25 +25,22 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.match import Finding, MatchFinding, PenMatch
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import LedFile, ListedPen, read_library
-from lightpen.record.swings.names import Names
-from lightpen.swing.image_sources import SourceChoice, SourceKind
-from lightpen.swing.preparation import MissingInput
+from lightpen.record.swings.header import Names
+from lightpen.swing.preparation import MissingInput, SourceChoice, SourceKind
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.leds.file_panel import LedFilePanel
-from lightpen_app.steps.leds.led_table import MISFIT, LedTable
+from lightpen_app.steps.leds.match_control import LedSimulatorControls
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
-from lightpen_app.steps.leds.simulator_controls import LedSimulatorControls
-from lightpen_app.steps.leds.table_panel import LedTablePanel
+from lightpen_app.steps.leds.table_panel import MISFIT, LedTable, LedTablePanel
+from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.pen_view import PenView
-from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
-from lightpen_app.work.live_images import DisplayedImage
+from lightpen_app.work.live_view import DisplayedImage
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.hand import HandActivity
-from lightpen_extensions.simulator.samples import fanned_pen, six_led_pen
-from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.scenes import Scene, fanned_pen, six_led_pen
 from lightpen_extensions.simulator.swings import paper_pen
 
 if TYPE_CHECKING:
@@ -512,8 +509,8 @@ def test_opening_another_file_asks_before_changes_are_lost(
 def slow_disk(hold_back: "HoldBack") -> Event:
     """LED files are read and written once this is set."""
     return hold_back(
-        "lightpen_app.steps.leds.file_control.open_pen",
-        "lightpen_app.steps.leds.file_control.save_pen",
+        "lightpen_app.steps.leds.file_panel.open_pen",
+        "lightpen_app.steps.leds.file_panel.save_pen",
     )
 
 
@@ -830,7 +827,7 @@ def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
     small_scene: Scene,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lightpen_app.steps.leds.simulator_controls.COVER_S", math.inf)
+    monkeypatch.setattr("lightpen_app.steps.leds.match_control.COVER_S", math.inf)
     row = seen.child(LedSimulatorControls)
     assert not row.isVisibleTo(seen.page)
     camera = FaultyCamera(small_scene, workbench.around.clock)

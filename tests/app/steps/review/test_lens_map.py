@@ -10,8 +10,7 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
-from lightpen.record.swings.recorded_source import RecordSource
-from lightpen.record.swings.solving import Solution
+from lightpen.record.swings.solving import RecordSource, Solution
 from lightpen_app.steps.review.plots_panel import ResidualsPanel
 from lightpen_app.steps.review.residual_plots import ArrowPlot
 from lightpen_extensions.simulator.swings import (

@@ -40,60 +40,62 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_pen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
-from lightpen.estimation.reports.methods import result_of
+from lightpen.estimation.reports.report_warnings import result_of
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.model.laboratory import Laboratory
 from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
+from lightpen.model.names import Laboratory, Origin
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedTip
 from lightpen.record.results.results import Result
-from lightpen.record.swings.assumed import PREFIX
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import PREFIX, Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
-from lightpen.record.swings.recorded_source import source
-from lightpen.record.swings.solving import Solution, solve_again, solve_record
+from lightpen.record.swings.solving import Solution, solve_again, solve_record, source
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.capture.state import SwingState
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import Resumable, read_resumable, recorded_setup
+from lightpen.swing.swing_recorder import (
+    Resumable,
+    read_resumable,
+    record_header,
+    recorded_setup,
+)
 from lightpen_app.look.theme import Tone, colors_of
-from lightpen_app.print_report.preview import PrintReportWindow
+from lightpen_app.print_report.control import PrintReportWindow
 from lightpen_app.steps.review.image_table import STATE, ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
-from lightpen_app.steps.review.laboratory_dialog import LaboratoryDialog
-from lightpen_app.steps.review.message_list import StatusMessageList
 from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.next_tips import NextTipsRow
 from lightpen_app.steps.review.page import ReviewPage
-from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
-from lightpen_app.steps.review.residual_plots import MisfitPlot
-from lightpen_app.steps.review.residual_view import ResidualView
-from lightpen_app.steps.review.result_panel import ResultPanel, TipSummary
-from lightpen_app.steps.review.result_tools import ResultTools
-from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.steps.review.residual_plots import MisfitPlot, ResidualView
+from lightpen_app.steps.review.result_export import LaboratoryDialog, ResultTools
+from lightpen_app.steps.review.result_panel import (
+    ResultPanel,
+    StatusMessageList,
+    TipReadout,
+    TipSummary,
+    TipValue,
+)
+from lightpen_app.steps.review.series_plots import PlotCard
+from lightpen_app.widgets.bars import JobProgress, QuestionBar, ReasonBar, WithdrawalBar
+from lightpen_app.widgets.controls import PushButton
 from lightpen_app.widgets.figure import MARK_HEIGHT, PNG_SCALE, Figure
-from lightpen_app.widgets.job_progress import JobProgress
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.number_table import NumberTable
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.reason_bar import ReasonBar
-from lightpen_app.widgets.sign_label import SignLabel
-from lightpen_app.widgets.state_banner import State, StateBanner
-from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
+from lightpen_app.widgets.state_banner import SignLabel, State, StateBanner
+from lightpen_app.widgets.tables import NumberTable
 from lightpen_app.work.workbench import Workbench
 from lightpen_app_extensions.exports.service import ExportsService
 from lightpen_extensions.exports.formats import FORMATS
 from lightpen_extensions.simulator.image_plans import ImagePlan, render_plan
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
-from lightpen_extensions.simulator.swings import PAPER_TIP, swing_from_postures
+from lightpen_extensions.simulator.swings import (
+    PAPER_TIP,
+    Postures,
+    swing_from_postures,
+)
 
 if TYPE_CHECKING:
     from tests.app.conftest import SolvingOn

@@ -9,17 +9,21 @@ from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.detection.reasons import Reason
-from lightpen.record.swings.image_list import ImageRow
-from lightpen_app.look.quantities import decimals_for, number_text
+from lightpen.record.swings.interrupted import ImageRow
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import TextSize, Tone
+from lightpen_app.look.words import decimals_for, number_text
 from lightpen_app.steps.review.image_table import ImageTable
-from lightpen_app.steps.review.message_list import MOST, StatusMessageList
-from lightpen_app.steps.review.residual_view import Arrows, ResidualView
-from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
-from lightpen_app.widgets.number_table import Figures, NumberTable
-from lightpen_app.widgets.question_bar import Question, QuestionBar
-from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.steps.review.residual_plots import Arrows, ResidualView
+from lightpen_app.steps.review.result_panel import (
+    MOST,
+    StatusMessageList,
+    TipReadout,
+    TipValue,
+)
+from lightpen_app.widgets.bars import Question, QuestionBar
+from lightpen_app.widgets.state_banner import StatusMessage
+from lightpen_app.widgets.tables import Figures, NumberTable
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,8 @@ from PySide6.QtWidgets import QDialogButtonBox
 from pytestqt.qtbot import QtBot
 from tests.app.typed_numbers import type_number
 
-from lightpen.model.assumptions import USUAL
-from lightpen_app.steps.start.assumptions_panel import (
-    AssumptionsDialog,
-    AssumptionsPanel,
-)
+from lightpen.model.limits import USUAL
+from lightpen_app.steps.start.limits_dialog import AssumptionsDialog, AssumptionsPanel
 from lightpen_app.widgets.number_field import NumberField
 
 

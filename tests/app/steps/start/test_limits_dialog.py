@@ -20,10 +20,9 @@ from lightpen.model.limits import (
 )
 from lightpen.record.library.supervision import Signature, Supervision
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
-from lightpen_app.widgets.choice_field import ChoiceField
+from lightpen_app.widgets.bars import ReasonBar
+from lightpen_app.widgets.fields import ChoiceField, SupervisorFields
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.reason_bar import ReasonBar
-from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.work.workbench import Workbench
 
 TIGHT = StationLimits(

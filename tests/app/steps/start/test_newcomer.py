@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog
 from lightpen.cameras.source import FoundDevice, SourcePlace
 from lightpen.cameras.sources import source_named
 from lightpen.live.sources import SourceEnvironment
-from lightpen.model.origin import Origin
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.model.names import Origin
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.work.settings import Settings
 from lightpen_extensions.simulator.simulator import SceneSimulator
 

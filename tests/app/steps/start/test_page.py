@@ -32,24 +32,23 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.live.sources import SourceEnvironment
 from lightpen.local_time import local_now
 from lightpen.model.limits import SwingLimits
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.record.swings.writing import RecordWriter
-from lightpen.swing.image_sources import NO_SOURCE, SourceChoice, SourceKind
-from lightpen.swing.record_header import record_header
+from lightpen.swing.preparation import NO_SOURCE, SourceChoice, SourceKind
+from lightpen.swing.swing_recorder import record_header
 from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.sidebar import subject_of
 from lightpen_app.steps.start.day_view import DayView, TemperatureField
-from lightpen_app.steps.start.interrupted_item import InterruptedItem
-from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.steps.start.interrupted_panel import InterruptedItem, InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.widgets.page import MainAction
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.state_banner import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench

@@ -14,11 +14,11 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.model.limits import DueRule
 from lightpen.record.library.supervision import Signature
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
-from lightpen_app.widgets.push_button import PushButton
-from lightpen_app.widgets.supervisor_fields import SupervisorFields
-from lightpen_app.widgets.withdrawal_bar import WithdrawalBar
+from lightpen_app.widgets.bars import WithdrawalBar
+from lightpen_app.widgets.controls import PushButton
+from lightpen_app.widgets.fields import SupervisorFields
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 

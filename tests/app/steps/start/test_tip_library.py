@@ -17,8 +17,7 @@ from tests.app.undressed import undressed
 
 from lightpen.local_time import local_now
 from lightpen.record.library.library_changes import Author, add_item, retire_item
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_password
+from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.library.tip_library import (
     ItemKind,
     Library,
@@ -29,16 +28,16 @@ from lightpen.record.library.tip_library import (
     library_files,
     read_library,
 )
-from lightpen.swing.image_sources import SourceChoice, SourceKind
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.shell.sidebar import Sidebar, Subject, subject_of
-from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.day_state import tip_details
 from lightpen_app.steps.start.form import NamesForm
+from lightpen_app.steps.start.item_form import TipPicture
+from lightpen_app.steps.start.library_control import PACE_MS
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.page import StartPage
-from lightpen_app.steps.start.tip_picture import TipPicture
-from lightpen_app.widgets.question_bar import QuestionBar
-from lightpen_app.widgets.row_table import RowTable
+from lightpen_app.widgets.bars import QuestionBar
+from lightpen_app.widgets.tables import RowTable
 from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:

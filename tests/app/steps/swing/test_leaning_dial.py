@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from lightpen.model.posture import Posture
+from lightpen.model.rigid import Posture
 from lightpen_app.look.theme import DARK
-from lightpen_app.steps.swing.leaning_dial import LeaningDial
+from lightpen_app.steps.swing.simulator_controls import LeaningDial
 from lightpen_app.widgets.posture_dial import (
     BAR_SHARE,
     RIM_SHARE,

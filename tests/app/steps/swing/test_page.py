@@ -15,25 +15,24 @@ from tests.app.blank_page import BlankPage
 from tests.app.patience import PATIENCE_MS
 from tests.faulty_camera import FaultyCamera, scene_of
 
-from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.worker_events import Connection
+from lightpen.cameras.protocol import CameraSettings, Connection
 from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import SourceEnvironment
 from lightpen.model.limits import SwingLimits
-from lightpen.model.posture import Posture
+from lightpen.model.rigid import Posture
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.interrupted import find_unfinished
-from lightpen.record.swings.names import Names
 from lightpen.record.swings.reading import DISCARDED, Record, open_record
 from lightpen.swing.capture.state import Pause, Phase, SwingState
-from lightpen.swing.image_sources import SourceChoice
+from lightpen.swing.preparation import SourceChoice
 from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow
-from lightpen_app.steps.swing.leaning_dial import LeaningDial
 from lightpen_app.steps.swing.page import SwingPage
+from lightpen_app.steps.swing.simulator_controls import LeaningDial
+from lightpen_app.widgets.bars import QuestionBar
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.plots import TracePlot
-from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 from lightpen_extensions.simulator.hand import Operator

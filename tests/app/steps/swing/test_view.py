@@ -8,10 +8,9 @@ from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.theme import font
 from lightpen_app.steps.swing.view import SwingView
-from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.fitting import FittedText, PageScroll
 from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.operator_view import OperatorValue
-from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.state_banner import StateBanner
 
 COUNT = "60 of about 80 images"

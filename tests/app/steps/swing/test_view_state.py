@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QApplication
 
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.reports.verdict import Grade, Verdict
-from lightpen.messages import message
+from lightpen.messages import PEN_LOST, Code, message
 from lightpen.model.limits import SwingLimits
-from lightpen.swing.capture.shortfall import measure_shortfall
+from lightpen.swing.capture.guidance import measure_shortfall
 from lightpen.swing.capture.state import (
     Pause,
     Phase,
@@ -19,11 +19,13 @@ from lightpen.swing.capture.state import (
     SwingState,
     start_swing,
 )
-from lightpen.swing_messages import PEN_LOST, Code
-from lightpen_app.steps.swing.remaining_images import RemainingImages, in_true_steps
-from lightpen_app.steps.swing.view_state import SwingViewState
+from lightpen_app.steps.swing.view_state import (
+    RemainingImages,
+    SwingViewState,
+    in_true_steps,
+)
 from lightpen_app.steps.swing.words import SwingWords
-from lightpen_app.widgets.sign_label import StatusMessage
+from lightpen_app.widgets.state_banner import StatusMessage
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 SETUP = SwingSetup(paper_camera(binning=2), paper_pen())

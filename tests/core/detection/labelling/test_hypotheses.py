@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from benchmarks.labelling import CAMERA, PEN, random_view
 
-from lightpen.detection.labelling.constellation import constellation_of
+from lightpen.detection.labelling.constellation import constellation_of, spot_arrays
 from lightpen.detection.labelling.hypotheses import SearchEffort, poses_from_triples
 from lightpen.detection.labelling.labels import EFFORTS
-from lightpen.detection.labelling.spot_arrays import spot_arrays
 
 
 @pytest.mark.parametrize("effort", EFFORTS)

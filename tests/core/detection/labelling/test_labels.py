@@ -25,7 +25,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.samples import SAMPLE_PENS
+from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.simulator.swings import flat_pen, paper_camera, paper_pen
 
 CAMERA = paper_camera()

@@ -3,9 +3,12 @@ import pytest
 from benchmarks.labelling import spots_at
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.labelling.constellation import constellation_of
+from lightpen.detection.labelling.constellation import (
+    SpotArrays,
+    constellation_of,
+    spot_arrays,
+)
 from lightpen.detection.labelling.matching import log_false_alarms, match, settle
-from lightpen.detection.labelling.spot_arrays import SpotArrays, spot_arrays
 from lightpen.model.ellipse import disc_images
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen

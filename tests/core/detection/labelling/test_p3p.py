@@ -1,7 +1,7 @@
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.labelling.p3p import solve_p3p
+from lightpen.detection.labelling.hypotheses import solve_p3p
 from lightpen.model.rigid import rotation_from_vector
 
 

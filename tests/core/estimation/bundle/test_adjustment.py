@@ -16,8 +16,8 @@ from lightpen.estimation.bundle.adjustment import (
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.uncertainty.budget import ContributionName, contributions_of
-from lightpen.model.assumptions import USUAL
-from lightpen.model.rig import rig_of
+from lightpen.model.limits import USUAL
+from lightpen.model.rigid import rig_of
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen, swing_poses
 
 CAMERA = replace(paper_camera(), covariance=None)

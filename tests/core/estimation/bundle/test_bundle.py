@@ -11,6 +11,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.robust_residuals import NOISE_FLOOR
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.image_fields import seat_modes_of
 from lightpen.estimation.bundle.linearised import (
     N_CONE,
     N_TURN,
@@ -20,14 +21,11 @@ from lightpen.estimation.bundle.linearised import (
     views_at,
 )
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.contact.joint import TURN_RIDGE
-from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
-from lightpen.model.effective_tip import effective_tip
-from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import fit_rigid, rotation_from_vector
+from lightpen.model.limits import USUAL
+from lightpen.model.pen import Pen, effective_tip
+from lightpen.model.rigid import Rig, fit_rigid, rig_of, rotation_from_vector
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

@@ -12,9 +12,9 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
+from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.swing_messages import Code
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -18,10 +18,10 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
+from lightpen.messages import Code
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
-from lightpen.swing_messages import Code
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

@@ -18,8 +18,8 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import disc_images
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
-from lightpen_extensions.simulator.samples import fanned_pen
+from lightpen.model.rigid import rig_of
+from lightpen_extensions.simulator.scenes import fanned_pen
 from lightpen_extensions.simulator.swings import (
     leds_in_camera,
     paper_camera,

@@ -7,15 +7,14 @@ import pytest
 from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle.adjustment import SearchedField, search_fields
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
-from lightpen.estimation.bundle.field_search import SearchedField, search_fields
-from lightpen.estimation.bundle.image_fields import FieldName
+from lightpen.estimation.bundle.image_fields import FieldName, seat_modes_of
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
-from lightpen.model.assumptions import USUAL
-from lightpen.model.rig import Rig, from_first, rig_of
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.limits import USUAL
+from lightpen.model.rigid import Rig, from_first, rig_of
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -9,18 +9,17 @@ from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.bundle.adjustment import adjust
-from lightpen.estimation.bundle.field_search import FoundField, found_fields
+from lightpen.estimation.bundle.adjustment import FoundField, adjust, found_fields
 from lightpen.estimation.bundle.image_fields import FieldName, ImageField, size_of
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
-from lightpen.model.rig import from_first
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.fisheye import LensField
+from lightpen.model.limits import USUAL
+from lightpen.model.rigid import from_first
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

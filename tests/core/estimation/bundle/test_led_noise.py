@@ -11,10 +11,10 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.adjustment import find_center_noise, find_led_noise
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report import calibration_record
-from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.observation_files import Centers
+from lightpen.formats.opened_files import InputFile, Inputs
 from lightpen.model.limits import SwingLimits
-from lightpen.record.calibrations.calibrations import shown_images
+from lightpen.record.calibrations import shown_images
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

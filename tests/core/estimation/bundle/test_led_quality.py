@@ -14,7 +14,7 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

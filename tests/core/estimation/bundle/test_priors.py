@@ -7,11 +7,11 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle.priors import priors_of, thermal_growth
-from lightpen.model.assumptions import USUAL, Assumptions
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
+from lightpen.model.limits import USUAL, Assumptions
 from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig, rig_of
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.rigid import Rig, rig_of
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
 CAMERA = paper_camera()

@@ -5,7 +5,7 @@ import pytest
 from tests.simulated_centers import simulate_rig_centers
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.estimation.bundle.image_fields import image_fields
+from lightpen.estimation.bundle.image_fields import image_fields, seat_modes_of
 from lightpen.estimation.bundle.linearised import BundleState, eliminate
 from lightpen.estimation.bundle.noise_correlation import (
     ImageRows,
@@ -13,11 +13,10 @@ from lightpen.estimation.bundle.noise_correlation import (
     summed_products,
 )
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.bundle.unknowns import Unknowns
-from lightpen.model.assumptions import USUAL
-from lightpen.model.rig import from_first
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.limits import USUAL
+from lightpen.model.rigid import from_first
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen, seen_from, swing_poses
 
 N_IMAGES, N_ROWS, N_COMMON = 7, 8, 4

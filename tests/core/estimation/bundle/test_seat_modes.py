@@ -2,15 +2,14 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle.seat_modes import (
+from lightpen.estimation.bundle.image_fields import (
     FULL_LEAN,
     axes_of_cone,
     drift_modes,
     oval_seat,
     tilt_modes,
 )
-from lightpen.model.posture import rotations_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import rotation_from_vector, rotations_of
 from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 PEN = paper_pen()

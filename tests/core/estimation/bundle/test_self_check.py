@@ -9,17 +9,16 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.estimation.bundle.consistency_test import SelfCheck, check_prediction
 from lightpen.estimation.bundle.linearised import BundleState, views_at
-from lightpen.estimation.bundle.self_check import SelfCheck, check_prediction
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.limits import SwingLimits
-from lightpen.model.rig import from_first
-from lightpen.model.rigid import nearest_rotation, vector_from_rotation
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.rigid import from_first, nearest_rotation, vector_from_rotation
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

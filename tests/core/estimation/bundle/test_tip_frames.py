@@ -9,18 +9,16 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.bundle.bundle import Bundle, fit_bundle
+from lightpen.estimation.bundle.image_fields import seat_modes_of
 from lightpen.estimation.bundle.led_quality import LedQuality, tip_frames
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.estimation.bundle.priors import priors_of
-from lightpen.estimation.bundle.seat_modes import seat_modes_of
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.summary import calibration_text
 from lightpen.estimation.reports.verdict import judge
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import USUAL
-from lightpen.model.limits import SwingLimits
-from lightpen.model.rig import rig_of
-from lightpen.model.rigid import fit_rigid
+from lightpen.model.limits import USUAL, SwingLimits
+from lightpen.model.rigid import fit_rigid, rig_of
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

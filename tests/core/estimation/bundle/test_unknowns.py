@@ -8,7 +8,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
-from lightpen.estimation.bundle.seat_modes import tilt_modes
+from lightpen.estimation.bundle.image_fields import tilt_modes
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contact.joint import ContactModel, fit_contact

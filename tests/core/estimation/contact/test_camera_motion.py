@@ -12,7 +12,7 @@ from lightpen.detection.observations import Observations, leave_out, observe_cen
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.contact.camera_motion import (
+from lightpen.estimation.contact.single_images import (
     CameraPath,
     follow_lamps,
     pose_steadily,
@@ -21,9 +21,9 @@ from lightpen.estimation.contact.camera_motion import (
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
+from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.swing_messages import Code
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

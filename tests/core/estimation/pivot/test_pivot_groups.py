@@ -8,8 +8,7 @@ from lightpen.arrays import BoolArray
 from lightpen.estimation.pivot.pivot import fit_pivot
 from lightpen.estimation.pivot.pivot_groups import PoseGroups, find_groups
 from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.postures import SwingKind
-from lightpen_extensions.simulator.swings import swing_poses
+from lightpen_extensions.simulator.swings import SwingKind, swing_poses
 
 N_POSES = 200
 HALF = np.arange(N_POSES) >= N_POSES // 2

@@ -6,11 +6,10 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_paper_poses
 from lightpen.errors import CalibrationError
-from lightpen.estimation.pivot.pivot import fit_pivot
-from lightpen.estimation.pivot.two_stage import fit_two_stage, projection_bias
-from lightpen_extensions.simulator.postures import SwingKind
+from lightpen.estimation.pivot.pivot import fit_pivot, fit_two_stage, projection_bias
 from lightpen_extensions.simulator.swings import (
     Swing,
+    SwingKind,
     paper_camera,
     paper_pen,
     simulate_centers,

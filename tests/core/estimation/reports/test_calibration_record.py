@@ -8,8 +8,7 @@ import pytest
 from benchmarks.small_records import SMALL, entries_of, record_of, small_record
 from docs.schema import FILE, PAGE, page_text, schema_text
 
-from lightpen.formats.json_records import record_bytes
-from lightpen.formats.own_json import DamagedError
+from lightpen.formats.own_json import DamagedError, record_bytes
 
 if TYPE_CHECKING:
     from jsonschema import Draft202012Validator

@@ -15,12 +15,12 @@ from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot_calibration import calibrate_pivot
-from lightpen.estimation.reports.pivot_report import pivot_record
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.report_warnings import warnings_of
 from lightpen.estimation.reports.summary import (
     calibration_text,
     convergence_text,
+    pivot_record,
     pivot_text,
 )
 from lightpen.estimation.reports.verdict import Verdict, judge
@@ -28,14 +28,14 @@ from lightpen.estimation.uncertainty.budget import (
     ContributionName,
     UncertaintyContribution,
 )
-from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.formats.json_records import json_bytes
 from lightpen.formats.observation_files import Centers
+from lightpen.formats.opened_files import InputFile, Inputs
+from lightpen.formats.own_json import json_bytes
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
-from lightpen.model.method import Method
-from lightpen_extensions.simulator.postures import Postures
+from lightpen.model.names import Method
 from lightpen_extensions.simulator.swings import (
+    Postures,
     paper_camera,
     paper_pen,
     simulate_centers,

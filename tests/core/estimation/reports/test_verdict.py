@@ -32,13 +32,12 @@ from lightpen.estimation.uncertainty.budget import (
 )
 from lightpen.estimation.variance_components import Component
 from lightpen.formats.observation_files import Centers
-from lightpen.messages import Message, message
+from lightpen.messages import NO_TEMPERATURE, Code, Message, message, too_little_tilt
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.swing_messages import NO_TEMPERATURE, Code, too_little_tilt
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
+    Postures,
     Swing,
     paper_camera,
     paper_pen,

@@ -10,9 +10,8 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.rigs.rig_conventions import require_usual_rig
 from lightpen.estimation.rigs.rig_poses import InitialExtrinsics
 from lightpen.messages import Message
-from lightpen.model.rig import Rig, from_first
-from lightpen.model.rigid import rotation_from_vector
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.rigid import Rig, from_first, rotation_from_vector
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import paper_pen
 
 RIG = from_first(row_of_cameras(3, 1000.0))

@@ -6,7 +6,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.rigs.synchrony import (
+from lightpen.estimation.rigs.rig_poses import (
     PenRotations,
     RelativeRotation,
     measure_lag,

@@ -22,10 +22,10 @@ from lightpen.estimation.uncertainty.budget import (
     contributions_of,
 )
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
+from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of
 from lightpen_extensions.simulator.swings import (
     Swing,
     paper_camera,

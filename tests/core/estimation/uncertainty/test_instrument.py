@@ -17,9 +17,9 @@ from lightpen.estimation.uncertainty.instrument import (
     instrument_of_files,
     with_rig,
 )
-from lightpen.model.assumptions import USUAL
-from lightpen.model.rig import rig_of
-from lightpen_extensions.simulator.samples import row_of_cameras
+from lightpen.model.limits import USUAL
+from lightpen.model.rigid import rig_of
+from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,

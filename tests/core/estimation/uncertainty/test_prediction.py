@@ -11,8 +11,8 @@ from lightpen.estimation.uncertainty.prediction import (
     UncertaintyPrediction,
     predict_uncertainty,
 )
-from lightpen.model.assumptions import USUAL
-from lightpen.model.rig import rig_of
+from lightpen.model.limits import USUAL
+from lightpen.model.rigid import rig_of
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -10,8 +10,8 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_centroids
 from lightpen_extensions.boards.adjustment import board_points
 from lightpen_extensions.boards.boards import Board, parse_board
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.simulated_boards import simulate_board_poses
-from lightpen_extensions.boards.views import Views
 
 NOISE = 0.03  # px
 

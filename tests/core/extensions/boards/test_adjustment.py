@@ -14,8 +14,8 @@ from lightpen_extensions.boards.adjustment import (
     adjust_board,
     fit_board_poses,
 )
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.start import start_board_poses, start_camera
-from lightpen_extensions.boards.views import Views
 
 MakeViews = Callable[..., Views]
 

@@ -11,7 +11,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen_extensions.boards.calibration import CameraCalibration, calibrate_camera
-from lightpen_extensions.boards.views import Views
+from lightpen_extensions.boards.observing import Views
 
 MakeViews = Callable[..., Views]
 NOISE = 0.03  # px

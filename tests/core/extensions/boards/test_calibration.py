@@ -16,9 +16,9 @@ from lightpen_extensions.boards.calibration import (
     calibrate_camera,
 )
 from lightpen_extensions.boards.distortion import choose_distortion, fit_camera
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.report import residuals_by_region
 from lightpen_extensions.boards.start import start_camera
-from lightpen_extensions.boards.views import Views
 
 MakeViews = Callable[..., Views]
 NOISE = 0.03  # px, of `make_views`

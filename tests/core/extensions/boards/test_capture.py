@@ -12,8 +12,12 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen.model.uncertainty_map import map_uncertainty
 from lightpen_extensions.boards.boards import Board, parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
-from lightpen_extensions.boards.capture import STILL_TIME, BoardVisibility, Capture
-from lightpen_extensions.boards.views import Views
+from lightpen_extensions.boards.observing import (
+    STILL_TIME,
+    BoardVisibility,
+    Capture,
+    Views,
+)
 from lightpen_extensions.boards.wanted_views import VIEWS, wanted_outline
 
 MakeViews = Callable[..., Views]

@@ -9,12 +9,12 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
 from lightpen_extensions.boards.adjustment import fit_board_poses
 from lightpen_extensions.boards.distortion import fit_camera
 from lightpen_extensions.boards.effects import MixedFit, _inverse, fit_effects
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.start import start_board_poses, start_camera
-from lightpen_extensions.boards.views import Views
 
 MakeViews = Callable[..., Views]
 NOISE = 0.03  # px, of `make_views`

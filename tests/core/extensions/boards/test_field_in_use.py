@@ -8,15 +8,15 @@ import pytest
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.observation_files import Centers
+from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera
-from lightpen.model.lens_field import LensField
+from lightpen.model.fisheye import LensField
 from lightpen_extensions.boards.boards import parse_board
 from lightpen_extensions.boards.calibration import calibrate_camera
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.simulated_boards import simulate_board_poses
-from lightpen_extensions.boards.views import Views
 from lightpen_extensions.simulator.swings import (
     paper_camera,
     paper_pen,

@@ -11,9 +11,9 @@ from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.boards.boards import parse_board
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.pair import PairCalibration, calibrate_pair
 from lightpen_extensions.boards.simulated_boards import simulate_board_poses
-from lightpen_extensions.boards.views import Views
 
 MakeViews = Callable[..., Views]
 TURN = rotation_from_vector(np.array([0.02, -0.2, 0.01]))

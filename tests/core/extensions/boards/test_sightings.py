@@ -24,7 +24,7 @@ from lightpen_extensions.boards.sightings import (
     find_points,
 )
 from lightpen_extensions.boards.simulated_boards import expose_board, render_board
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 
 SMALL = Camera(
     *(400, 320, 600.0, 599.0, 201.0, 158.0),

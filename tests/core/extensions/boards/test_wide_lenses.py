@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera, LensModel
 from lightpen.model.rigid import rotation_from_vector, skew
 from lightpen.model.uncertainty_map import map_uncertainty
@@ -23,9 +23,9 @@ from lightpen_extensions.boards.distortion import (
     choose_distortion,
     fit_camera,
 )
+from lightpen_extensions.boards.observing import Views
 from lightpen_extensions.boards.start import start_any_camera
-from lightpen_extensions.boards.views import Views
-from lightpen_extensions.discover.lens_conversion import convert_lens
+from lightpen_extensions.discover.scaled_start import convert_lens
 
 NOISE = 0.04  # px
 WIDE = Camera(

@@ -17,15 +17,12 @@ from lightpen.errors import CalibrationError
 from lightpen.formats.observation_files import read_unlabelled_centers
 from lightpen_extensions.discover import hypotheses
 from lightpen_extensions.discover.discover import discover
-from lightpen_extensions.discover.found import Discovery
+from lightpen_extensions.discover.found import Discovery, require_sketched
 from lightpen_extensions.discover.hypotheses import require_one_focal_length
 from lightpen_extensions.discover.report import discovery_text
-from lightpen_extensions.discover.request import Request
-from lightpen_extensions.discover.requirements import require_sketched
-from lightpen_extensions.discover.scale import MeasuredLength
-from lightpen_extensions.discover.sightings import Sightings, sightings_of_centers
+from lightpen_extensions.discover.scale import MeasuredLength, Request
 from lightpen_extensions.discover.starts import KnownLength
-from lightpen_extensions.discover.tracks import Pieces
+from lightpen_extensions.discover.tracks import Pieces, Sightings, sightings_of_centers
 from lightpen_extensions.simulator.swings import swing_from_postures
 
 DATA = Path(__file__).parents[3] / "data"

@@ -8,8 +8,7 @@ from tests.simulated_stations import Station, errors_of, random_station, seen_st
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.model.rig import rig_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import rig_of, rotation_from_vector
 from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.found import Discovery
 from lightpen_extensions.discover.hypotheses import Seed
@@ -21,8 +20,8 @@ from lightpen_extensions.discover.labelling import (
 )
 from lightpen_extensions.discover.starts import Start, ideal_camera
 from lightpen_extensions.discover.tracks import Pieces
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
+    Postures,
     Swing,
     simulate_centers,
     swing_from_postures,

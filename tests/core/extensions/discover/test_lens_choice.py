@@ -9,11 +9,10 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
 from lightpen.model.camera import lens_model_of
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of
 from lightpen_extensions.boards.distortion import Choice
-from lightpen_extensions.discover.lens_choice import choose_lens
-from lightpen_extensions.discover.lens_conversion import convert_lens
-from lightpen_extensions.discover.requirements import require_lens
+from lightpen_extensions.discover.found import require_lens
+from lightpen_extensions.discover.scaled_start import choose_lens, convert_lens
 from lightpen_extensions.discover.starts import KnownLength, adjust_start, any_camera
 
 STATION = random_station(0, n_images=48)

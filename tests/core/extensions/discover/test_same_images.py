@@ -11,10 +11,10 @@ from tests.simulated_stations import errors_of, random_station, seen_again
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.reports.report_warnings import warnings_of
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.formats.rig_files import write_camera
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen_extensions.discover.discover import discover

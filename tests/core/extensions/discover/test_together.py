@@ -7,16 +7,19 @@ from tests.simulated_stations import Station, errors_of, random_station, seen_st
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen_extensions.discover.discover import discover
-from lightpen_extensions.discover.picture import picture_of_pen
-from lightpen_extensions.discover.request import Request, SecondSightings
+from lightpen_extensions.discover.report import picture_of_pen
+from lightpen_extensions.discover.scale import Request, SecondSightings
 from lightpen_extensions.discover.together import (
     Together,
     common_part,
     discover_together,
     joined,
 )
-from lightpen_extensions.simulator.postures import FRAME_RATE, operator_postures
-from lightpen_extensions.simulator.swings import swing_from_postures
+from lightpen_extensions.simulator.swings import (
+    FRAME_RATE,
+    operator_postures,
+    swing_from_postures,
+)
 
 N = 60  # images
 FIRST = random_station(6, n_images=N)

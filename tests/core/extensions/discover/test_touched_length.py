@@ -12,8 +12,8 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen_extensions.discover.discover import discover, with_touched_length
 from lightpen_extensions.discover.found import Discovery
-from lightpen_extensions.discover.numbering import number_by_sketch
-from lightpen_extensions.discover.request import TouchedLength
+from lightpen_extensions.discover.hypotheses import number_by_sketch
+from lightpen_extensions.discover.scale import TouchedLength
 from lightpen_extensions.measure.probing.probing import ONE_IMAGE
 from lightpen_extensions.measure.probing.sources import touches_of
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint

@@ -12,13 +12,18 @@ from xml.etree import ElementTree
 import pytest
 from msgspec import structs
 
-from lightpen.formats.json_records import record_bytes
-from lightpen.model.laboratory import Laboratory
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.traceability import TracedItem
+from lightpen.formats.own_json import record_bytes
+from lightpen.model.names import Laboratory
+from lightpen.record.calibrations import CalibrationFile, TracedItem, read_calibration
 from lightpen.record.library.tip_library import ItemKind, ListedCamera
-from lightpen.record.swings.names import Names
-from lightpen_extensions.exports.dcc import DCC, NO_CERTIFICATE, SI, VERSION, dcc_text
+from lightpen.record.swings.header import Names
+from lightpen_extensions.exports.formats import (
+    DCC,
+    NO_CERTIFICATE,
+    SI,
+    VERSION,
+    dcc_text,
+)
 
 if TYPE_CHECKING:
     from xmlschema import XMLSchema

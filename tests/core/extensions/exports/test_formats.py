@@ -17,13 +17,13 @@ from msgspec import structs
 from tests.aqdef import read_aqdef
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.json_records import record_bytes
-from lightpen.model.laboratory import Laboratory
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.export_status import (
+from lightpen.formats.own_json import record_bytes
+from lightpen.model.names import Laboratory, Origin
+from lightpen.record.calibrations import (
     OVERDUE,
     RETIRED,
+    CalibrationFile,
+    read_calibration,
     status_of,
     with_status,
 )
@@ -31,7 +31,7 @@ from lightpen.record.library.library_changes import Author, add_item, retire_ite
 from lightpen.record.library.tip_library import ItemKind, ListedTip
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import Result, TipChange
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import open_record
 from lightpen_extensions.exports.formats import FORMATS
 

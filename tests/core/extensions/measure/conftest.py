@@ -11,8 +11,7 @@ from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
-from lightpen.model.posture import rotations_of
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of, rotations_of
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbedPoint,

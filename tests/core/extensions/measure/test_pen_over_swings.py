@@ -12,20 +12,20 @@ import pytest
 from msgspec import structs
 from tests.simulated_sessions import recorded
 
+from lightpen.comparisons.assessment import Scale
 from lightpen.comparisons.led_file import _is_better, improve_pen
 from lightpen.comparisons.pen_health import examine_pen
-from lightpen.comparisons.recorded_tasks import Scale
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.reports.calibration_record import ContradictionRecord
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.json_records import FileRecord
 from lightpen.formats.observation_files import Centers
+from lightpen.formats.own_json import FileRecord
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
 from lightpen.model.self_calibration import EXACT_SCALE, FoundPen, marks_of
-from lightpen.record.calibrations.calibrations import CalibrationFile, shown_images
+from lightpen.record.calibrations import CalibrationFile, shown_images
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     paper_camera,

@@ -8,15 +8,14 @@ import pytest
 from tests.accepted_tip import seen_by
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.rig_pose import fit_rig_poses
+from lightpen.detection.rig_observations import fit_rig_poses
 from lightpen.estimation.uncertainty.instrument import (
     Instrument,
     instrument_of_files,
     parameters_of,
     with_rig,
 )
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import Rig, rig_of, rotation_from_vector
 from lightpen_extensions.measure.tasks.probed_point import (
     SEATING,
     ProbedPoint,
@@ -25,7 +24,7 @@ from lightpen_extensions.measure.tasks.probed_point import (
     measure_touches,
     point_sensitivities,
 )
-from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.scenes import beside
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,

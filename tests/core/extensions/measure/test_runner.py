@@ -20,28 +20,29 @@ from tests.verifying import (
     found_by,
 )
 
-from lightpen.archive.checks.check import check_archive
-from lightpen.archive.logbook.logbook import Logbook
-from lightpen.cameras.clock import SkippingClock
+from lightpen.archive.checks import check_archive
+from lightpen.archive.logbook import Logbook
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.comparisons.recorded_tasks import read_scale
+from lightpen.comparisons.assessment import read_scale
 from lightpen.detection.pen_detection import detect_pen
-from lightpen.detection.region_of_interest import RegionOfInterest
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
-from lightpen.record.folder.verifications import TOUCHES
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_password
-from lightpen.record.swings.journal import JOURNAL
-from lightpen.record.swings.reading import DISCARDED, Record, RecordedImage, open_record
+from lightpen.record.folder import TOUCHES
+from lightpen.record.library.supervision import Signature, set_password
+from lightpen.record.swings.reading import (
+    DISCARDED,
+    JOURNAL,
+    Record,
+    RecordedImage,
+    open_record,
+)
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.session.status import (
-    SessionEventKind,
-    VerificationStatus,
-)
+from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 from lightpen_extensions.measure.storage.session_record import (
     CONCLUDED,
     find_interrupted,

@@ -20,24 +20,19 @@ from lightpen.detection.pen_detection import PenDetection
 from lightpen.errors import LightpenError
 from lightpen.formats.opened_files import CameraFile
 from lightpen.messages import Message
-from lightpen.model.rig import rig_of
-from lightpen.record.folder.verifications import TOUCHES, VERIFICATIONS
-from lightpen.record.library.signing.station import STATION_FILE
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_password
+from lightpen.model.rigid import rig_of
+from lightpen.record.folder import TOUCHES, VERIFICATIONS
+from lightpen.record.library.signing import STATION_FILE
+from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.results.result_folder import SIMULATED, FolderArchive
-from lightpen.runners.serial_queue import Act, Report, T, Task
-from lightpen.swing.image_sources import SourceChoice
-from lightpen.swing.preparation import Preparation
+from lightpen.runners import Act, Report, T, Task
+from lightpen.swing.preparation import Preparation, SourceChoice
 from lightpen_extensions.measure.probing.drift_reference import (
     LampImages,
     LampObservations,
 )
-from lightpen_extensions.measure.probing.image_locations import touch_place
-from lightpen_extensions.measure.session.status import (
-    SessionEventKind,
-    VerificationStatus,
-)
+from lightpen_extensions.measure.probing.sources import touch_place
+from lightpen_extensions.measure.session import SessionEventKind, VerificationStatus
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
 from lightpen_extensions.measure.storage.session_record import find_interrupted
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT

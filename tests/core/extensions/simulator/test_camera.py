@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from tests.faulty_camera import FaultyCamera
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.pose import fit_poses

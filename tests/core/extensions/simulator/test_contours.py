@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen_extensions.simulator.contours import (
+from lightpen_extensions.simulator.faces import (
     Contours,
     Patch,
     blurred_insides,
@@ -12,8 +12,8 @@ from lightpen_extensions.simulator.contours import (
     ellipse_contour,
     measure_insides,
 )
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
+    Postures,
     leds_in_camera,
     paper_camera,
     paper_pen,

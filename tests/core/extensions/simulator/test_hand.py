@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen_extensions.simulator.hand import (
     AWAY,
     GUIDED,
@@ -14,16 +14,14 @@ from lightpen_extensions.simulator.hand import (
     HandPose,
     Operator,
 )
-from lightpen_extensions.simulator.postures import (
-    MAX_TILT,
-    TREMOR,
-    Postures,
-    operator_postures,
-)
 from lightpen_extensions.simulator.swings import (
+    MAX_TILT,
     PAPER_CONE,
     PAPER_TIP,
+    TREMOR,
+    Postures,
     leds_in_camera,
+    operator_postures,
     paper_camera,
     paper_pen,
 )

@@ -6,8 +6,13 @@ import pytest
 from tests.simulated_plans import live_plan
 
 from lightpen_extensions.simulator.image_plans import SLIP, plan_scene, render_plan
-from lightpen_extensions.simulator.samples import SAMPLE_PENS
-from lightpen_extensions.simulator.scenes import HARD, SCENES, Disturbances, Scene
+from lightpen_extensions.simulator.scenes import (
+    HARD,
+    SAMPLE_PENS,
+    SCENES,
+    Disturbances,
+    Scene,
+)
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     leds_in_camera,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lightpen_extensions.simulator.postures import (
+from lightpen_extensions.simulator.swings import (
     FRAME_RATE,
     MAX_TILT,
     Postures,

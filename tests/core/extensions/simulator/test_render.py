@@ -9,7 +9,7 @@ from tests.simulated_plans import still_view
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
-from lightpen_extensions.simulator.contours import disc_contours, measure_insides
+from lightpen_extensions.simulator.faces import disc_contours, measure_insides
 from lightpen_extensions.simulator.render import (
     Light,
     Window,
@@ -17,7 +17,7 @@ from lightpen_extensions.simulator.render import (
     led_levels,
     render_view,
 )
-from lightpen_extensions.simulator.sensor import Sensor
+from lightpen_extensions.simulator.scenes import Sensor
 from lightpen_extensions.simulator.swings import (
     PAPER_TIP,
     leds_in_camera,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lightpen_extensions.simulator.samples import (
+from lightpen_extensions.simulator.scenes import (
     NEARLY,
     SAMPLE_PENS,
     fanned_pen,

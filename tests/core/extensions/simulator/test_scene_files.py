@@ -16,14 +16,20 @@ from lightpen.model.camera import Camera
 from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.simulator.image_plans import plan_scene
 from lightpen_extensions.simulator.render import render_view
-from lightpen_extensions.simulator.samples import row_of_cameras, six_led_pen
 from lightpen_extensions.simulator.scene_files import (
     scene_truth,
     write_rig_scene,
     write_scene,
 )
-from lightpen_extensions.simulator.scenes import HARD, Disturbances, Scene
-from lightpen_extensions.simulator.sensor import Sensor, quantize
+from lightpen_extensions.simulator.scenes import (
+    HARD,
+    Disturbances,
+    Scene,
+    Sensor,
+    quantize,
+    row_of_cameras,
+    six_led_pen,
+)
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from lightpen_extensions.simulator.render import Light, Window
-from lightpen_extensions.simulator.sensor import Sensor, expose, quantize
+from lightpen_extensions.simulator.scenes import Sensor, expose, quantize
 
 SHAPE = (400, 500)
 WHOLE = Window(0, SHAPE[0], 0, SHAPE[1])

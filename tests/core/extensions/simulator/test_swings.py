@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from lightpen.model.ellipse import ellipse_centers
-from lightpen_extensions.simulator.postures import SWING_KINDS, Postures
-from lightpen_extensions.simulator.samples import SAMPLE_PENS
+from lightpen_extensions.simulator.scenes import SAMPLE_PENS
 from lightpen_extensions.simulator.swings import (
     MIN_GAP,
     PAPER_CONE,
     PAPER_TIP,
+    SWING_KINDS,
+    Postures,
     edge_gaps,
     faces_camera,
     leds_in_camera,

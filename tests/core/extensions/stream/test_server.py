@@ -21,11 +21,11 @@ from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import StreamError
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
-from lightpen.formats.json_records import record_bytes
-from lightpen.model.origin import Origin
-from lightpen.model.rig import rig_of
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.swings.names import Names
+from lightpen.formats.own_json import record_bytes
+from lightpen.model.names import Origin
+from lightpen.model.rigid import rig_of
+from lightpen.record.calibrations import read_calibration
+from lightpen.record.swings.header import Names
 from lightpen_extensions.measure.tasks.probed_point import (
     ProbingFrame,
     StillFrames,
@@ -39,10 +39,10 @@ from lightpen_extensions.simulator.swings import (
     simulate_centers,
 )
 from lightpen_extensions.stream.messages import StreamedTip, pose_messages, tip_metadata
-from lightpen_extensions.stream.points import NamedPoint
 from lightpen_extensions.stream.server import (
     LOOPBACK,
     MOST_CLIENTS,
+    NamedPoint,
     PoseStream,
     StreamPlace,
     StreamStatus,

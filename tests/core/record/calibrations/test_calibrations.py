@@ -11,12 +11,11 @@ from benchmarks.small_records import record_of
 
 from lightpen.errors import FileError, LightpenError, UsageError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.json_records import record_bytes
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import read_calibration
+from lightpen.formats.own_json import StoredMessage, record_bytes
+from lightpen.model.names import Origin
+from lightpen.record.calibrations import read_calibration
 from lightpen.record.results.results import Result, result_bytes
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 WHY = StoredMessage("verdict.tip-changed", "The tip lies elsewhere.", {})

@@ -4,7 +4,7 @@ import re
 
 from lightpen.estimation.reports.calibration_record import VerdictLimits
 from lightpen.estimation.reports.verdict import CHANGE_GATE, FAR_OFF, HALVES_GATE
-from lightpen.record.calibrations.decision_rule import decision_rule
+from lightpen.record.calibrations import decision_rule
 
 
 def test_the_rule_names_the_limits_of_the_record_and_the_gates_of_the_program() -> None:

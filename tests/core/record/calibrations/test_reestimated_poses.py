@@ -8,12 +8,9 @@ import pytest
 from benchmarks.small_records import SECOND_CONE
 
 from lightpen.estimation.reports.calibration_record import CalibrationRecord
-from lightpen.formats.json_records import record_bytes
-from lightpen.record.calibrations.calibrations import read_calibration
-from lightpen.record.calibrations.reestimated_poses import (
-    ReestimatedPoses,
-    reestimate_poses,
-)
+from lightpen.formats.own_json import record_bytes
+from lightpen.record.calibrations import read_calibration
+from lightpen.record.recomputing import ReestimatedPoses, reestimate_poses
 
 
 def of_file(stated: dict[str, Any], folder: Path) -> CalibrationRecord:

@@ -5,7 +5,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.pivot.pivot import fit_pivot
-from lightpen.record.calibrations.reestimated_poses import fit_running_tip
+from lightpen.record.recomputing import fit_running_tip
 from lightpen_extensions.simulator.swings import paper_pen, swing_poses
 
 N_POSES = 40

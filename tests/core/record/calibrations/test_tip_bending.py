@@ -7,15 +7,19 @@ from pathlib import Path
 import pytest
 from benchmarks.small_records import small_record
 
-from lightpen.formats.json_records import record_bytes
+from lightpen.formats.own_json import record_bytes
 from lightpen.local_time import local_now
 from lightpen.model.bending import ASSUMED_BENDING, measured_on
-from lightpen.model.origin import Origin
-from lightpen.record.calibrations.calibrations import CalibrationFile, read_calibration
-from lightpen.record.calibrations.tip_bending import bending_of, keep_bending
+from lightpen.model.names import Origin
+from lightpen.record.calibrations import (
+    CalibrationFile,
+    bending_of,
+    keep_bending,
+    read_calibration,
+)
 from lightpen.record.library.library_changes import Author, add_item
 from lightpen.record.library.tip_library import ListedTip, item_entries, read_library
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 NOW = datetime(2025, 11, 3, 12, tzinfo=UTC)
 TODAY = local_now().date()

@@ -6,7 +6,7 @@ from pathlib import Path
 from msgspec import structs
 
 from lightpen.model.artefacts import Artefact, ArtefactKind
-from lightpen.record.calibrations.traceability import certified_values, traced_items
+from lightpen.record.calibrations import certified_values, traced_items
 from lightpen.record.library.library_changes import Author, add_item, retire_item
 from lightpen.record.library.tip_library import (
     ItemKind,
@@ -15,7 +15,7 @@ from lightpen.record.library.tip_library import (
     ListedTip,
     read_library,
 )
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 BY = Author("Hall 2", "Ann")

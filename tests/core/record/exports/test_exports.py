@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightpen.model.origin import Origin
-from lightpen.record.exports.exports import (
+from lightpen.model.names import Origin
+from lightpen.record.exports import (
+    TABLE_FORMATS,
     copied_tip,
     export_stem,
     exported_solution,
     save_new,
 )
-from lightpen.record.exports.formats import TABLE_FORMATS
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import solve_record
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.errors import FileError
-from lightpen.record.folder.data_folder import check_writable
+from lightpen.record.folder import check_writable
 
 
 def test_a_folder_is_made_and_nothing_is_left_in_it(tmp_path: Path) -> None:

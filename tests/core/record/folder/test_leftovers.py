@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.formats.part_files import part_of
-from lightpen.record.folder.data_folder import OLDEST, sweep_leftovers
+from lightpen.record.folder import OLDEST, sweep_leftovers
 from lightpen.record.results.result_folder import RECORDS, RESULTS
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.writing import RecordWriter

@@ -4,12 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from lightpen.record.folder.data_folder import WINDOWS, Presence
+from lightpen.record.folder import WINDOWS, Presence
 
 OTHER = """
 import sys, time
 from pathlib import Path
-from lightpen.record.folder.data_folder import Presence
+from lightpen.record.folder import Presence
 presence = Presence(Path(sys.argv[1]))
 print(presence.count_others(), flush=True)
 time.sleep(600)

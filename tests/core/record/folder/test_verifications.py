@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from lightpen.errors import FileError
-from lightpen.formats.json_records import record_bytes
-from lightpen.record.folder.verifications import read_verification
+from lightpen.formats.own_json import record_bytes
+from lightpen.record.folder import read_verification
 
 FILE = Path("000001.json")
 RECORD: dict[str, Any] = {

@@ -10,26 +10,28 @@ import pytest
 from msgspec import ValidationError, convert, structs, to_builtins
 from tests.entering import enter_in
 
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.logbook import Logbook
 from lightpen.errors import AcceptanceError, FileError
-from lightpen.formats.json_records import json_bytes
-from lightpen.formats.own_json import parse_own_json, with_checksum
+from lightpen.formats.own_json import json_bytes, parse_own_json, with_checksum
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.record.library.entered_files import ARCHIVE, entered_files
-from lightpen.record.library.guard_files import (
+from lightpen.record.library.signing import (
+    SALT_LENGTH,
+    head_file,
+    key_folder,
+    station_key,
+    station_name,
+)
+from lightpen.record.library.supervision import (
     LIMITS_FOLDER,
     LimitsChange,
     PasswordVerifier,
-    write_limits_change,
-)
-from lightpen.record.library.signing.account import head_file
-from lightpen.record.library.signing.keys import SALT_LENGTH, key_folder, station_key
-from lightpen.record.library.signing.station import station_name
-from lightpen.record.library.supervision import Signature, read_supervision
-from lightpen.record.library.supervision_changes import (
+    Signature,
+    read_supervision,
     renew_station_key,
     set_limits,
     set_password,
+    write_limits_change,
 )
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

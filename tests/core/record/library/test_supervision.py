@@ -13,14 +13,15 @@ from lightpen.model.limits import (
     SwingLimits,
     VerificationLimits,
 )
-from lightpen.record.library.guard_files import LIMITS_FOLDER
 from lightpen.record.library.supervision import (
+    LIMITS_FOLDER,
     Signature,
     Supervision,
     read_supervision,
     require_supervisor,
+    set_limits,
+    set_password,
 )
-from lightpen.record.library.supervision_changes import set_limits, set_password
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 SECRET = "correct horse"

@@ -12,8 +12,7 @@ from tests.entering import put_in
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.json_records import json_bytes
-from lightpen.formats.own_json import with_checksum
+from lightpen.formats.own_json import json_bytes, with_checksum
 from lightpen.model.limits import DueRule
 from lightpen.record.library.library_changes import (
     Author,
@@ -22,8 +21,7 @@ from lightpen.record.library.library_changes import (
     keep_picture,
     retire_item,
 )
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_password
+from lightpen.record.library.supervision import Signature, set_password
 from lightpen.record.library.tip_library import (
     LIBRARY,
     ItemKind,
@@ -163,7 +161,7 @@ def test_a_changed_file_is_reported_and_nothing_older_counts(tmp_path: Path) -> 
 
 
 def test_a_file_of_a_later_version_is_refused(tmp_path: Path) -> None:
-    from lightpen.formats.json_records import record_bytes
+    from lightpen.formats.own_json import record_bytes
 
     (tmp_path / LIBRARY).mkdir()
     file = tmp_path / LIBRARY / "000001.json"

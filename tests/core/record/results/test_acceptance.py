@@ -20,13 +20,13 @@ from tests.entering import enter_in
 from lightpen.arrays import FloatArray
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.reports.verdict import Grade, judge
-from lightpen.formats.stored_messages import StoredMessage
+from lightpen.formats.own_json import StoredMessage
+from lightpen.messages import Code
 from lightpen.model.limits import StationLimits, SwingLimits
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.library.library_changes import Author, add_item, retire_item
-from lightpen.record.library.signing.station import STATION_FILE
-from lightpen.record.library.supervision import Signature
-from lightpen.record.library.supervision_changes import set_limits, set_password
+from lightpen.record.library.signing import STATION_FILE
+from lightpen.record.library.supervision import Signature, set_limits, set_password
 from lightpen.record.library.tip_library import (
     ItemKind,
     ListedCone,
@@ -46,7 +46,6 @@ from lightpen.record.swings.solving import (
     solve_record,
 )
 from lightpen.record.swings.writing import RecordWriter, note_excluded
-from lightpen.swing_messages import Code
 from lightpen_extensions.simulator.swings import swing_poses
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

@@ -10,10 +10,9 @@ from benchmarks.small_records import small_record
 
 from lightpen.errors import FileError
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.record.results.opening import swing_folder
-from lightpen.record.results.result_folder import RECORDS, FolderArchive
+from lightpen.record.results.result_folder import RECORDS, FolderArchive, swing_folder
 from lightpen.record.results.results import Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 from lightpen.record.swings.reading import OPENER
 
 

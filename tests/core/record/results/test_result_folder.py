@@ -28,7 +28,7 @@ from lightpen.estimation.reports.verdict import Grade
 from lightpen.formats.own_json import with_checksum
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.record.results.results import CALIBRATION, END, Result
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 N_RIVALS, N_RIVAL_RESULTS = 4, 10
 RIVAL = """

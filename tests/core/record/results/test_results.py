@@ -10,9 +10,8 @@ import pytest
 from benchmarks.small_records import small_record
 
 from lightpen.estimation.reports.verdict import Grade
-from lightpen.formats.stored_format import FORMAT
-from lightpen.formats.stored_messages import StoredMessage
-from lightpen.model.origin import Origin
+from lightpen.formats.own_json import FORMAT, StoredMessage
+from lightpen.model.names import Origin
 from lightpen.record.results.results import (
     Result,
     TipChange,
@@ -20,7 +19,7 @@ from lightpen.record.results.results import (
     parse_result,
     result_bytes,
 )
-from lightpen.record.swings.names import Names
+from lightpen.record.swings.header import Names
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 FILE = Path("000001.json")

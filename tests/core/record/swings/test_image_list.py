@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lightpen.detection.reasons import Reason
-from lightpen.record.swings.image_list import ImageRow, count_left_out, worst_first
+from lightpen.record.swings.interrupted import ImageRow, count_left_out, worst_first
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import Solution, solve_again, solve_record
 

@@ -14,19 +14,22 @@ from msgspec import structs
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
-from lightpen.record.swings.header import HEADER
+from lightpen.record.swings.header import HEADER, Names
 from lightpen.record.swings.interrupted import (
     discard_damaged,
     discard_swing,
     find_unfinished,
 )
-from lightpen.record.swings.journal import JOURNAL, VerdictLine, line_bytes
-from lightpen.record.swings.names import Names
-from lightpen.record.swings.reading import DISCARDED, open_record
+from lightpen.record.swings.reading import (
+    DISCARDED,
+    JOURNAL,
+    VerdictLine,
+    line_bytes,
+    open_record,
+)
 from lightpen.record.swings.writing import RecordWriter
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.record_header import record_header
-from lightpen.swing.resuming import read_for_more, read_resumable
+from lightpen.swing.swing_recorder import read_for_more, read_resumable, record_header
 from lightpen_extensions.simulator.scene_files import write_sample_files
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.formats.files import is_reserved
-from lightpen.record.swings.names import Names, not_reserved
+from lightpen.record.swings.header import Names, not_reserved
 from lightpen.record.swings.writing import make_record_folder
 
 NOW = datetime(2026, 8, 14, 9, 5, 3)

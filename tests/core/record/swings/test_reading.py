@@ -17,15 +17,15 @@ from msgspec import structs
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.camera_file_writing import write_camera
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
-from lightpen.model.origin import Origin
+from lightpen.formats.rig_files import write_camera
+from lightpen.model.names import Origin
 from lightpen.record.swings.header import FileCopy, Header, header_copies
 from lightpen.record.swings.interrupted import find_unfinished
 from lightpen.record.swings.reading import open_record, record_files
-from lightpen.record.swings.recorded_source import source
+from lightpen.record.swings.solving import source
 from lightpen.record.swings.writing import RecordWriter, note_excluded
 from lightpen_extensions.simulator.swings import paper_camera, paper_pen
 
@@ -301,7 +301,7 @@ def test_the_program_itself_writes_to_a_record_once_at_a_time(
 def test_a_writer_waits_for_one_who_is_about_to_close(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lightpen.record.swings.lock.PATIENCE", 60.0)
+    monkeypatch.setattr("lightpen.record.swings.writing.PATIENCE", 60.0)
     folder = recorded(tmp_path / "swing", header, 1)
     first = RecordWriter.resume(open_record(folder))
     closing = Timer(0.1, first.close)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lightpen.formats.simulated_files import MARK
-from lightpen.record.swings.recordings import (
+from lightpen.formats.files import MARK
+from lightpen.record.swings.solving import (
     FilesBeside,
     files_beside,
     is_simulated_recording,

@@ -10,7 +10,7 @@ import pytest
 
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, FileError
-from lightpen.record.swings.image_list import count_left_out, worst_first
+from lightpen.record.swings.interrupted import count_left_out, worst_first
 from lightpen.record.swings.reading import open_record
 from lightpen.record.swings.solving import (
     Solution,

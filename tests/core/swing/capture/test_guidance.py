@@ -9,9 +9,15 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.estimation.contact.joint import ContactModel, fit_contact
 from lightpen.model.coverage import TILT_RINGS
-from lightpen.model.posture import Posture, angles_between, rotations_of
-from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
+from lightpen.model.rigid import (
+    Posture,
+    Rig,
+    angles_between,
+    rig_of,
+    rotation_from_vector,
+    rotations_of,
+    vector_from_rotation,
+)
 from lightpen.swing.capture.guidance import (
     TILTS,
     TURNS,

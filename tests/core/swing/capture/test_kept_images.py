@@ -10,10 +10,10 @@ from lightpen.detection.observations import observe_centers
 from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
+from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of
 from lightpen.swing.capture.kept_images import (
     AcceptedImages,
     distance_unit,

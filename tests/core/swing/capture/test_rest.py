@@ -7,7 +7,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.pen_detection import detect_from_centers
-from lightpen.swing.capture.rest import (
+from lightpen.swing.capture.rules import (
     in_place,
     offset,
     rests_in_place,
@@ -20,9 +20,9 @@ from lightpen.swing.capture.state import (
     SwingState,
     start_swing,
 )
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
+    Postures,
     paper_camera,
     paper_pen,
     simulate_centers,

@@ -7,14 +7,25 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.detection.pen_detection import PenDetection, detect_from_centers, unseen
 from lightpen.detection.reasons import Reason
-from lightpen.messages import message
+from lightpen.messages import (
+    FOLLOW_ARROW,
+    HOLD_UPRIGHT,
+    LEAN_TO_YOUR_RIGHT,
+    PEN_LOST,
+    SEAT_TIP,
+    SWING_TO_SEAT,
+    Code,
+    message,
+    too_little_tilt,
+)
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.model.posture import angles_between
-from lightpen.swing.capture.kept_images import kept_before
+from lightpen.model.rigid import angles_between
+from lightpen.swing.capture.guidance import missing
+from lightpen.swing.capture.kept_images import Seat, kept_before
 from lightpen.swing.capture.rules import (
     advance_swing,
     conclude,
@@ -25,8 +36,6 @@ from lightpen.swing.capture.rules import (
     start_again,
     stillness,
 )
-from lightpen.swing.capture.seat import Seat
-from lightpen.swing.capture.shortfall import missing
 from lightpen.swing.capture.state import (
     Pause,
     Phase,
@@ -36,16 +45,6 @@ from lightpen.swing.capture.state import (
     SwingState,
     Transition,
     start_swing,
-)
-from lightpen.swing_messages import (
-    FOLLOW_ARROW,
-    HOLD_UPRIGHT,
-    LEAN_TO_YOUR_RIGHT,
-    PEN_LOST,
-    SEAT_TIP,
-    SWING_TO_SEAT,
-    Code,
-    too_little_tilt,
 )
 from lightpen_extensions.simulator.hand import Operator
 from lightpen_extensions.simulator.swings import (

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from lightpen.detection.pose import Poses, fit_poses
-from lightpen.swing.capture.seat import fit_seat, tip_distances, tip_offsets
-from lightpen_extensions.simulator.postures import Postures
+from lightpen.swing.capture.kept_images import fit_seat, tip_distances, tip_offsets
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
+    Postures,
     paper_camera,
     paper_pen,
     simulate_centers,

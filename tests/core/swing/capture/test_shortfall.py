@@ -8,11 +8,10 @@ import pytest
 
 from lightpen.detection.pen_detection import detect_from_centers
 from lightpen.estimation.uncertainty.prediction import PredictedUncertainty
-from lightpen.model.assumptions import USUAL, Assumptions
-from lightpen.model.limits import SwingLimits
-from lightpen.model.posture import Posture, rotations_of
-from lightpen.swing.capture.kept_images import kept_before
-from lightpen.swing.capture.shortfall import (
+from lightpen.messages import SIDES, Code
+from lightpen.model.limits import USUAL, Assumptions, SwingLimits
+from lightpen.model.rigid import Posture, rotations_of
+from lightpen.swing.capture.guidance import (
     N_MORE,
     guided,
     limits_for_more,
@@ -23,10 +22,10 @@ from lightpen.swing.capture.shortfall import (
     out_of_reach,
     turn_range,
 )
+from lightpen.swing.capture.kept_images import kept_before
 from lightpen.swing.capture.state import SwingSetup, SwingState, start_swing
-from lightpen.swing_messages import SIDES, Code
-from lightpen_extensions.simulator.postures import Postures
 from lightpen_extensions.simulator.swings import (
+    Postures,
     Swing,
     paper_camera,
     paper_pen,

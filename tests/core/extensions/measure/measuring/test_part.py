@@ -9,9 +9,10 @@ from msgspec import structs
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, FileError
 from lightpen.model.artefacts import Side
-from lightpen.model.decision_rules import Decision
+from lightpen.model.coverage import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.measure.measuring.next_touch import PartTouches
 from lightpen_extensions.measure.measuring.part import MeasuredPart, measure_part
 from lightpen_extensions.measure.measuring.plan import (
     QUANTITIES,
@@ -21,8 +22,7 @@ from lightpen_extensions.measure.measuring.plan import (
 )
 from lightpen_extensions.measure.measuring.plan_checks import missing_normal, parse_plan
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
-from lightpen_extensions.measure.measuring.touches import PartTouches
-from lightpen_extensions.measure.plate import plate_plan
+from lightpen_extensions.measure.probing_operator import plate_plan
 
 R = rotation_from_vector(np.array([0.4, -0.7, 0.2]))
 T = np.array([120.0, -80.0, 1400.0])

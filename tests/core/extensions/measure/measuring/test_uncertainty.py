@@ -13,15 +13,13 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.measure.measuring import constructions as construct
 from lightpen_extensions.measure.measuring.alignment import (
     Alignment,
+    Quantity,
     align_321,
     align_points,
-)
-from lightpen_extensions.measure.measuring.features import fit_feature
-from lightpen_extensions.measure.measuring.quantities import (
-    Quantity,
     derive,
     quantity_of,
 )
+from lightpen_extensions.measure.measuring.features import fit_feature
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
 
 STEP = 1e-4  # mm, of differences

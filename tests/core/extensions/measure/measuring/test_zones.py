@@ -16,9 +16,13 @@ from tests.core.extensions.measure.measuring.test_features import CASES, EXACT, 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.rigid import rotation_from_vector
+from lightpen_extensions.measure.measuring.compensation import (
+    ZONES,
+    Criterion,
+    fit_zone,
+)
 from lightpen_extensions.measure.measuring.features import fit_feature
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
-from lightpen_extensions.measure.measuring.zones import ZONES, Criterion, fit_zone
 
 RNG = np.random.default_rng(3)
 R = rotation_from_vector(np.array([0.4, -0.7, 0.2]))

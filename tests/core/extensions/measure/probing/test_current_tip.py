@@ -13,18 +13,18 @@ from lightpen.errors import UsageError
 from lightpen.formats.opened_files import CameraFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.model.bending import ASSUMED
-from lightpen.model.origin import Origin
+from lightpen.model.names import Origin
 from lightpen.record.results.result_folder import FolderArchive
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.probing.current_tip import (
     CurrentTip,
     read_tip_in_force,
 )
-from lightpen_extensions.measure.probing.image_locations import (
+from lightpen_extensions.measure.probing.sources import (
+    instrument_of,
     read_viewers,
     viewers_of_camera,
 )
-from lightpen_extensions.measure.probing.sources import instrument_of
 
 MASK = np.array([[10.0, 20.0, 5.0]])
 TIPS = np.array([[0.0, -90.0, -25.0], [1.0, -91.0, -26.0], [2.0, -92.0, -27.0]])

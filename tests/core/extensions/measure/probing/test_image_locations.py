@@ -1,4 +1,4 @@
-"""Tests of `lightpen_extensions.measure.probing.image_locations`."""
+"""Tests of `lightpen_extensions.measure.probing.sources`."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from lightpen.errors import FileError
-from lightpen.formats.simulated_files import mark_simulated
-from lightpen.model.origin import Origin
-from lightpen.model.rig import Rig, rig_of
-from lightpen_extensions.measure.probing.image_locations import touch_place
+from lightpen.formats.files import mark_simulated
+from lightpen.model.names import Origin
+from lightpen.model.rigid import Rig, rig_of
+from lightpen_extensions.measure.probing.sources import touch_place
 from lightpen_extensions.simulator.swings import paper_camera
 
 ONE = rig_of(paper_camera())

@@ -11,8 +11,7 @@ from lightpen.detection.pen_detection import PenDetection, detect_from_centers, 
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.pivot.pivot import outlier_distance
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.posture import rotations_of
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.rigid import rotation_from_vector, rotations_of
 from lightpen_extensions.measure.probing.probing import (
     ONE_IMAGE,
     PRECISE,

@@ -13,8 +13,8 @@ from tests.verifying import FRAME
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.observations import Observations, observe_centers
+from lightpen.detection.pixel_box import RegionOfInterest
 from lightpen.detection.reasons import Reason
-from lightpen.detection.region_of_interest import RegionOfInterest
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
 from lightpen.formats.observation_files import Centers
@@ -24,19 +24,17 @@ from lightpen_extensions.measure.probing.drift_reference import (
     LampObservations,
     lamps_in,
 )
-from lightpen_extensions.measure.probing.image_locations import (
-    ImageLocation,
-    RecordedTouch,
-)
 from lightpen_extensions.measure.probing.probing import ONE_IMAGE, ProbingRules
 from lightpen_extensions.measure.probing.sources import (
+    ImageLocation,
     ProbingRun,
+    RecordedTouch,
     lamp_drift_of,
     observe_place,
     require_leds_fit,
     touches_of,
 )
-from lightpen_extensions.simulator.samples import beside
+from lightpen_extensions.simulator.scenes import beside
 from lightpen_extensions.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,

@@ -10,24 +10,22 @@ from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VERIFY_AGAIN, check
 from lightpen.comparisons.led_file import ImprovedPen
 from lightpen.comparisons.pen_health import Growth, PenHealth, SwingOfPen
-from lightpen.comparisons.press_test import PressTest
+from lightpen.comparisons.pen_over_time import PressTest
 from lightpen.comparisons.records import (
+    improved_pen_text,
     pen_health_entries,
+    pen_health_text,
+    press_test_text,
     repeatability_entries,
+    repeatability_text,
     verification_record,
 )
 from lightpen.comparisons.repeatability import ControlLimits, Repeatability, TipEstimate
-from lightpen.comparisons.summaries import (
-    improved_pen_text,
-    pen_health_text,
-    press_test_text,
-    repeatability_text,
-)
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.messages import message
 from lightpen.model.limits import VerificationLimits, rule_in_words
-from lightpen_extensions.measure.reports.summaries import found_text, touches_text
+from lightpen_extensions.measure.reports import found_text, touches_text
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint, RejectedFrame
 from lightpen_extensions.measure.tasks.task import ResultRow, ResultTable
 from lightpen_extensions.simulator.swings import (

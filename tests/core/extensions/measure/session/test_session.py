@@ -8,14 +8,13 @@ import pytest
 from tests.accepted_tip import Hold, Holder, leant, round_a_ring
 from tests.verifying import BAR, CHOICES, LENGTH, found_by
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.pairing import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.pen_detection import PenDetection, detect_pen
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
-from lightpen.model.rig import rig_of
-from lightpen_extensions.measure.measuring.artefacts import artefact_plan
-from lightpen_extensions.measure.measuring.plan import Plan
+from lightpen.model.rigid import rig_of
+from lightpen_extensions.measure.measuring.plan import Plan, artefact_plan
 from lightpen_extensions.measure.probing.probing import (
     ProbingEvent,
     ProbingEventKind,
@@ -23,7 +22,7 @@ from lightpen_extensions.measure.probing.probing import (
     advance_touch,
 )
 from lightpen_extensions.measure.probing_operator import ProbingOperator
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.session import (
     SessionSetup,
     SessionState,
     advance_session,

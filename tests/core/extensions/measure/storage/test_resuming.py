@@ -15,13 +15,13 @@ from msgspec.structs import replace as replace_entries
 from tests.accepted_tip import Hold, accept_tip, leant, round_a_ring
 from tests.verifying import BAR, NOON, PART_CHOICES, TIMEOUT, Verifier
 
-from lightpen.archive.logbook.logbook import Logbook
+from lightpen.archive.logbook import Logbook
 from lightpen.model.artefacts import Side
 from lightpen.record.swings.reading import DISCARDED, open_record
 from lightpen.swing.preparation import Preparation
 from lightpen_extensions.measure.measuring.plan import Plan
-from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.session.session import SessionState
+from lightpen_extensions.measure.probing_operator import plate_plan
+from lightpen_extensions.measure.session import SessionState
 from lightpen_extensions.measure.storage.session_files import abandon_interrupted
 from lightpen_extensions.measure.storage.session_record import (
     CONCLUDED,

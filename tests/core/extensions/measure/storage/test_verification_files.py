@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from lightpen.formats.hashes import InputFile
-from lightpen.formats.json_records import FileRecord
-from lightpen.model.rig import rig_of
-from lightpen_extensions.measure.probing.image_locations import PenCameras
+from lightpen.formats.opened_files import InputFile
+from lightpen.formats.own_json import FileRecord
+from lightpen.model.rigid import rig_of
+from lightpen_extensions.measure.probing.sources import PenCameras
 from lightpen_extensions.measure.storage.session_files import viewer_entries
 from lightpen_extensions.simulator.swings import paper_camera
 

@@ -7,22 +7,19 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.comparisons.recorded_tasks import Scale
+from lightpen.comparisons.assessment import Scale
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.artefacts import Artefact, ArtefactKind, Side
 from lightpen.model.limits import VerificationLimits
-from lightpen_extensions.measure.measuring.artefacts import (
-    are_of_second_end,
-    artefact_plan,
-)
+from lightpen_extensions.measure.measuring.plan import are_of_second_end, artefact_plan
 from lightpen_extensions.measure.measuring.plan_checks import problems_of
-from lightpen_extensions.measure.tasks.artefact import measure_artefacts, size_table
 from lightpen_extensions.measure.tasks.part import PART, Part, sizes_of
-from lightpen_extensions.measure.tasks.pen_scale import scale_of
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
+from lightpen_extensions.measure.tasks.registry import measure_artefacts, size_table
 from lightpen_extensions.measure.tasks.task import Conditions
+from lightpen_extensions.measure.tasks.tip_evidence import scale_of
 from lightpen_extensions.simulator.swings import PAPER_CONE, PAPER_TIP
 
 Touching = Callable[..., tuple[ProbedPoint, ...]]

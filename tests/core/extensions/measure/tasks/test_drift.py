@@ -9,7 +9,7 @@ from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.decision_rules import Decision, DecisionRule
+from lightpen.model.coverage import Decision, DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.tasks.drift import DRIFT, measure_drift
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint

@@ -8,7 +8,7 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.model.decision_rules import Decision
+from lightpen.model.coverage import Decision
 from lightpen.model.limits import VerificationLimits
 from lightpen_extensions.measure.tasks.fixed_point import (
     FIXED_POINT,

@@ -14,10 +14,9 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.formats.file_format import FileFormat
+from lightpen.formats.files import FileFormat
 from lightpen.messages import Message
-from lightpen.model.posture import FACING
-from lightpen_extensions.measure.measuring.exports import EXPORTS
+from lightpen.model.rigid import FACING
 from lightpen_extensions.measure.measuring.part import taught_plan
 from lightpen_extensions.measure.measuring.plan import (
     Nominal,
@@ -26,9 +25,10 @@ from lightpen_extensions.measure.measuring.plan import (
     free_plan,
 )
 from lightpen_extensions.measure.measuring.qif import qif_text
+from lightpen_extensions.measure.measuring.report import EXPORTS
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
-from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.session.session import (
+from lightpen_extensions.measure.probing_operator import plate_plan
+from lightpen_extensions.measure.session import (
     SessionSetup,
     SessionState,
     advance_session,
@@ -36,8 +36,9 @@ from lightpen_extensions.measure.session.session import (
     end_task,
     without_last_touch,
 )
-from lightpen_extensions.measure.tasks.part import PART, Part
-from lightpen_extensions.measure.tasks.part_course import (
+from lightpen_extensions.measure.tasks.part import (
+    PART,
+    Part,
     feature_so_far,
     planned_places,
     touches_of_part,

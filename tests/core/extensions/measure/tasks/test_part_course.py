@@ -10,8 +10,8 @@ from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.artefacts import Side
 from lightpen_extensions.measure.measuring.plan import Nominal, Plan, PlannedFeature
 from lightpen_extensions.measure.measuring.surfaces import FeatureKind
-from lightpen_extensions.measure.plate import plate_plan
-from lightpen_extensions.measure.tasks.part_course import (
+from lightpen_extensions.measure.probing_operator import plate_plan
+from lightpen_extensions.measure.tasks.part import (
     feature_so_far,
     hand_goal,
     planned_places,

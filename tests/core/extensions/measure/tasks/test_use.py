@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.uncertainty.instrument import Instrument, instrument_of_files
-from lightpen.estimation.uncertainty.use import in_use
-from lightpen.model.assumptions import USUAL
+from lightpen.estimation.uncertainty.instrument import (
+    Instrument,
+    in_use,
+    instrument_of_files,
+)
 from lightpen.model.bending import ASSUMED, Bending, measured_on
+from lightpen.model.limits import USUAL
 from lightpen.model.pen import Pen, grown
-from lightpen.model.posture import rotations_of
-from lightpen.model.rig import rig_of
+from lightpen.model.rigid import rig_of, rotations_of
 from lightpen_extensions.measure.tasks.probed_point import (
     SEATING,
     ProbedPoint,

@@ -14,7 +14,7 @@ from lightpen.comparisons.assessment import VerificationAssessment, accepted
 from lightpen.comparisons.repeatability import Scatter
 from lightpen.estimation.reports.verdict import Grade
 from lightpen.messages import message
-from lightpen.model.decision_rules import DecisionRule
+from lightpen.model.coverage import DecisionRule
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.rigid import rotation_from_vector
 from lightpen_extensions.measure.tasks import drift, fixed_point

@@ -1,0 +1,312 @@
+"""Tables: of numbers that can be edited, and of rows that can be chosen."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractItemModel,
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSize,
+    Qt,
+)
+from PySide6.QtGui import (
+    QGuiApplication,
+    QKeyEvent,
+    QKeySequence,
+    QResizeEvent,
+    QShortcut,
+    QUndoCommand,
+    QUndoStack,
+)
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QSizePolicy,
+    QTableView,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen_app.look.layouts import horizontal_layout
+from lightpen_app.look.theme import GRID, TextSize, set_size
+from lightpen_app.widgets.fields import Translated
+
+Index = QModelIndex | QPersistentModelIndex
+ROW_HEIGHT = 7 * GRID // 2
+LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+
+
+class TitledModel(QAbstractTableModel):
+    """A model whose columns have titles."""
+
+    n_columns: int
+
+    def titles(self) -> tuple[str, ...]:
+        """Return the titles of the columns in the selected language."""
+        raise NotImplementedError
+
+    def side(self, column: int) -> Qt.AlignmentFlag | None:
+        """Return the horizontal alignment of a title; None for the view's."""
+
+    def hint(self, column: int) -> str | None:
+        """Return the tool tip of a title, if it has one."""
+
+    @override
+    def columnCount(self, parent: Index | None = None) -> int:
+        is_cell = parent is not None and parent.isValid()
+        return 0 if is_cell else self.n_columns
+
+    @override
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> Any:
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return self.titles()[section]
+            case Qt.ItemDataRole.ToolTipRole:
+                return self.hint(section)
+            case Qt.ItemDataRole.TextAlignmentRole:
+                side = self.side(section)
+                return None if side is None else side | Qt.AlignmentFlag.AlignVCenter
+        return None
+
+
+class RowTable(QTableView):
+    """Shows the rows of a model, all of one height; several can be selected."""
+
+    def __init__(self, model: QAbstractItemModel) -> None:
+        super().__init__()
+        self.setModel(model)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setTabKeyNavigation(False)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        self.verticalHeader().hide()
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+        across = self.horizontalHeader()
+        across.setHighlightSections(False)
+        across.setDefaultAlignment(LEFT)
+        across.setStretchLastSection(True)
+
+    def show_other_words(self) -> None:
+        """Update the texts in the selected language."""
+        model = self.model()
+        across = Qt.Orientation.Horizontal
+        model.headerDataChanged.emit(across, 0, model.columnCount() - 1)
+        self.viewport().update()
+
+
+NUMBER_ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; also of the header
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Content of a table."""
+
+    columns: tuple[str, ...] = ()  # names
+    rows: tuple[str, ...] = ()  # names
+    cells: tuple[tuple[str, ...], ...] = ()  # row by row
+
+
+class NumberTable(QTableWidget):
+    """Shows a table without scrolling; Ctrl+C copies the selection."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value = Figures()
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setTabKeyNavigation(False)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        self.setFrameShape(QTableWidget.Shape.NoFrame)
+        self.setProperty("role", "figures")
+        never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(never)
+        self.setHorizontalScrollBarPolicy(never)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setCornerButtonEnabled(False)
+        across, down = self.horizontalHeader(), self.verticalHeader()
+        across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        across.setDefaultAlignment(RIGHT)
+        across.setHighlightSections(False)
+        down.setDefaultAlignment(LEFT)
+        down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        down.setHighlightSections(False)
+        self.set_letters(TextSize.BODY)
+
+    def set_letters(self, size: TextSize) -> None:
+        """Show the figures larger, for a large window, smaller or as usual."""
+        # Before the heights: none is less than the letters are high.
+        for each in (self, self.horizontalHeader(), self.verticalHeader()):
+            set_size(each, size)
+        is_large = size > TextSize.BODY
+        self._row_height = LARGE_ROW_HEIGHT if is_large else NUMBER_ROW_HEIGHT
+        self.horizontalHeader().setFixedHeight(self._row_height)
+        self.verticalHeader().setDefaultSectionSize(self._row_height)
+        self.updateGeometry()
+
+    def value(self) -> Figures:
+        """Return the figures that are shown."""
+        return self._value
+
+    def set_value(self, value: Figures) -> None:
+        """Show other figures."""
+        if value == self._value:
+            return
+        self._value = value
+        self.setRowCount(len(value.rows))
+        self.setColumnCount(len(value.columns))
+        self.setHorizontalHeaderLabels(value.columns)
+        self.setVerticalHeaderLabels(value.rows)
+        for i, row in enumerate(value.cells):
+            for j, text in enumerate(row):
+                item = QTableWidgetItem(text)
+                item.setTextAlignment(RIGHT)
+                self.setItem(i, j, item)
+        self._share_width()
+        self.updateGeometry()
+
+    @override
+    def sizeHint(self) -> QSize:
+        height = self._row_height * (1 + self.rowCount()) + 2
+        return QSize(super().sizeHint().width(), height)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        width = sum(self._needed()) + self.verticalHeader().sizeHint().width()
+        return QSize(max(width, 20 * GRID), self.sizeHint().height())
+
+    def _needed(self) -> list[int]:
+        """Return the width of each column, px."""
+        heads = self.horizontalHeader()
+        return [
+            max(self.sizeHintForColumn(i), heads.sectionSizeHint(i))
+            for i in range(self.columnCount())
+        ]
+
+    def _share_width(self) -> None:
+        """Make the columns equally wide, or as needed where there is little room."""
+        heads, needed = self.horizontalHeader(), self._needed()
+        spare = self.viewport().width() - sum(needed)
+        is_short = self.viewport().width() < len(needed) * max(needed, default=0)
+        mode = QHeaderView.ResizeMode
+        heads.setSectionResizeMode(mode.Fixed if is_short else mode.Stretch)
+        if is_short:
+            for i, width in enumerate(needed):
+                heads.resizeSection(i, width + max(spare, 0) // len(needed))
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._share_width()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.matches(QKeySequence.StandardKey.Copy):
+            QGuiApplication.clipboard().setText(self._selected_text())
+        else:
+            super().keyPressEvent(event)
+
+    def _selected_text(self) -> str:
+        """Return the selected cells: tabs between columns, lines between rows."""
+        lines: dict[int, list[str]] = {}
+        for index in sorted(self.selectedIndexes()):
+            lines.setdefault(index.row(), []).append(index.data() or "")
+        return "\n".join("\t".join(cells) for cells in lines.values())
+
+
+class UndoableStep(QUndoCommand):
+    """An undoable step."""
+
+    def __init__(self, do: Callable[[], object], undo: Callable[[], object]) -> None:
+        super().__init__()
+        self._do, self._undo = do, undo
+
+    @override
+    def redo(self) -> None:
+        self._do()
+
+    @override
+    def undo(self) -> None:
+        self._undo()
+
+
+class UndoButtons(Translated, QWidget):
+    """Undoes and redoes the last step of a stack.
+
+    While ``scope`` is visible its keys do the same, wherever the focus is.
+    """
+
+    def __init__(self, stack: QUndoStack, scope: QWidget) -> None:
+        super().__init__()
+        self._can_undo, self._can_redo = stack.canUndo(), stack.canRedo()
+        self._why_locked = ""
+
+        # Widgets
+        self._undo = self.make_button(self.tr("Undo"), least_width=0)
+        self._redo = self.make_button(self.tr("Redo"), least_width=0)
+
+        # Layout
+        horizontal_layout(self, (self._undo, 1), (self._redo, 1))
+
+        # Connections
+        for button, standard, act in (
+            (self._undo, QKeySequence.StandardKey.Undo, stack.undo),
+            (self._redo, QKeySequence.StandardKey.Redo, stack.redo),
+        ):
+            button.clicked.connect(act)
+            keys = QShortcut(scope)
+            keys.setKeys(standard)
+            keys.activated.connect(button.click)
+        stack.canUndoChanged.connect(self._on_can_undo_changed)
+        stack.canRedoChanged.connect(self._on_can_redo_changed)
+
+        self._retranslate()
+
+    def set_locked(self, why: str) -> None:
+        """Disable undo and redo with a reason; enable them with an empty one."""
+        self._why_locked = why
+        self._refresh()
+
+    # A stack that is being deleted still emits these: do not query it then.
+
+    def _on_can_undo_changed(self, can_undo: bool) -> None:
+        self._can_undo = can_undo  # a stack always shows the other next
+
+    def _on_can_redo_changed(self, can_redo: bool) -> None:
+        self._can_redo = can_redo
+        self._refresh()
+
+    def _refresh(self) -> None:
+        no_undo = "" if self._can_undo else self.tr("Nothing to undo")
+        no_redo = "" if self._can_redo else self.tr("Nothing to redo")
+        shown = [
+            (self._undo, no_undo, QKeySequence.StandardKey.Undo),
+            (self._redo, no_redo, QKeySequence.StandardKey.Redo),
+        ]
+        shown.sort(key=lambda each: bool(each[1]))  # an enabled button takes the focus
+        for button, nothing, keys in shown:
+            if nothing and button.hasFocus() and shown[0][0].isEnabled():
+                shown[0][0].setFocus()
+            button.set_why_not(self._why_locked or nothing, _written(keys))
+
+    @override
+    def _retranslate(self) -> None:
+        self._refresh()
+
+
+def _written(keys: QKeySequence.StandardKey) -> str:
+    return QKeySequence(keys).toString(QKeySequence.SequenceFormat.NativeText)

@@ -1,0 +1,499 @@
+"""``lightpen --self-test REPORT.json``: tests an installation."""
+
+import importlib
+import json
+import logging
+import os
+import platform
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Lock, Timer
+from traceback import extract_stack
+from types import TracebackType
+
+from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtGui import QFont, QFontDatabase, QFontMetrics, QGuiApplication
+from PySide6.QtWidgets import QApplication
+
+from lightpen.cameras.pairing import SkippingClock
+from lightpen.detection.pen_detection import detect_pen
+from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.live.sources import SourceEnvironment
+from lightpen.model.limits import SwingLimits
+from lightpen.record.results.result_folder import RECORDS, RESULTS, FolderArchive
+from lightpen.record.results.results import Result
+from lightpen.record.swings.header import Names
+from lightpen.record.swings.reading import open_record
+from lightpen.record.swings.writing import RecordWriter
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.swing_recorder import record_header
+from lightpen_app.application import Wizard, has_display, make_application
+from lightpen_app.crash import versions
+from lightpen_app.look.theme import FAMILIES, LIGHT, apply_theme, load_fonts
+from lightpen_app.work.settings import Settings
+from lightpen_extensions.simulator.image_plans import plan_scene, render_plan
+from lightpen_extensions.simulator.scene_files import write_sample_files
+from lightpen_extensions.simulator.scenes import Scene
+from lightpen_extensions.simulator.simulator import SceneSimulator
+from lightpen_extensions.simulator.swings import paper_camera
+from lightpen_program.extensions import faces
+
+
+class SelfTestError(Exception):
+    """A test failed; the text says why."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Result of one check."""
+
+    name: str
+    ok: bool
+    found: str  # result or fault
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Tip:
+    """The tip that the wizard found, and the true one: x, y, z, pen frame, mm."""
+
+    found_mm: list[float]
+    true_mm: list[float]
+    expanded_uncertainty_mm: list[float]
+
+
+@dataclass
+class Report:
+    """Grows with each check, and can be written at any time, from any thread."""
+
+    file: Path
+    checks: list[Check] = field(default_factory=list)
+    tip: Tip | None = None
+    screenshot: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    is_complete: bool = False
+    last_lines: Callable[[], Sequence[str]] = tuple  # of the log
+    doing: Callable[[], str] = str  # returns the current step
+    # Where each thread was when the test was given up, by its name.
+    threads: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    @property
+    def ok(self) -> bool:
+        """Whether all was tried and all is well."""
+        return self.is_complete and all(check.ok for check in self.checks)
+
+    @contextmanager
+    def check(self, name: str) -> Iterator[list[str]]:
+        """Run a test; its body appends the findings.
+
+        What goes wrong is noted before it is raised again.
+        """
+        found: list[str] = []
+        began = time.monotonic()
+        ok = False
+        try:
+            yield found
+            ok = True
+        finally:
+            if not ok:
+                found = [traceback.format_exc()]
+            seconds = round(time.monotonic() - began, 3)
+            self.checks.append(Check(name, ok, "; ".join(found), seconds))
+
+    def write(self) -> None:
+        """Write the present findings."""
+        entries = {
+            "ok": self.ok,
+            "system": platform.platform(),
+            "executable": sys.executable,
+            "versions": self.versions,
+            "checks": [asdict(check) for check in self.checks],
+            "tip": None if self.tip is None else asdict(self.tip),
+            "screenshot": self.screenshot,
+            "log": list(self.last_lines()),
+            "doing": self.doing(),
+            "threads": self.threads,
+        }
+        with self._lock:
+            text = json.dumps(entries, indent=1, ensure_ascii=False)
+            # A path need not be text; its bytes are then written as JSON escapes them.
+            self.file.write_text(
+                text + "\n", encoding="utf-8", errors="backslashreplace"
+            )
+
+
+# The checks of a self-test, in order.
+#
+# Only modules of Python itself are imported before the files are found to be whole.
+
+
+FILE_LIST = "files.sha256"
+
+
+def file_list() -> Path:
+    """Return the path of the file list of the installer, if it was used."""
+    return Path(sys.prefix).parent / FILE_LIST
+
+
+def damaged_files(files: Path) -> tuple[str, ...]:
+    """Return the files of a list that are missing, or not as they were built."""
+    lines = files.read_text(encoding="utf-8").splitlines()
+    entries = [line.split("  ", maxsplit=1) for line in lines]
+    return tuple(
+        name for digest, name in entries if _digest(files.parent / name) != digest
+    )
+
+
+def _digest(path: Path) -> str:
+    try:
+        return sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return "unreadable"
+
+
+LONGEST = 600.0  # s, after which something hangs
+UNWRITTEN, HUNG = 2, 3  # exit status
+NEAR = 0.005  # mm from the true tip
+MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
+           "cryptography.hazmat.bindings._rust", "PySide6.QtWidgets",
+           "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
+           "lightpen_app.application")  # fmt: skip
+# Drive cameras, and reach an archive on a server.
+OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg")
+
+
+def test_program(file: Path) -> int:
+    """Test the installation, write a report, and return the exit status.
+
+    The report is written in any case, with a picture of the wizard beside it.
+    """
+    report = Report(file)
+    try:
+        report.write()
+    except OSError as error:
+        _say(f"{file} cannot be written: {error.strerror}. Name another file.")
+        return UNWRITTEN
+    watchdog = Timer(LONGEST, _give_up, [report])
+    watchdog.daemon = True
+    watchdog.start()
+    with ExitStack() as stack:
+        stack.callback(report.write)
+        stack.callback(watchdog.cancel)
+        folder = Path(stack.enter_context(TemporaryDirectory(prefix="lightpen-试 ")))
+        os.environ["LIGHTPEN_KEYS"] = str(folder / "keys")  # no key of the user's
+        try:
+            _test_all(report, folder, stack)
+        except SelfTestError as failed:
+            _say(str(failed))
+    return 0 if report.ok else 1
+
+
+def _test_all(report: Report, folder: Path, stack: ExitStack) -> None:
+    with report.check("files") as found:
+        found.append(_checked_files())
+    from lightpen.logs import recent_lines, running_log
+
+    stack.enter_context(running_log(logging.INFO))
+    report.last_lines = recent_lines
+    with report.check("imports") as found:
+        there = (name for name in OPTIONAL if find_spec(name.partition(".")[0]))
+        names = (*MODULES, *there)
+        for name in names:
+            importlib.import_module(name)
+        found.append(", ".join(names))
+    # Everything below needs these imports.
+
+    with report.check("window system") as found:
+        desk = Desk(folder)
+        report.versions.update(desk.versions())
+        found.append(desk.platform())
+    with report.check("fonts") as found:
+        found.append(desk.tested_fonts())
+    with report.check("record") as found:
+        found.append(desk.tested_record())
+    with report.check("wizard") as found:
+        report.doing = desk.doing
+        picture = report.file.with_suffix(".png")
+        found.append(desk.walked_wizard(picture))
+        report.screenshot = str(picture)
+    with report.check("result") as found:
+        found.append(desk.tested_result())
+    with report.check("tip") as found:
+        report.tip = tip = desk.tip()
+        found.append(_judged(tip))
+    report.is_complete = True
+
+
+def _checked_files() -> str:
+    files = file_list()
+    if not files.is_file():
+        return "not put here by an installer: no list to check them by"
+    damaged = damaged_files(files)
+    if damaged:
+        raise SelfTestError(
+            f"Damaged or missing: {', '.join(damaged)}. Install the program again."
+        )
+    return f"as they were built, by {files}"
+
+
+def _judged(tip: Tip) -> str:
+    pairs = zip(tip.found_mm, tip.true_mm, strict=True)
+    distance = sum((found - true) ** 2 for found, true in pairs) ** 0.5
+    if distance > NEAR:
+        raise SelfTestError(f"The tip is {distance:.6f} mm from the true one.")
+    return f"{distance:.6f} mm from the true one"
+
+
+def _say(text: str) -> None:
+    if sys.stderr is not None:  # as it is without a console on Windows
+        sys.stderr.write(f"lightpen: {text}\n")
+
+
+def _give_up(report: Report) -> None:
+    """End a process that hangs, from the thread of the watchdog, and report where."""
+    names = {thread.ident: thread.name for thread in threading.enumerate()}
+    report.threads = {
+        names.get(ident, str(ident)): [str(each) for each in extract_stack(frame)]
+        for ident, frame in sys._current_frames().items()
+    }
+    report.write()
+    os._exit(HUNG)
+
+
+TICK_MS = 50
+# The classes to which a platform gives fonts of its own.
+CLASSES_WITH_FONTS = (
+    "QAbstractItemView",
+    "QHeaderView",
+    "QListView",
+    "QMenu",
+    "QMenuBar",
+    "QMessageBox",
+    "QStatusBar",
+    "QTableView",
+    "QTreeView",
+)
+
+
+class Walk(QObject):
+    """Opens an interrupted swing, ends it, reviews it and accepts its tip."""
+
+    ended = Signal()  # the tip is accepted
+
+    def __init__(self, wizard: Wizard, swing: Path) -> None:
+        super().__init__(wizard)
+        self._window = wizard.window
+        self._workbench = wizard.workbench
+        self._swing = swing
+        self._next: Callable[[], bool] = self._open
+        self.doing = ""  # the awaited event, and the texts of the window
+        self._timer = QTimer(self, interval=TICK_MS)
+        self._timer.timeout.connect(self._on_tick)
+
+    def start(self) -> None:
+        """Begin on the first page."""
+        self._timer.start()
+
+    def _on_tick(self) -> None:
+        self.doing = f"{self._next.__name__}: {', '.join(self._window.words())}"
+        if self._next():
+            self._timer.stop()
+            self.ended.emit()
+
+    def _open(self) -> bool:
+        self._workbench.run.open_requested.emit(self._swing)
+        self._next = self._finish
+        return False
+
+    def _finish(self) -> bool:
+        status = self._workbench.run.status
+        is_whole = status.verdict is not None  # its tip was computed at once
+        if self._window.page().key == "swing" and (status.is_capturing or is_whole):
+            if not is_whole:
+                self._workbench.run.runner.ask(lambda workflow: workflow.finish())
+            self._next = self._review
+        return False
+
+    def _review(self) -> bool:
+        status = self._workbench.run.status
+        if status.verdict is None:
+            return False
+        if not status.verdict.can_be_accepted:
+            raise SelfTestError(f"The tip cannot be accepted: {status.verdict}.")
+        if self._window.page().key == "review":
+            self._next = self._accept
+        else:
+            self._press_main()
+        return False
+
+    def _accept(self) -> bool:
+        if self._workbench.run.status.result is not None:
+            return True
+        self._press_main()
+        return False
+
+    def _press_main(self) -> None:
+        """Press the main button, which takes no key at once."""
+        if not self._window.page().main_action().why_not:
+            self._window.press_main()
+
+
+N_IMAGES = 60
+PERIOD = 0.1  # s from image to image
+# With blanks and letters that a Windows of another language has no code page for.
+NAMES = Names("Prüfstand 1", "自检", "SELF-TEST", "T-1 ä", "C-1", 10.0)
+# A quarter of the usual pixels makes the test short.
+SCENE = Scene(n_images=N_IMAGES, camera=paper_camera(binning=2), led_noise=0.0)
+
+
+def record_swing(folder: Path, files: Path) -> None:
+    """Render the images of `SCENE` and record them with their detections.
+
+    The files of camera and pen are written to a folder. Raises `SelfTestError` if the
+    pen is not found in an image.
+    """
+    written = write_sample_files(SCENE, files)
+    preparation = Preparation(
+        names=NAMES,
+        camera_file=CameraFile.read(written.camera),
+        pen_file=PenFile.read(written.pen),
+        limits=replace(SwingLimits(), min_per_field=0),
+    )
+    setup = preparation.swing_setup()
+    with RecordWriter.create(folder, record_header(preparation)) as writer:
+        for image_plan in plan_scene(SCENE).image_plans:
+            image = render_plan(SCENE, image_plan)
+            seen = detect_pen(image, setup.camera, setup.pen)
+            if not seen.has_pose:
+                raise SelfTestError(
+                    f"The pen is not found in rendered image {image_plan.index + 1}."
+                )
+            writer.append(
+                image,
+                seen.pixels,
+                seen.rotation,
+                seen.translation,
+                image_plan.index * PERIOD,
+            )
+
+
+LETTERS = "Aaµ°±光笔校准"
+
+
+class Desk:
+    """An application with its own data folder.
+
+    Records, results and settings are in a folder; nothing of the user's is touched.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._data = folder / "data"
+        self._files = folder / "files"
+        self._settings = folder / "lightpen.json"
+        self._record = self._data / RECORDS / "self-test"
+        self._walk: Walk | None = None
+        if not has_display():
+            os.environ["QT_QPA_PLATFORM"] = "offscreen"
+        self._application = make_application(sys.argv[:1])
+
+    def versions(self) -> dict[str, str]:
+        """Return the versions of the program and its libraries."""
+        return versions()
+
+    def platform(self) -> str:
+        """Return the name of Qt's platform plugin."""
+        return QGuiApplication.platformName()
+
+    def tested_fonts(self) -> str:
+        """Return the fonts that were found to have all letters."""
+        load_fonts()
+        missing = set(FAMILIES) - set(QFontDatabase.families())
+        if missing:
+            raise SelfTestError(f"Not among the fonts: {', '.join(sorted(missing))}.")
+        metrics = [QFontMetrics(QFont(family)) for family in FAMILIES]
+        for letter in LETTERS:
+            if not any(each.inFontUcs4(ord(letter)) for each in metrics):
+                raise SelfTestError(f"The fonts have no {letter}.")
+        apply_theme(self._application, LIGHT)
+        for name in CLASSES_WITH_FONTS:
+            # The stubs of PySide 6.11 want bytes, which the method itself refuses.
+            family = QApplication.font(name).family()  # type: ignore[call-overload]
+            if family != FAMILIES[0]:
+                raise SelfTestError(f"{name} is shown in {family}, not {FAMILIES[0]}.")
+        return ", ".join(FAMILIES)
+
+    def tested_record(self) -> str:
+        """Write a rendered swing, and read it back."""
+        record_swing(self._record, self._files)
+        n_images = len(open_record(self._record).images)
+        if n_images != N_IMAGES:
+            raise SelfTestError(f"{n_images} of {N_IMAGES} images came back.")
+        return f"{n_images} images written and read back"
+
+    def walked_wizard(self, picture: Path) -> str:
+        """Have the wizard find and accept the tip of the swing; draw it at its end."""
+        around = SourceEnvironment(SceneSimulator(SCENE), SkippingClock(rests=True))
+        settings = Settings(self._settings)
+        wizard = Wizard(self._application, faces(), settings, self._data, around)
+        self._walk = walk = Walk(wizard, self._record)
+        faults: list[str] = []
+
+        def end() -> None:
+            if not wizard.window.grab().save(str(picture)):
+                faults.append(f"The picture {picture} cannot be written.")
+            wizard.window.close()
+
+        def give_up(
+            kind: type[BaseException], error: BaseException, trace: TracebackType | None
+        ) -> None:
+            previous(kind, error, trace)
+            faults.append(f"{kind.__name__}: {error}")
+            wizard.window.close_unasked()
+
+        previous, sys.excepthook = sys.excepthook, give_up
+        walk.ended.connect(end)
+        wizard.workbench.notifications.raised.connect(
+            lambda text, _: faults.append(text)
+        )
+        wizard.show()
+        wizard.started.connect(walk.start)
+        try:
+            self._application.exec()
+        finally:
+            sys.excepthook = previous
+        if faults:
+            raise SelfTestError(" ".join(faults))
+        return "opened, finished, reviewed and accepted"
+
+    def doing(self) -> str:
+        """Return what the walk through the wizard waits for; it may run or hang."""
+        return "" if self._walk is None else self._walk.doing
+
+    def tested_result(self) -> str:
+        """Return pen, folder and grade of the accepted result, which is current."""
+        return f"{self._result().names.pen} in {RESULTS}, grade {self._result().grade}"
+
+    def tip(self) -> Tip:
+        """Return the tip of the accepted result, and the true one."""
+        result = self._result()
+        return Tip(
+            result.tip_pen.tolist(), SCENE.tip_pen.tolist(), result.uncertainty.tolist()
+        )
+
+    def _result(self) -> Result:
+        result = FolderArchive(self._data).in_force(
+            NAMES.pen, NAMES.tip, is_simulated=True
+        )
+        if result is None:
+            raise SelfTestError("The accepted result is not current.")
+        return result

@@ -1,1 +1,0 @@
-"""``lightpen --self-test REPORT.json``: tests an installation."""

@@ -1,1 +1,0 @@
-"""Chains of signed entries, each with the hash of the one before."""

@@ -1,1 +1,0 @@
-"""Checks of an archive and of the files that it refers to."""

@@ -1,1 +1,0 @@
-"""Queries of an archive: entries by filters, the history of tips, what is due."""

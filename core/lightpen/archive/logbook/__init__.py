@@ -1,1 +1,0 @@
-"""The logbook of a station: it enters events, and updates the status of tips."""

@@ -1,1 +1,0 @@
-"""The database of an archive: its tables, opened for reading and writing."""

@@ -1,1 +1,0 @@
-"""Calibration records: read back, stated, recomputed."""

@@ -1,1 +1,0 @@
-"""Tips for other programs: tables, DCC, trackers, robots, statistics."""

@@ -1,0 +1,367 @@
+"""The data folder: verifications, camera calibrations, presence, clean-up."""
+
+import os
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any, Final
+from uuid import uuid4
+
+from msgspec import Struct, field
+
+from lightpen.errors import FileError
+from lightpen.formats.files import why_unwritten
+from lightpen.formats.opened_files import InputFile
+from lightpen.formats.own_json import (
+    DamagedError,
+    ProgramName,
+    StoredMessage,
+    ZonedTime,
+    parse_checked,
+    parse_own_json,
+    record_bytes,
+    record_heading,
+    require_usual,
+)
+from lightpen.formats.part_files import locked, sweep_parts
+from lightpen.messages import message
+from lightpen.model.names import Origin
+from lightpen.record.library.entered_files import add_numbered, entered_files
+from lightpen.record.library.signing import SigningKey
+from lightpen.record.library.supervision import read_supervision
+from lightpen.record.results.result_folder import RECORDS, RESULTS, SIMULATED
+from lightpen.record.swings.header import HEADER, Names
+from lightpen.record.swings.reading import IMAGES, JOURNAL, OPENER, last_verdict
+from lightpen.record.swings.writing import is_locked
+
+
+class TrialOutcome(StrEnum):
+    """Outcome of a verification or of the calibration of a camera."""
+
+    ACCEPTED = "accepted"
+    REFUSED = "refused"  # solved, but not used
+    ABANDONED = "abandoned"  # before a solution
+
+
+CAMERA_CALIBRATIONS = "camera-calibrations"
+CAMERA_CALIBRATION = message("file.camera-calibration")
+
+
+@dataclass(frozen=True, eq=False)
+class CameraTrial:
+    """An attempt to calibrate a camera by a board."""
+
+    outcome: TrialOutcome
+    board: str
+    serial: str  # empty for images from a folder
+    origin: Origin | None
+    images: Mapping[str, str]  # SHA-256 of file or pixels by name
+    found: Mapping[str, Any] | None = None  # the result, plain; None if abandoned
+    camera_file: InputFile | None = None  # None if not accepted
+
+
+class StoredTrial(Struct, frozen=True):
+    """Content of the file of an attempt, without the result."""
+
+    program: ProgramName
+    created: ZonedTime
+    outcome: TrialOutcome
+    station: str
+    operator: str
+    board: str
+    serial: str
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+
+
+def keep_camera_trial(
+    data: Path, trial: CameraTrial, names: Names, now: datetime
+) -> Path:
+    """Write the file of a camera calibration and return it."""
+    file = trial.camera_file
+    record = {
+        **record_heading(now),
+        "outcome": trial.outcome.value,
+        "station": names.station,
+        "operator": names.operator,
+        "board": trial.board,
+        "serial": trial.serial,
+        "origin": trial.origin,
+        "camera_file": None if file is None else _entry(file.path.name, file.sha256),
+        "calibration": trial.found,
+        "inputs": {"images": [_entry(*image) for image in trial.images.items()]},
+    }
+    return add_numbered(data, data / CAMERA_CALIBRATIONS, record_bytes(record))
+
+
+def read_camera_trial(content: bytes, file: Path) -> StoredTrial:
+    """Read the file of an attempt."""
+    try:
+        return parse_checked(content, StoredTrial)
+    except DamagedError as error:
+        raise FileError("camera-calibration.damaged", file=file) from error
+
+
+def _entry(name: str, sha256: str) -> dict[str, str]:
+    return {"file": name, "sha256": sha256}
+
+
+def check_writable(data: Path) -> None:
+    """Check by a temporary file that a folder can be written; create it if missing."""
+    try:
+        data.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=data) as file:
+            file.write(b"\n")
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise FileError(
+            "data-folder.unwritable", folder=data, reason=why_unwritten(error)
+        ) from error
+
+
+WINDOWS = "windows"
+SUFFIX = ".lock"
+
+
+class Presence:
+    """Tells other windows that this one uses a data folder, and counts them."""
+
+    def __init__(self, data: Path) -> None:
+        self._folder = data / WINDOWS
+        self._file = self._folder / f"{uuid4().hex}{SUFFIX}"
+        self._descriptor: int | None = None
+
+    def count_others(self) -> int:
+        """Count the other windows that use the folder, and announce this one.
+
+        In a folder that cannot be written, windows do not count each other.
+        """
+        with suppress(OSError):
+            self._announce()
+            others = (f for f in self._folder.glob(f"*{SUFFIX}") if f != self._file)
+            return sum(map(_is_held, others))
+        return 0
+
+    def leave(self) -> None:
+        """Remove this window from the list of open windows."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            os.close(descriptor)
+            with suppress(OSError):
+                self._file.unlink()
+
+    def _announce(self) -> None:
+        """Hold the file; another window that found it unlocked may have removed it."""
+        before = self._descriptor
+        if before is not None and not self._file.exists():
+            self._descriptor = None
+            os.close(before)
+        if self._descriptor is None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._descriptor = os.open(self._file, os.O_RDWR | os.O_CREAT)
+        locked(self._descriptor)
+
+
+def _is_held(file: Path) -> bool:
+    """Return whether another window holds its file; remove it if none does."""
+    try:
+        descriptor = os.open(file, os.O_RDWR)
+    except FileNotFoundError:  # it has just left
+        return False
+    try:
+        is_free = locked(descriptor)
+    finally:
+        os.close(descriptor)
+    if is_free:
+        with suppress(OSError):
+            file.unlink()
+    return not is_free
+
+
+OLDEST = 1.0  # s; longest time between creating a folder and locking its journal
+
+
+def sweep_leftovers(data: Path) -> None:
+    """Remove the parts of files, and folders of swings that never began.
+
+    Files that a running program is writing are left alone, and so are all other files.
+    """
+    sweep_parts(data / RESULTS)
+    with suppress(OSError):  # the search for interrupted swings shows it
+        for folder in list((data / RECORDS).iterdir()):
+            with suppress(OSError, FileError):
+                _sweep_record(folder)
+
+
+def _sweep_record(folder: Path) -> None:
+    with suppress(FileNotFoundError):
+        if last_verdict(folder) is not None:
+            return
+    is_fresh = time.time() - folder.stat().st_mtime < OLDEST
+    sweep_parts(folder)
+    sweep_parts(folder / IMAGES)
+    if not is_fresh and _has_never_begun(folder):
+        for path in folder.iterdir():
+            path.rmdir() if path.name == IMAGES else path.unlink()
+        folder.rmdir()
+
+
+def _has_never_begun(folder: Path) -> bool:
+    """Return whether a record was made here and was not completed."""
+    names = {path.name for path in folder.iterdir()}
+    others = {name for name in names if not name.startswith(("camera.", "pen."))}
+    if HEADER in names or not others <= {JOURNAL, IMAGES, OPENER}:
+        return False
+    if IMAGES in names and any((folder / IMAGES).iterdir()):
+        return False
+    journal = folder / JOURNAL
+    return JOURNAL not in names or not (journal.stat().st_size or is_locked(journal))
+
+
+VERIFICATIONS = "verifications"
+TOUCHES = "touches"  # in that folder: the images of live points, session by session
+CONCLUSION = "conclusion"
+VERIFIED = "verified"  # key of the task in the settings of an entry
+MEASURED_PART: Final = "part"  # kind of the task that measures a part
+BALL_CENTRE = "ball centre"  # of a measured feature: no surface was touched
+
+
+class _Verdict(StoredMessage, frozen=True, kw_only=True):
+    grade: str
+    limits_mm: dict[str, float] = field(default_factory=dict)
+
+
+class StoredImages(Struct, frozen=True):
+    """Folder of the images of a session."""
+
+    folder: str
+    journal_sha256: str
+
+
+class _Inputs(Struct, frozen=True):
+    touches: tuple[StoredImages, ...] = ()
+
+
+class StoredVerification(Struct, frozen=True):
+    """A verification in a data folder."""
+
+    program: ProgramName
+    created: ZonedTime
+    verification: str  # kind of the task; "conclusion" for the end of the session
+    station: str = ""
+    operator: str = ""
+    pen: str = ""
+    tip: str = ""
+    origin: Origin | None = None
+    temperature_c: float | None = None  # of the pen; None if not measured
+    humidity_percent: float | None = None  # of the room; None if not measured
+    camera_serials: tuple[str, ...] = ()  # of the cameras that saw the pen
+    verdict: _Verdict | None = None
+    ended: TrialOutcome | None = field(name="outcome", default=None)
+    reason: str = ""  # conclusion only: why a tip is used that did not pass
+    supervisor: str = ""  # conclusion only: who approved that
+    inputs: _Inputs = _Inputs()
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+
+    @property
+    def outcome(self) -> TrialOutcome:
+        """Outcome of the verification."""
+        if self.ended is not None:
+            return self.ended
+        has_passed = self.verdict is None or self.verdict.grade == "pass"
+        return TrialOutcome.ACCEPTED if has_passed else TrialOutcome.REFUSED
+
+    @property
+    def why(self) -> StoredMessage | None:
+        """Reason of the grade."""
+        verdict = self.verdict
+        if verdict is None:
+            return None
+        return StoredMessage(verdict.code, verdict.text, verdict.values)
+
+
+class _Kind(Struct):
+    verification: str = ""
+
+
+def is_verification(content: bytes) -> bool:
+    """Return whether a JSON file says that it is a verification."""
+    try:
+        return parse_own_json(content, _Kind).verification != ""
+    except DamagedError:
+        return False
+
+
+def read_verification(content: bytes, file: Path) -> StoredVerification:
+    """Read the file of a verification, approved as it must be in a data folder."""
+    try:
+        done = parse_checked(content, StoredVerification)
+    except DamagedError as error:
+        raise FileError("verification.damaged", file=file) from error
+    data = data_folder_of_verification(file)
+    if data is not None and done.supervisor:
+        counted = entered_files(data).counted(file, content)
+        if counted is not None:
+            counted.require_approved(read_supervision(data).key)
+    return done
+
+
+def attributed(
+    record: Mapping[str, Any], names: Names, origin: Origin | None
+) -> dict[str, Any]:
+    """Return the record of a verification with who made it where, of what."""
+    return {
+        **record,
+        "session": record["created"],
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": origin,
+    }
+
+
+def data_folder_of_verification(file: Path) -> Path | None:
+    """Return the data folder that a file is a verification of; None of other files."""
+    folder = file.absolute().parent
+    if folder.name != VERIFICATIONS:
+        return None
+    return folder.parents[folder.parent.name == SIMULATED]
+
+
+def keep_verification(
+    data: Path,
+    record: Mapping[str, Any],
+    supervisor: SigningKey | None = None,
+    *,
+    is_simulated: bool,
+) -> Path:
+    """Keep the record of a verification in a data folder, and return its file.
+
+    The supervisor whom it names approves it.
+    """
+    folder = verifications_folder(data, is_simulated=is_simulated)
+    return add_numbered(data, folder, record_bytes(record), supervisor)
+
+
+def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
+    """Return the verifications folder of a data folder."""
+    return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
+
+
+def conditions_entries(
+    temperature_c: float | None, humidity_percent: float | None
+) -> dict[str, float]:
+    """Return the measured environment as entries of a record."""
+    conditions = {"temperature_c": temperature_c, "humidity_percent": humidity_percent}
+    return {name: each for name, each in conditions.items() if each is not None}

@@ -1,1 +1,0 @@
-"""The data folder: verifications, camera calibrations, presence, clean-up."""

@@ -1,1 +1,0 @@
-"""Keys of stations and supervisors, and what a user account remembers."""

@@ -1,1 +1,0 @@
-"""Threads that own long procedures: serial queue, background tasks, faults."""

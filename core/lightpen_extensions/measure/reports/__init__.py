@@ -1,1 +1,0 @@
-"""Verifications as JSON records, text tables and control charts."""

@@ -1,1 +1,0 @@
-"""A verification session: its state, its rules and guidance."""
