@@ -166,10 +166,10 @@ UNWRITTEN, HUNG = 2, 3  # exit status
 NEAR = 0.005  # mm from the true tip
 MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2",
            "cryptography.hazmat.bindings._rust", "PySide6.QtWidgets",
-           "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
+           "PySide6.QtSvg", "pyqtgraph", "lightpen.cli",
            "lightpen_app.application")  # fmt: skip
-# Drive cameras, and reach an archive on a server.
-OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg")
+# Drive cameras, reach an archive on a server, and read workbooks.
+OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg", "python_calamine")
 
 
 def test_program(file: Path) -> int:

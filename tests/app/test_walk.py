@@ -182,6 +182,36 @@ def test_a_recorded_swing_gives_its_tip(
 
 
 @pytest.mark.slow
+def test_reading_300_images_can_be_ended_and_leaves_the_tips_as_before(
+    open_wizard: "OpenWizard", around: SourceEnvironment, shared_data: Path
+) -> None:
+    walker = open_wizard(replace(around, simulator=SceneSimulator()))
+    _begin_with_images(walker, shared_data / "swing-full")
+    walker.until_says("Found with the images: camera.yaml and leds.csv")
+    walker.click("Use both files")
+    walker.until(walker.main_button().isEnabled)
+    walker.click("Continue to the LEDs")
+    walker.until_says("10 of 10 LEDs")
+    walker.click("Continue to the swing")
+    walker.until(lambda: bool(re.search(r"[1-9]\d of 300", page_text(walker))))
+    results = walker.workbench.folder / "results"
+    before = walker.workbench.run.status.record_folder
+    tips = sorted(results.rglob("*"))
+
+    walker.click("Start over")
+    walker.click("Restart swing")
+
+    # The images read so far are set aside; it reads from the first image.
+    walker.until(lambda: walker.workbench.run.status.record_folder != before)
+    assert before is not None
+    assert len(list(before.glob("images/*.png"))) >= 10
+    walker.until(lambda: bool(re.search(r"\b\d of 300", page_text(walker))))
+    assert sorted(results.rglob("*")) == tips
+    walker.click("Back")
+    walker.until_shows("LEDs")
+
+
+@pytest.mark.slow
 def test_no_english_word_is_left_after_a_change_to_chinese(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
