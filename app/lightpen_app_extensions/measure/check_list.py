@@ -132,7 +132,7 @@ class CheckList(QListWidget):
         self.blockSignals(False)
 
     def show_row(self, index: int) -> None:
-        """Select a row as if nobody had."""
+        """Select a row without a signal."""
         if index != self.currentRow():
             self.blockSignals(True)
             self.setCurrentRow(index)

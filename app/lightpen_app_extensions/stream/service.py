@@ -236,7 +236,7 @@ class Streaming(QObject):
         self._reading.start(lambda _: _tip(archive, preparation), self._on_tip_read)
 
     def shut_down(self) -> None:
-        """Stream to nobody more; what a job has still to tell begins nothing more."""
+        """Open no stream any more; a job that ends later starts none."""
         self._wanted = self._opened = None
 
     def await_end(self, timeout_s: float) -> bool:

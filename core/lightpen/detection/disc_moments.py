@@ -69,7 +69,8 @@ def rows_of(table: Table, rows: BoolArray | IntArray | list[int]) -> Table:
     chosen = (
         rows_of(each, rows) if isinstance(each, tuple) else each[rows] for each in table
     )
-    return make(*chosen)  # type: ignore[no-any-return]
+    made: Table = make(*chosen)
+    return made
 
 
 def joined(tables: Sequence[Table]) -> Table:
@@ -81,7 +82,8 @@ def joined(tables: Sequence[Table]) -> Table:
         joined(each) if isinstance(each[0], tuple) else np.concatenate(each)
         for each in zip(*tables, strict=True)
     )
-    return make(*columns)  # type: ignore[no-any-return]
+    made: Table = make(*columns)
+    return made
 
 
 class DiscMoments(NamedTuple):
