@@ -17,7 +17,12 @@ from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen_extensions.measure.probing.probing import ProbingRules
-from lightpen_extensions.measure.probing.sources import touch_place, touch_run
+from lightpen_extensions.measure.probing.sources import (
+    ProbingRun,
+    observe_place,
+    touch_place,
+    touches_of,
+)
 from lightpen_extensions.measure.tasks.fixed_point import measure_fixed_point
 from lightpen_extensions.measure.tasks.part import sizes_of
 from lightpen_extensions.measure.tasks.registry import measure_artefacts
@@ -68,13 +73,10 @@ def _covered(n_calibrations: int, n_touches: int, seed: int) -> float:
 def _of_sets(data: Path) -> list[Row]:
     instrument = _instrument(data / "swing-full")
     conditions = Conditions(instrument, nominal_tip=NOMINAL_TIP)
-    place = touch_place((str(data / "fixed-point" / "images"),))
-    touched = touch_run(place, instrument, ONE_IMAGE)
+    touched = _touched(data / "fixed-point" / "images", instrument)
     point = measure_fixed_point([(touched.name, touched.touches)], conditions)
     runs = [
-        touch_run(
-            touch_place((str(data / "circle" / f"run_{i:02d}"),)), instrument, ONE_IMAGE
-        )
+        _touched(data / "circle" / f"run_{i:02d}", instrument)
         for i in range(1, N_RUNS + 1)
     ]
     ring = Artefact(ArtefactKind.RING, RADIUS)
@@ -107,3 +109,10 @@ def _instrument(folder: Path) -> Instrument:
     pen = read_pen(folder / "leds.csv")
     images = find_images(str(folder / "images"))
     return calibrate(camera, pen, observe_images(images, camera, pen)).instrument
+
+
+def _touched(folder: Path, instrument: Instrument) -> ProbingRun:
+    place = touch_place((str(folder),))
+    return touches_of(
+        place.name, observe_place(place, instrument), instrument, ONE_IMAGE
+    )

@@ -21,7 +21,7 @@ from lightpen_extensions.measure.session import (
 )
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART
-from lightpen_extensions.measure.tasks.task import VerificationChoices
+from lightpen_extensions.measure.tasks.task import Conditions, VerificationChoices
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import simulate_centers, swing_poses
@@ -66,10 +66,8 @@ def verified(seed: int = 1) -> Verified:
     )
     for task in (FIXED_POINT, PART):
         choices = VerificationChoices(task.kind, plan)
-        setup, state = (
-            SessionSetup(instrument, choices, cone_cam=scene.cone_cam),
-            SessionState(),
-        )
+        conditions = Conditions(instrument, cone_cam=scene.cone_cam)
+        setup, state = SessionSetup(conditions, choices), SessionState()
         while state.done is None and clock.now_ns() < GIVE_UP * 1e9:
             probing_operator.follow(setup, state)
             frame = camera.read(1.0)

@@ -41,7 +41,7 @@ class PartValue:
     # (M, 3), what is drawn as large as fits; empty for all of it
     focus: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     tip: FloatArray | None = None  # (3,), at present
-    goal: FloatArray | None = None  # (3,), most informative next point
+    goal: FloatArray | None = None  # (3,), a next point, far from the others
 
 
 EMPTY = np.zeros((0, 3))

@@ -56,7 +56,8 @@ class ProbingOperator:
         if must_move_on:
             operator.lift()
         elif goal.point is not None:
-            operator.touch(_ball_on(goal, goal.point, setup.ball_diameter or 0.0))
+            ball = setup.conditions.ball_diameter or 0.0
+            operator.touch(_ball_on(goal, goal.point, ball))
         else:
             is_other = before is None or before.task is not task
             if is_lifted or is_same_again or is_other:

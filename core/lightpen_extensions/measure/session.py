@@ -10,7 +10,6 @@ from typing import Protocol
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
 from lightpen.comparisons.assessment import VerificationAssessment
 from lightpen.detection.pen_detection import PenDetection
 from lightpen.detection.pixel_box import RegionOfInterest
@@ -31,11 +30,7 @@ from lightpen_extensions.measure.probing.probing import (
     with_taken,
 )
 from lightpen_extensions.measure.probing.sources import require_leds_fit
-from lightpen_extensions.measure.tasks.probed_point import (
-    NO_DRIFT,
-    StillFrames,
-    measure_touches,
-)
+from lightpen_extensions.measure.tasks.probed_point import StillFrames, measure_touches
 from lightpen_extensions.measure.tasks.registry import AnyTask, task_of
 from lightpen_extensions.measure.tasks.task import (
     Band,
@@ -63,14 +58,15 @@ BROKEN_OFF = message("session.broken-off")
 
 @dataclass(frozen=True, eq=False)
 class SessionSetup:
-    """Instrument, tasks and artefacts; see `Conditions`."""
+    """A task, and under which conditions its points are measured and judged."""
 
-    instrument: Instrument
+    conditions: Conditions
     choices: VerificationChoices = field(default_factory=VerificationChoices)
-    ball_diameter: float | None = None
-    nominal_tip: FloatArray | None = None
-    cone_cam: FloatArray | None = None
-    drift: FloatArray = field(default_factory=NO_DRIFT.copy)
+
+    @property
+    def instrument(self) -> Instrument:
+        """The instrument."""
+        return self.conditions.instrument
 
     @property
     def task(self) -> AnyTask:
@@ -84,24 +80,13 @@ class SessionSetup:
         n_frames = self.task.n_frames(self.choices)
         return ProbingRules(n_frames, min_turn=turn, min_distance=distance)
 
-    @property
-    def conditions(self) -> Conditions:
-        """Under which points are measured and judged."""
-        return Conditions(
-            self.instrument,
-            self.choices.limits,
-            self.ball_diameter,
-            nominal_tip=self.nominal_tip,
-            cone_cam=self.cone_cam,
-            drift=self.drift,
-        )
-
 
 def with_drift(setup: SessionSetup, reference: LampDrift | None) -> SessionSetup:
     """Return the conditions with the camera drift measured by lamps."""
     if reference is None:
         return setup
-    return replace(setup, drift=np.maximum(setup.drift, reference.share))
+    drift = np.maximum(setup.conditions.drift, reference.share)
+    return replace(setup, conditions=replace(setup.conditions, drift=drift))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,20 +162,15 @@ def bands_so_far(setup: SessionSetup, state: SessionState) -> tuple[Band, ...]:
     runs = state.runs
     if task.judges_points and state.touches:
         runs = (*runs, state.touches)
-    given = setup.choices, setup.instrument, setup.ball_diameter
-    return _bands_of(*given, runs) if runs else ()
+    return _bands_of(setup.choices, setup.conditions, runs) if runs else ()
 
 
 @lru_cache(maxsize=8)
 def _bands_of(
-    choices: VerificationChoices,
-    instrument: Instrument,
-    ball_diameter: float | None,
-    runs: tuple[Points, ...],
+    choices: VerificationChoices, conditions: Conditions, runs: tuple[Points, ...]
 ) -> tuple[Band, ...]:
     """Return the values of some runs; none as long as they do not determine any."""
     task = task_of(choices.kind)
-    conditions = Conditions(instrument, choices.limits, ball_diameter)
     try:
         found = task.measure(numbered_runs(runs), conditions, choices)
     except CalibrationError:
@@ -223,9 +203,14 @@ class SessionTransition:
 
 def setup_of(tip: CurrentTip, choices: VerificationChoices) -> SessionSetup:
     """Return the setup of a session with a current tip."""
-    return SessionSetup(
-        tip.instrument, choices, tip.names.ball_diameter, tip.nominal_tip, tip.cone_cam
+    conditions = Conditions(
+        tip.instrument,
+        choices.limits,
+        tip.names.ball_diameter,
+        nominal_tip=tip.nominal_tip,
+        cone_cam=tip.cone_cam,
     )
+    return SessionSetup(conditions, choices)
 
 
 def advance_session(

@@ -335,7 +335,7 @@ class VerificationWorkflow:
         if choices.kind != setup.choices.kind:
             self._begin(tip)
             return
-        setup = replace(setup, choices=choices)
+        setup = setup_of(tip, choices)
         refusal = self._why_not(tip)
         self._publish(replace(status, setup=setup, refusal=refusal))
 

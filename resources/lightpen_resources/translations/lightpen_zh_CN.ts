@@ -8264,10 +8264,6 @@ needed</source>
         <translation>{name} 中镜头残差场的协方差不是协方差矩阵：它必须对称，且相关系数在 -1 到 1 之间。请更正或删除条目 lens_field。</translation>
     </message>
     <message>
-        <source>The criterion {criterion} is not defined for a {kind}. Use least squares.</source>
-        <translation>评定准则“{criterion}”不适用于{kind}。请使用最小二乘。</translation>
-    </message>
-    <message>
         <source>The datum points are on one line, which leaves the rotation about it undetermined. Add a point beside that line.</source>
         <translation>基准点位于同一条直线上，绕该直线的转动不能确定。请在直线之外增加一点。</translation>
     </message>
@@ -9032,20 +9028,8 @@ needed</source>
         <translation>直线</translation>
     </message>
     <message>
-        <source>maximum inscribed feature</source>
-        <translation>最大内切要素</translation>
-    </message>
-    <message>
         <source>measuring plan</source>
         <translation>测量计划</translation>
-    </message>
-    <message>
-        <source>minimum circumscribed feature</source>
-        <translation>最小外接要素</translation>
-    </message>
-    <message>
-        <source>minimum zone</source>
-        <translation>最小区域</translation>
     </message>
     <message>
         <source>no matching entry</source>

@@ -24,11 +24,7 @@ from lightpen.model.artefacts import Side
 from lightpen.model.coverage import COVERAGE, symmetric_root
 from lightpen_extensions.measure.measuring import constructions
 from lightpen_extensions.measure.measuring.alignment import Quantity, derive
-from lightpen_extensions.measure.measuring.compensation import (
-    Criterion,
-    TouchedSurface,
-    fit_zone,
-)
+from lightpen_extensions.measure.measuring.compensation import TouchedSurface
 from lightpen_extensions.measure.measuring.features import AXIS, PLACE, Feature
 from lightpen_extensions.measure.measuring.next_touch import PartTouches
 from lightpen_extensions.measure.measuring.plan import CharacteristicKind as Of
@@ -205,11 +201,9 @@ def _deviation(
 
 
 def _form(planned: PlannedCharacteristic, one: Measured, inputs: FloatArray) -> Value:
-    """Return the form error by the minimum zone, with U by its residuals."""
+    """Return the form error about least squares, with U by its residuals."""
     if one.feature is None or one.points is None:
         raise _refused(planned)
-    points = one.points.values.reshape(-1, 3)
-    *_, width = fit_zone(one.kind, points, Criterion.MINIMUM_ZONE)
     n_points, n_distances = one.feature.distances.shape
     errors = one.feature.distances_by_points @ one.points.by_inputs
     drawn = _draws(errors, inputs).reshape(N_DRAWS, n_points, n_distances)
@@ -217,7 +211,7 @@ def _form(planned: PlannedCharacteristic, one: Measured, inputs: FloatArray) -> 
         widths = 2 * np.linalg.norm(drawn, axis=2).max(axis=1)
     else:
         widths = np.ptp(drawn[:, :, 0], axis=1)
-    return Value(width, float(np.quantile(widths, COVERAGE)))
+    return Value(one.feature.form_error, float(np.quantile(widths, COVERAGE)))
 
 
 def _draws(errors: FloatArray, inputs: FloatArray) -> FloatArray:

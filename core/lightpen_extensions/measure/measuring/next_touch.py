@@ -1,14 +1,4 @@
-"""Most informative place of the next touch on a feature.
-
-Of places spread over the feature, the chosen one most reduces the volume of the
-covariance of its unknowns (D-optimal design [1]_): with the derivatives ``J`` of the
-distances of all touches and ``j`` of the new one, ``det(I + j (J^T J)^-1 j^T)`` is
-largest.
-
-References
-----------
-.. [1] V. V. Fedorov, "Theory of Optimal Experiments", Academic Press (1972), ch. 3.
-"""
+"""The points of a part: those probed, and places to probe that lie far from them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,12 +11,10 @@ from lightpen_extensions.measure.measuring.features import Feature, frame_about
 from lightpen_extensions.measure.measuring.plan import Nominal
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 
-RIDGE = 1e-6  # of the squares of a touch: what is known before the first
 N_ROUND, N_ALONG = 24, 5  # places round an axis and along it
 N_GRID = 7  # places along the sides of a plane
 INSIDE = 0.8  # of the extent: edges are not probed
 HALF_ANGLE = np.radians(70.0)  # of a sphere, about its accessible pole
-APART = 1.0  # mm, of two touches
 USUAL_LENGTH = 20.0  # mm, of a feature whose nominal has none
 
 
@@ -41,10 +29,6 @@ class ProbedArea:
     half: FloatArray  # (3,), half of its extent along its axes, mm
     # (3,), direction to the accessible side of a sphere, frame of the feature
     pole: FloatArray
-
-    def local(self, points: FloatArray) -> FloatArray:
-        """Return points (N, 3) in the frame of the feature."""
-        return np.asarray((points - self.origin) @ self.axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,38 +86,23 @@ def _level_frame(z: FloatArray) -> FloatArray:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-def best_places(
+def spread_places(
     area: ProbedArea, n: int, touched: FloatArray | None = None
 ) -> list[Place]:
-    """Return the n most informative places, one after the other.
+    """Return n places, each as far as can be from those before it.
 
     ``touched`` (N, 3) are points that are probed already.
     """
-    surface = SURFACES[area.kind]
     places = _places(area)
-    J = surface.derivatives(places, area.sizes)[1]
-    unit = float(np.mean(np.sum(J**2, axis=(1, 2)))) / surface.n_unknowns
-    scale = np.sqrt(np.mean(J**2, axis=(0, 1))) + 1e-12
-    J = J / scale
-    known = RIDGE * np.eye(surface.n_unknowns) * max(unit, 1.0)
+    away = np.full(len(places), np.inf)
     if touched is not None and len(touched):
-        own = surface.derivatives(area.local(touched), area.sizes)[1] / scale
-        own = own.reshape(-1, surface.n_unknowns)
-        known = known + own.T @ own
-    is_free = np.ones(len(places), dtype=bool)
-    if touched is not None and len(touched):
-        away = np.linalg.norm(places[:, None] - area.local(touched), axis=2)
-        is_free = away.min(axis=1) > APART
+        own = (touched - area.origin) @ area.axes
+        away = np.linalg.norm(places[:, None] - own, axis=2).min(axis=1)
     found = []
     for _ in range(n):
-        if not is_free.any():
-            is_free[:] = True
-        inner = J @ np.linalg.inv(known) @ np.swapaxes(J, 1, 2)
-        gains = np.linalg.slogdet(np.eye(inner.shape[1]) + inner)[1]
-        best = int(np.argmax(np.where(is_free, gains, -np.inf)))
-        is_free &= np.linalg.norm(places - places[best], axis=1) > APART
-        known = known + J[best].T @ J[best]
-        found.append(_place(area, places[best]))
+        farthest = places[int(np.argmax(away))]
+        away = np.minimum(away, np.linalg.norm(places - farthest, axis=1))
+        found.append(_place(area, farthest))
     return found
 
 

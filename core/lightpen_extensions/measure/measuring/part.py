@@ -29,13 +29,11 @@ from lightpen_extensions.measure.measuring.characteristics import (
     evaluate,
 )
 from lightpen_extensions.measure.measuring.compensation import (
-    Criterion,
     Evidence,
     Normal,
     ProbedFeature,
     TouchedSurface,
     along_touches,
-    fit_zone,
     surface_of,
 )
 from lightpen_extensions.measure.measuring.constructions import recognise, recognised
@@ -47,7 +45,6 @@ from lightpen_extensions.measure.measuring.features import (
 )
 from lightpen_extensions.measure.measuring.next_touch import PartTouches
 from lightpen_extensions.measure.measuring.plan import (
-    NEVER,
     CharacteristicKind,
     Nominal,
     Plan,
@@ -307,11 +304,7 @@ def _determined(planned: PlannedFeature, touches: PartTouches, at: IntArray) -> 
         if height < FLAT_POINTS * extent + noise:
             raise CalibrationError("measuring.undetermined", kind=NAMES[kind])
     _require_determined(feature, touches, at)
-    if planned.criterion == NEVER:
-        return feature
-    # The points that touch the zone define it; its U is taken from least squares.
-    origin, axes, sizes, _ = fit_zone(kind, points, Criterion(planned.criterion))
-    return replace(feature, origin=origin, axes=axes, sizes=sizes)
+    return feature
 
 
 def _require_determined(feature: Feature, touches: PartTouches, at: IntArray) -> None:

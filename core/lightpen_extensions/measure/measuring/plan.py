@@ -25,7 +25,6 @@ from lightpen.model.coverage import DecisionRule
 from lightpen_extensions.measure.measuring.surfaces import SURFACES, FeatureKind
 
 MAX_FREE = 50  # features of a part without a plan
-NEVER = "least squares"
 FARTHEST = 1e6  # mm or degrees, of what a plan states
 REDUNDANT = 2  # times as many points as determine a feature
 UNKNOWN_TOUCHES = 8  # of a feature to be recognised
@@ -114,7 +113,6 @@ class PlannedFeature(_Entry, frozen=True):
     # Number of points; None for the usual one.
     touches: Annotated[int, Meta(ge=1, le=10_000)] | None = None
     side: Side = Side.AUTO
-    criterion: str = NEVER
     nominal: Nominal | None = None
     # Of a point or line, the normal of the surface that was touched: that of a plane
     # of the plan, or a vector out of the material, frame of the part. Without them a

@@ -21,11 +21,9 @@ from lightpen_extensions.measure.measuring.characteristics import (
     NEEDS_DATUM,
     is_defined,
 )
-from lightpen_extensions.measure.measuring.compensation import Criterion
 from lightpen_extensions.measure.measuring.constructions import constructor
 from lightpen_extensions.measure.measuring.plan import (
     FARTHEST,
-    NEVER,
     Plan,
     PlannedAlignment,
     PlannedCharacteristic,
@@ -146,8 +144,6 @@ def _of_feature(
         *(None, FeatureKind.PLANE)
     }:
         yield f"the surface {each.surface!r} is no plane of the plan"
-    if each.criterion not in {NEVER, *(known.value for known in Criterion)}:
-        yield f"the criterion {each.criterion!r} is unknown"
 
 
 def _of_alignment(

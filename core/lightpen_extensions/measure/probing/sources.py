@@ -306,24 +306,10 @@ def _fitted_rig(viewers: PenCameras, fitted: InstrumentRecord) -> Rig:
     )
 
 
-def touch_run(
-    place: ImageLocation, instrument: Instrument, rules: ProbingRules
-) -> ProbingRun:
-    """Find the touches in images.
-
-    With one image a touch, and none to settle, each image is a touch; else the pen must
-    be held still through as many as the rules say. Images with a recorded touch need no
-    rules. Raises `CalibrationError` if no image shows the pen, or the LEDs are of
-    another pen.
-    """
-    seen = observe_place(place, instrument)
-    return touches_of(place.name, seen, instrument, rules, place.touches)
-
-
 def observe_place(
     place: ImageLocation, instrument: Instrument
 ) -> tuple[Observations, ...]:
-    """Find and label the LEDs in the images of each camera; see `touch_run`."""
+    """Find and label the LEDs in the images of each camera."""
     rig, pen = instrument.rig, instrument.pen
     if len(place.images) != rig.n_cameras:
         raise UsageError(
@@ -346,7 +332,13 @@ def touches_of(
     rules: ProbingRules,
     touches_known: Sequence[RecordedTouch] | None = None,
 ) -> ProbingRun:
-    """Return the touches in the observations of each camera; see `touch_run`."""
+    """Return the touches in the observations of each camera.
+
+    With one image a touch, and none to settle, each image is a touch; else the pen must
+    be held still through as many as the rules say. Images with a recorded touch need no
+    rules. Raises `CalibrationError` if no image shows the pen, or the LEDs are of
+    another pen.
+    """
     images = _detections(seen, instrument)
     if not any(detection.has_pose for _, detection in images):
         raise _no_pen(name, seen[0])

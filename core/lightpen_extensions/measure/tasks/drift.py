@@ -37,7 +37,7 @@ from lightpen_extensions.measure.tasks.fixed_point import (
     elsewhere,
     without_others,
 )
-from lightpen_extensions.measure.tasks.probed_point import mean_point
+from lightpen_extensions.measure.tasks.probed_point import joint_covariance
 from lightpen_extensions.measure.tasks.task import (
     Band,
     Conditions,
@@ -83,15 +83,14 @@ def measure_drift(
     if len(visits) < MIN_VISITS:
         raise CalibrationError("drift.too-few")
     instrument = conditions.instrument.seated
-    first, *others = [
-        mean_point([touch.seated for touch in touches]) for _, touches in visits
-    ]
-    moves = np.array([each.point_cam - first.point_cam for each in (first, *others)])
-    covariances = np.zeros((len(visits), 3, 3))
-    for i, each in enumerate(others, start=1):
-        row = each.sensitivity - first.sensitivity
-        shared = row @ instrument.covariance @ row.T
-        covariances[i] = shared + each.noise + first.noise
+    points = [point.seated for _, own in visits for point in own]
+    owners = np.repeat(np.arange(len(visits)), [len(own) for _, own in visits])
+    shares = np.equal.outer(np.arange(len(visits)), owners).astype(float)
+    means = shares / shares.sum(axis=1, keepdims=True)
+    differences = means - means[0]
+    moves = differences @ np.array([point.point_cam for point in points])
+    spread = joint_covariance(points, instrument).reshape(len(points), 3, -1, 3)
+    covariances = np.einsum("vn,niMj,vM->vij", differences, spread, differences)
     variances = np.diagonal(covariances, axis1=1, axis2=2)
     names = tuple(name for name, _ in visits)
     return Drift(

@@ -35,8 +35,8 @@ from lightpen_extensions.measure.measuring.next_touch import (
     PartTouches,
     Place,
     area_of,
-    best_places,
     nominal_area,
+    spread_places,
 )
 from lightpen_extensions.measure.measuring.part import (
     CharacteristicResult,
@@ -123,7 +123,7 @@ class FeatureSoFar:
     planned: PlannedFeature
     kind: FeatureKind | None  # as planned, or as recognised so far
     fit: Feature | None = None  # to the ball centres, once they determine it
-    next_touch: Place | None = None  # the most informative one, frame of the camera
+    next_touch: Place | None = None  # far from the others, frame of the camera
 
 
 def feature_so_far(
@@ -138,7 +138,7 @@ def feature_so_far(
     if fit is None:
         return FeatureSoFar(planned, kind)
     places = np.array([point.point_cam for point in points])
-    place = best_places(area_of(fit, places), 1, places)[0]
+    place = spread_places(area_of(fit, places), 1, places)[0]
     return FeatureSoFar(planned, kind, fit, place)
 
 
@@ -172,7 +172,7 @@ def planned_places(planned: PlannedFeature) -> tuple[Place, ...]:
     area = nominal_area(planned.kind, planned.nominal)
     if area is None:
         return ()
-    places = best_places(area, planned.n_touches)
+    places = spread_places(area, planned.n_touches)
     if planned.side is Side.INSIDE:
         places = [replace(each, normal=-each.normal) for each in places]
     if planned.side is Side.CENTRE:

@@ -98,24 +98,6 @@ class ProbedPoint:
         return np.asarray(self.noise + shared)
 
 
-@dataclass(frozen=True, eq=False)
-class MeanPoint:
-    """A point averaged over several touches, see `ProbedPoint`."""
-
-    point_cam: FloatArray
-    noise: FloatArray
-    sensitivity: FloatArray
-
-
-def mean_point(touches: Sequence[ProbedPoint]) -> MeanPoint:
-    """Return the mean of touches of one point."""
-    return MeanPoint(
-        point_cam=np.mean([touch.point_cam for touch in touches], axis=0),
-        noise=np.sum([touch.noise for touch in touches], axis=0) / len(touches) ** 2,
-        sensitivity=np.mean([touch.sensitivity for touch in touches], axis=0),
-    )
-
-
 def measure_touches(
     instrument: Instrument, held: Sequence[StillFrames]
 ) -> tuple[ProbedPoint, ...]:
@@ -179,7 +161,7 @@ def with_tip(
 
 
 def joint_covariance(
-    points: Sequence[ProbedPoint | MeanPoint], instrument: Instrument
+    points: Sequence[ProbedPoint], instrument: Instrument
 ) -> FloatArray:
     """Return the covariance of several points with what they share, (3 n, 3 n)."""
     rows = np.concatenate([point.sensitivity for point in points])

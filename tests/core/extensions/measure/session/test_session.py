@@ -35,6 +35,7 @@ from lightpen_extensions.measure.tasks.drift import DRIFT
 from lightpen_extensions.measure.tasks.fixed_point import FIXED_POINT
 from lightpen_extensions.measure.tasks.part import PART, sizes_of
 from lightpen_extensions.measure.tasks.registry import TASKS, AnyTask
+from lightpen_extensions.measure.tasks.task import Conditions
 from lightpen_extensions.simulator.camera import SimulatedCamera
 from lightpen_extensions.simulator.scenes import Scene
 from lightpen_extensions.simulator.swings import paper_camera
@@ -59,7 +60,7 @@ def test_a_simulated_operator_completes_a_task_without_a_key(
         rig_of(scene.camera), pen, scene.tip_pen, 1e-6 * np.eye(3), 0.01
     )
     choices = replace(CHOICES, kind=task.kind, n_frames=2)
-    setup = SessionSetup(instrument, choices, cone_cam=scene.cone_cam)
+    setup = SessionSetup(Conditions(instrument, cone_cam=scene.cone_cam), choices)
     clock = SkippingClock()
     camera = SimulatedCamera(scene, clock)
     camera.open()
@@ -132,7 +133,7 @@ class Session:
 
 @pytest.fixture
 def session(instrument: Instrument) -> Session:
-    setup = SessionSetup(instrument, CHOICES)
+    setup = SessionSetup(Conditions(instrument), CHOICES)
     return Session(setup, Holder(instrument.rig, instrument.pen))
 
 

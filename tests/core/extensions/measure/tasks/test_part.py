@@ -87,7 +87,7 @@ class Station:
 
 def station(instrument: Instrument, plan: Plan) -> Station:
     choices = VerificationChoices(PART.kind, plan, n_frames=2)
-    setup = SessionSetup(instrument, choices, BALL)
+    setup = SessionSetup(Conditions(instrument, ball_diameter=BALL), choices)
     return Station(setup, Holder(instrument.rig, instrument.pen))
 
 
@@ -319,10 +319,10 @@ def test_points_that_do_not_determine_their_feature_are_reported_at_once(
 
 
 def test_nothing_is_measured_without_a_plan(instrument: Instrument) -> None:
-    setup = replace(SessionSetup(instrument), ball_diameter=BALL)
+    conditions = Conditions(instrument, ball_diameter=BALL)
 
     with pytest.raises(CalibrationError, match="No measuring plan"):
-        PART.measure([], setup.conditions, VerificationChoices())
+        PART.measure([], conditions, VerificationChoices())
     assert PART.missing(VerificationChoices(), BALL) is not None
 
 

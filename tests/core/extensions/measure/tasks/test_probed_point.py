@@ -23,7 +23,6 @@ from lightpen_extensions.measure.tasks.probed_point import (
     _mean_noise,
     _pooled_sigma,
     joint_covariance,
-    mean_point,
     measure_touches,
     point_sensitivities,
     with_tip,
@@ -150,9 +149,6 @@ def test_what_touches_share_drops_out_of_their_difference(
 
     assert np.trace(together) < 0.1 * np.trace(alone)
     np.testing.assert_allclose(covariance[:3, :3], touches[0].covariance(instrument))
-    np.testing.assert_allclose(
-        mean_point(touches).noise, (touches[0].noise + touches[1].noise) / 4
-    )
 
 
 def test_another_tip_moves_the_point_with_the_pen(
