@@ -235,7 +235,8 @@ def fit_bundle(
         else _begun(unknowns, begin, pixels)
     )
     last = np.zeros(2 * N_CONE)
-    for n_pass in range(MAX_PASSES):
+    # Another solution has its jitter already.
+    for n_pass in range(0 if begin is None else 2, MAX_PASSES):
         weight_sigma = max(now.sigma * float(np.sqrt(inflation)), FINEST)
         finding = 0 < n_pass <= FINDING_PASSES
         # The jitter first: without it, other random effects would absorb it.

@@ -172,74 +172,65 @@ def eliminate(
         Covariance of the seat from image to image, mm^2.
     """
     n_images, _, n_leds = used.shape
-    sizes = [view.own.shape[-1] for view in views]
-    n_fields = views[0].fields.shape[-1]
-    K = N_CONE + sum(sizes) + n_fields + 1 + 3 * n_leds
-    at_fields, at_leds = K - 3 * n_leds - 1 - n_fields, K - 3 * n_leds
+    ends = np.cumsum([0, *(view.own.shape[-1] for view in views)])
+    n = N_TURN + N_CONE + int(ends[-1]) + views[0].fields.shape[-1] + 1
+    K = n - N_TURN + 3 * n_leds
+    own_of_all = np.zeros((n_images, n_leds, 2, ends[-1]))
     N, b = np.zeros((K, K)), np.zeros(K)
     q = N_TURN if jitter is None else N_TURN + N_CONE
-    inner = np.zeros((n_images, q, q))
-    inner_right = np.zeros((n_images, q))
-    to_inner = np.zeros((n_images, K, q))
-    cone_rows = np.zeros((n_images, N_CONE, K))
-    cone_right = np.zeros((n_images, N_CONE))
-    own_start = N_CONE
+    # Of each image, rows of its turn and its cone; columns: turn, then those of all.
+    rows = np.zeros((n_images, N_TURN + N_CONE, N_TURN + K))
+    right = np.zeros((n_images, N_TURN + N_CONE))
+    at_led = (n - N_TURN + np.arange(3 * n_leds)).reshape(n_leds, 3)
     for c, view in enumerate(views):
-        k = sizes[c]
+        own = own_of_all.copy()
+        own[..., ends[c] : ends[c + 1]] = view.own
         J = np.concatenate(
             [
-                *(view.turn, view.cone, view.own, view.fields),
+                *(view.turn, view.cone, own, view.fields),
                 *(view.diameter[..., None], view.led),
             ],
             axis=3,
         )
-        mask = used[:, c, :, None]
-        J = np.where(mask[..., None], J, 0.0) / sigma
-        r = np.where(mask, view.residuals, 0.0) / sigma
-        shared = np.r_[0:N_CONE, own_start : own_start + k, at_fields:at_leds]
-        own_start += k
-        n = N_TURN + N_CONE + k + n_fields + 1  # columns that all LEDs share
-        rows = J[..., :n].reshape(n_images, 2 * n_leds, n)
-        H = np.swapaxes(rows, 1, 2) @ rows
-        g = (r.reshape(n_images, 1, -1) @ rows)[:, 0]
-        by_led = J[..., n:]
-        cross = np.swapaxes(by_led, 2, 3) @ J[..., : N_TURN + N_CONE]
-        cross = cross.reshape(n_images, 3 * n_leds, -1)
+        J[~used[:, c]] = 0.0
+        r = np.where(used[:, c, :, None], view.residuals, 0.0)
+        by_image = J.reshape(n_images, 2 * n_leds, -1)
+        first = np.swapaxes(by_image[..., : N_TURN + N_CONE], 1, 2)
+        rows[..., :n] += first @ by_image[..., :n]
+        right += (first @ r.reshape(n_images, -1, 1))[..., 0]
+        cross = np.swapaxes(J[..., : N_TURN + N_CONE], 2, 3) @ J[..., n:]
+        rows[..., n:] += np.swapaxes(cross, 1, 2).reshape(n_images, 6, -1)
+        shared = J[..., N_TURN:n].reshape(-1, n - N_TURN)  # columns of all LEDs
+        N[: n - N_TURN, : n - N_TURN] += shared.T @ shared
+        b[: n - N_TURN] += r.ravel() @ shared
         # All images of one LED beside each other.
         of_led = np.swapaxes(J, 0, 1).reshape(n_leds, 2 * n_images, -1)
-        r_of_led = np.swapaxes(r, 0, 1).reshape(n_leds, 2 * n_images, 1)
         transposed = np.swapaxes(of_led[..., n:], 1, 2)
-        N[np.ix_(shared, shared)] += H[:, 3:, 3:].sum(axis=0)
-        coupling = (transposed @ of_led[..., 3:n]).reshape(3 * n_leds, -1)
-        N[np.ix_(np.arange(at_leds, K), shared)] += coupling
-        N[np.ix_(shared, np.arange(at_leds, K))] += coupling.T
-        blocks = transposed @ of_led[..., n:]
-        for j in range(n_leds):
-            at = slice(at_leds + 3 * j, at_leds + 3 * j + 3)
-            N[at, at] += blocks[j]
-        b[shared] += g[:, 3:].sum(axis=0)
-        b[at_leds:] += (transposed @ r_of_led).ravel()
-        inner += H[:, :q, :q]
-        inner_right += g[:, :q]
-        to_inner[:, shared] += H[:, 3:, :q]
-        to_inner[:, at_leds:] += cross[..., :q]
-        cone_rows[:, :, shared] += H[:, 3:6, 3:]
-        cone_rows[:, :, at_leds:] += np.swapaxes(cross[..., N_TURN:], 1, 2)
-        cone_right += g[:, 3:6]
+        N[n - N_TURN :, : n - N_TURN] += (transposed @ of_led[..., N_TURN:n]).reshape(
+            3 * n_leds, -1
+        )
+        N[at_led[:, :, None], at_led[:, None]] += transposed @ of_led[..., n:]
+        r_of_led = np.swapaxes(r, 0, 1).reshape(n_leds, 2 * n_images, 1)
+        b[n - N_TURN :] += (transposed @ r_of_led).ravel()
+    N[: n - N_TURN, n - N_TURN :] = N[n - N_TURN :, : n - N_TURN].T
+    for each in (N, b, rows, right):
+        each /= sigma**2
+    inner, to_inner = rows[:, :q, :q].copy(), rows[:, :q, N_TURN:]
     inner[:, range(N_TURN), range(N_TURN)] += TURN_RIDGE / sigma**2
     if jitter is not None:
         inner[:, N_TURN:, N_TURN:] += np.linalg.inv(jitter)
     nuisance_covariance = np.asarray(np.linalg.inv(inner), dtype=np.float64)
-    gain: FloatArray = nuisance_covariance @ np.swapaxes(to_inner, 1, 2)  # (N, q, K)
-    turn = np.einsum("nij,nj->ni", nuisance_covariance, inner_right)
-    N -= np.tensordot(to_inner, gain, axes=([0, 2], [0, 1]))
-    b -= np.einsum("nki,ni->k", to_inner, turn)
-    to_cone = to_inner[:, :N_CONE]
+    gain: FloatArray = nuisance_covariance @ to_inner
+    turn = (nuisance_covariance @ right[:, :q, None])[..., 0]
+    flat = to_inner.reshape(-1, K)
+    N -= flat.T @ gain.reshape(-1, K)
+    b -= turn.ravel() @ flat
+    to_cone = np.swapaxes(to_inner[..., :N_CONE], 1, 2)
     return Eliminated(
         N=0.5 * (N + N.T),
         b=b,
-        cone_rows=cone_rows - to_cone @ gain,
-        cone_right=cone_right - np.einsum("nij,nj->ni", to_cone, turn),
+        cone_rows=rows[:, N_TURN:, N_TURN:] - to_cone @ gain,
+        cone_right=right[:, N_TURN:] - (to_cone @ turn[..., None])[..., 0],
         turn=turn,
         turn_by_step=-gain,
         nuisance_covariance=nuisance_covariance,
