@@ -17,7 +17,8 @@ MATLAB       cameraParameters or cameraIntrinsics by ``jsonencode``:
              pixel is (1, 1).
 caliscope    and anipose: TOML with one camera: ``size``, ``matrix``, ``distortions``,
              ``fisheye``
-others       mrcal, COLMAP, Metashape, calib.io, PhotonVision, RealSense, camodocal:
+others       mrcal, COLMAP, Metashape, calib.io, PhotonVision, RealSense, camodocal,
+             and ``fx fy cx cy k1 ...`` by their names:
              `lightpen.formats.camera_layouts`
 ============ ==========================================================================
 
@@ -208,6 +209,11 @@ def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
 
 
 def _from_opencv(entries: Entries) -> Camera:
+    if not entries.has(*_MATRIX):
+        found = [printable(key) for key, _ in entries.values.values()][:6]
+        raise FileError(
+            "camera-file.unknown", name=entries.name, found=", ".join(found)
+        )
     lens = _lens(entries)
     matrix = entries.counted(9, *_MATRIX).reshape(3, 3)
     return _camera(

@@ -155,6 +155,7 @@ class FileLayout:
     size: str  # paths of width and height, or of both together
     numbers: dict[str, str]  # by path: the names of the numbers there
     part: str = ""  # path of the part that has all this
+    lens: LensModel = BROWN  # where the file names no model
     model: str = ""  # path of the name of the lens model
     # Names of lens models without blanks and marks; of the last, if undistorted
     brown: str = ""
@@ -224,6 +225,13 @@ LAYOUTS = (
         brown="libcalibcameramodelopencv",
     ),
     FileLayout(
+        "Zivid",
+        marks="version CameraIntrinsics",
+        size="image_width image_height",
+        numbers=_each("fx fy cx cy", "CameraIntrinsics/CameraMatrix/{}")
+        | _each("k1 k2 p1 p2 k3", "CameraIntrinsics/Distortion/{}"),
+    ),
+    FileLayout(
         "PhotonVision",
         marks="cameraIntrinsics",
         size="resolution",
@@ -276,6 +284,31 @@ LAYOUTS = (
         brown="pinhole",
         fisheye="kannalabrandt8",
     ),
+    FileLayout(
+        "Open3D",
+        marks="intrinsic_matrix width height",
+        size="width height",
+        numbers={"intrinsic_matrix": "fx - - skew fy - cx cy -"},  # column by column
+    ),
+    FileLayout(
+        "Gyroflow",
+        marks="fisheye_params calib_dimension",
+        size="calib_dimension/w calib_dimension/h",
+        numbers={
+            "fisheye_params/camera_matrix": "fx skew cx - fy cy - - -",
+            "fisheye_params/distortion_coeffs": "k1 k2 k3 k4",
+        },
+        lens=KANNALA_BRANDT,
+    ),
+    FileLayout(
+        "names alone",
+        marks="fx fy cx cy",
+        size="width|image_width height|image_height",
+        numbers=_each(f"fx fy cx cy skew {_RADIAL}"),
+        model="distortion_model|camera_model|model",
+        brown="plumbbob radtan brown brownconrady opencv pinhole rationalpolynomial",
+        fisheye="equidistant fisheye kannalabrandt opencvfisheye",
+    ),
 )
 COLMAP_MODELS = {
     "SIMPLE_PINHOLE": "f cx cy",
@@ -304,6 +337,16 @@ FOREIGN = (
     (r"\"T_imu_cam\"", "Basalt", _BY_IMAGES),
     (r"(?m)^\s*Model\s*=\s*CAHV", "CAHVOR", _BY_IMAGES),
     (r"\APix4D camera calibration", "Pix4D", _BY_IMAGES),
+    (r"<x:xmpmeta", "RealityCapture (XMP)", _AS_TEXT),
+    (r"<calibration[^>]*qtm-version", "Qualisys Track Manager", _AS_TEXT),
+    (r"<Camera [^>]*DEVICEID", "Vicon (XCP)", _BY_IMAGES),
+    (r"\A\s*Australis", "Australis", _BY_IMAGES),
+    (r"\A# Bundle file", "Bundler", _AS_TEXT),
+    (r"\"sfm_data_version\"", "OpenMVG", _AS_TEXT),
+    (r"\"pxFocalLength\"|\"distortionParams\"", "Meshroom", _AS_TEXT),
+    (r"\"CalibrationInformation\"", "Azure Kinect", _AS_TEXT),
+    (r"aslam_cv|reprojection error: \[", "Kalibr (results as text)", _AS_TEXT),
+    (r"camera(Parameters|Intrinsics) with properties", "MATLAB (display)", _AS_TEXT),
     (r"(?m)^\[(LEFT|RIGHT)_CAM_\w+\]", "ZED", _AS_TEXT),
     (r"\"projection_type\"\s*:", "OpenSfM", _AS_TEXT),
     (r"\"cameraData\"\s*:", "DepthAI (OAK-D)", _AS_TEXT),
@@ -416,10 +459,10 @@ def _coefficients(named: dict[str, float], lens: LensModel) -> FloatArray:
 
 def _lens(layout: FileLayout, part: Entries) -> tuple[LensModel | None, str]:
     """Return the lens model, None without distortion, and its name in the file."""
-    if not layout.model:
-        return BROWN, ""
     holder, key = _holder(part, layout.model)
-    stated = "" if holder is None else holder.word(key)
+    if holder is None:
+        return layout.lens, ""
+    stated = holder.word(key)
     plain = re.sub(r"[\W_]|rs2|distortion", "", stated.casefold())
     for lens, names in (
         (BROWN, layout.brown),

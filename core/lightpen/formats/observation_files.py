@@ -21,7 +21,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, read_text
+from lightpen.formats.files import MEGABYTE, read_bytes, read_text
 from lightpen.formats.images import natural_order
 from lightpen.formats.pose_files import (
     SEQUENCE_SUFFIXES,
@@ -31,6 +31,7 @@ from lightpen.formats.pose_files import (
     is_own,
     motive_table,
     read_sequence,
+    refuse_foreign_poses,
 )
 from lightpen.formats.tables import Table, parse_table, read_table
 from lightpen.messages import Message, message, printable
@@ -161,8 +162,11 @@ def read_poses(path: Path, tool: str | None = None) -> PoseTable:
     if path.name.lower().endswith(SEQUENCE_SUFFIXES):
         given = read_sequence(path, tool)
         return _foreign_poses(given, path)
-    text = read_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
     name = printable(path.name)
+    refuse_foreign_poses(
+        read_bytes(path, message("file.poses"), OBSERVATION_FILE_LIMIT), name
+    )
+    text = read_text(path, message("file.poses"), OBSERVATION_FILE_LIMIT)
     text = motive_table(text, name) if is_motive(text) else text
     if is_own(parse_table(text, name, is_foreign=True)):
         return _own_poses(parse_table(text, name), path)

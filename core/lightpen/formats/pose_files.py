@@ -25,6 +25,7 @@ from lightpen.messages import Message, message, printable
 # Lightpen              ``r11`` to ``r33``, ``tx_mm ty_mm tz_mm``
 # quaternions           names end in w x y z (or q0 to q3), as of NDI Track, Motive,
 #                       EuRoC, ROS and many loggers; ``tx``, ``position.x``, ``p_x``
+# rotation vectors      ``rvec_x``, ``rodrigues.y``, in radians, as of OpenCV
 # matrices              ``m00`` to ``m33`` or ``m11`` to ``m44``; or 16 columns, 4
 #                       columns with 4 rows a pose, or 12 columns, without names
 # TUM, 7 or 8 columns   time, three coordinates and a quaternion in any order
@@ -46,6 +47,8 @@ _UNIT = (
 _ROTATING = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot"}
 _MOVING = {"t", "p", "pos", "position", "trans", "translation", "location", "tvec"}
 _SCALARS = {"o": "w", "s": "w", "0": "w", "1": "x", "2": "y", "3": "z"}
+_VECTORS = {"rvec", "rotvec", "rodrigues"}
+_EULER = {"roll", "pitch", "yaw"}
 _ELEMENT = r"(?:r|m|t|rot|mat|matrix|rotation)?_?\[?([0-4])[,_]?([0-4])\]?"
 _STATE = r".*(state|status|valid|visible|visibility|tracked).*"
 _LOST = (
@@ -56,11 +59,12 @@ _LOST = (
 
 @dataclass(frozen=True, eq=False)
 class ToolColumns:
-    """Columns of one tool: a quaternion or a matrix, the translation, and the state."""
+    """Columns of one tool: its rotation in one of three forms, translation, state."""
 
     name: str
     translation: tuple[int, ...]  # x, y, z
     quaternion: tuple[int, ...] = ()  # w, x, y, z
+    vector: tuple[int, ...] = ()  # x, y, z, rad
     matrix: tuple[int, ...] = ()  # row by row
     state: int | None = None
     unit: float | None = None  # mm, of the translation
@@ -68,7 +72,7 @@ class ToolColumns:
 
 @dataclass(frozen=True)
 class _Role:
-    kind: str  # "q", "t" or "r"
+    kind: str  # "q", "v" or "t"
     axis: str
     unit: float | None
     tool: str
@@ -111,6 +115,8 @@ def _role(name: str) -> _Role | None:
     stem, axis = re.sub(r"[^a-z0-9]+$", "", base[:-1]), base[-1:]
     words = set(re.findall(r"[a-z]+", stem))
     tool = re.sub(r"[\W_]*(" + "|".join(_ROTATING | _MOVING) + r")$", "", stem)
+    if words & _VECTORS and axis in {*"xyz"}:
+        return _Role("v", axis, unit, tool)
     if words & _ROTATING and axis in {*"wxyz", *_SCALARS}:
         return _Role("q", _SCALARS.get(axis, axis), unit, tool)
     if axis in {*"xyz"} and (words & _MOVING or not words):
@@ -132,9 +138,12 @@ def _tool(
                 key = ("t" if ("t", role.axis) not in places else "q"), role.axis
             places.setdefault(key, i)
     quaternion = [places.get(("q", axis)) for axis in "wxyz"]
+    vector = [places.get(("v", axis)) for axis in "xyz"]
     translation = [places.get(("t", axis)) for axis in "xyz"]
-    if None in translation or None in quaternion:
-        if None not in quaternion[1:] and None not in translation:
+    if None in translation or (None in quaternion and None in vector):
+        if None not in translation and (
+            None not in quaternion[1:] or set(table.header) >= _EULER
+        ):
             raise FileError("poses.angles", name=table.name)
         return None
     role = roles[translation[0] or 0]
@@ -144,6 +153,7 @@ def _tool(
         name=_name(table, before, role.tool if role is not None else ""),
         translation=tuple(i for i in translation if i is not None),
         quaternion=tuple(i for i in quaternion if i is not None),
+        vector=tuple(i for i in vector if i is not None),
         state=state[0] if state else None,
         unit=None if role is None else role.unit,
     )
@@ -205,6 +215,16 @@ def rotations_of_quaternions(quaternions: FloatArray) -> FloatArray:
     if good.any():
         turned = np.roll(quaternions[good], -1, axis=1)
         matrices[good] = Rotation.from_quat(turned).as_matrix()
+    return matrices
+
+
+def _rotations_of_vectors(vectors: FloatArray) -> FloatArray:
+    """Return rotations (N, 3, 3) of rotation vectors (N, 3), rad; NaN of none."""
+    from scipy.spatial.transform import Rotation  # takes 0.2 s
+
+    matrices = np.full((len(vectors), 3, 3), np.nan)
+    good = np.isfinite(vectors).all(axis=1)
+    matrices[good] = Rotation.from_rotvec(vectors[good]).as_matrix()
     return matrices
 
 
@@ -273,6 +293,18 @@ LONGEST_HEADER = 64_000_000  # bytes
 NOTHING_BELOW = -1e20  # NDI writes -3.7e28 for what it does not see
 MAX_TOOLS = 20
 
+_FOREIGN = (
+    (r"\A\s*[\[{]", "JSON"),
+    (r"\A(\x93NUMPY|PK\x03\x04)", "numpy"),
+    (r"\A\x89HDF", "HDF5"),
+    (r"\A\d+[ \t]+\d+[ \t]+\d+\s*\n(?:\S+[ \t]+){3}\S+[ \t]*\n", "Open3D (.log)"),
+    (r"\A#Insight Transform", "ITK"),
+    (r"\ANO_OF_FRAMES", "Qualisys Track Manager (6D)"),
+    (r"\APathFileType", "TRC (markers)"),
+    (r"\A(Trajectories|Joints|Segments|Objects)\b", "Vicon"),
+    (r"\A(---\s*)?header:\s", "ROS (text)"),
+    (r"\A# Image list with two lines", "COLMAP (images.txt)"),
+)
 _TRANSFORM = r"(?m)^Seq_Frame(\d+)_(\w+?)Transform(Status)?\s*:?=\s*(.+?)\s*$"
 _TOOL_COLUMN = r"(?:tool|handle|rigid|object|sensor|target|body|device|port).*"
 
@@ -286,6 +318,14 @@ class GivenPoses:
     places: IntArray  # (N,), among all rows of the tool, from 1
     n_lost: int
     remarks: tuple[Message, ...]
+
+
+def refuse_foreign_poses(head: bytes, name: str) -> None:
+    """Refuse poses in a form that is not read, by its name."""
+    text = head[:1000].decode("latin-1").removeprefix("\xef\xbb\xbf")
+    for pattern, program in _FOREIGN:
+        if re.search(pattern, text):
+            raise FileError("poses.foreign", name=name, program=program)
 
 
 def is_own(table: Table) -> bool:
@@ -349,6 +389,8 @@ def _of_tool(table: Table, columns: ToolColumns, rows: list[int]) -> GivenPoses:
     translations = own.numbers_or_none(columns.translation)
     if columns.matrix:
         rotations = own.numbers_or_none(columns.matrix).reshape(-1, 3, 3)
+    elif columns.vector:
+        rotations = _rotations_of_vectors(own.numbers_or_none(columns.vector))
     else:
         rotations = rotations_of_quaternions(own.numbers_or_none(columns.quaternion))
     return _given(rotations, translations, columns.unit, table.name)

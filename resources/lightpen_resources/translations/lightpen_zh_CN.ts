@@ -5832,10 +5832,6 @@ needed</source>
         <translation>{name} 第 {line} 行不是有效的 XML（{problem}）。文件可能不完整：请重新复制或导出。</translation>
     </message>
     <message>
-        <source>Line {line} of {name} is not valid YAML ({problem}). The file may be cut short: copy or export it again.</source>
-        <translation>{name} 第 {line} 行不是有效的 YAML（{problem}）。文件可能不完整：请重新复制或导出。</translation>
-    </message>
-    <message>
         <source>Line {line} of {name}: the quotation marks do not pair up. Remove or complete them.</source>
         <translation>{name} 第 {line} 行：引号不成对。请删除或补全。</translation>
     </message>
@@ -6744,10 +6740,6 @@ needed</source>
         <translation>{name}</translation>
     </message>
     <message>
-        <source>{name} begins with {start} and has no named values. Check that this is the right file.</source>
-        <translation>{name} 以 {start} 开头，其中没有命名的值。请检查是否选对了文件。</translation>
-    </message>
-    <message>
         <source>{name} contains more than one YAML document. Keep one of them.</source>
         <translation>{name} 含有多个 YAML 文档。请只保留一个。</translation>
     </message>
@@ -7428,6 +7420,10 @@ needed</source>
         <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}，而内参文件适用于 {width} × {height} px。请选择这台相机的文件，或关闭像素合并和裁剪。</translation>
     </message>
     <message>
+        <source>{name} begins with {start} and has no named values, as YAML, JSON, XML and TOML have them. Check that this is the right file.</source>
+        <translation>{name} 以 {start} 开头，不含 YAML、JSON、XML 或 TOML 那样的带名称的值。请检查文件是否正确。</translation>
+    </message>
+    <message>
         <source>{name} cannot be decoded.</source>
         <translation>{name} 无法解码。</translation>
     </message>
@@ -7476,6 +7472,10 @@ needed</source>
         <translation>{name} 没有数据行。请检查文件是否完整。</translation>
     </message>
     <message>
+        <source>{name} has the entries {found}, and no camera_matrix. An intrinsics file has image_width, image_height, camera_matrix and distortion_coefficients: check that this is the right file, or write these four.</source>
+        <translation>{name} 含有条目 {found}，但没有 camera_matrix。内参文件应含 image_width、image_height、camera_matrix 和 distortion_coefficients：请检查文件是否正确，或写入这四项。</translation>
+    </message>
+    <message>
         <source>{name} has the focal lengths {fx:g} and {fy:g} px along u and v; with the pixels of a camera these are nearly alike. Export the file again, or calibrate the camera again.</source>
         <translation>{name} 沿 u 和 v 的焦距为 {fx:g} 和 {fy:g} px；相机的这两个值应几乎相同。请重新导出文件，或重新标定相机。</translation>
     </message>
@@ -7486,6 +7486,10 @@ needed</source>
     <message>
         <source>{name} has the focal lengths {fx:g} and {fy:g} px; both must be positive. Export the file again, or calibrate the camera again.</source>
         <translation>{name} 的焦距为 {fx:g} 和 {fy:g} px；两者都必须为正。请重新导出文件，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} has the form of {program}, in which poses cannot be read. Write them as a table with the header qw,qx,qy,qz,tx_mm,ty_mm,tz_mm and a line for each pose.</source>
+        <translation>{name} 是 {program} 的格式，无法从中读取位姿。请写成表格：表头为 qw,qx,qy,qz,tx_mm,ty_mm,tz_mm，每个位姿一行。</translation>
     </message>
     <message>
         <source>{name} has {counted}; 4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 k6). Export the file again.</source>
@@ -8190,6 +8194,10 @@ needed</source>
     <message>
         <source>Lean the pen in the cone to all sides</source>
         <translation>在锥孔中向各方向倾斜光笔</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} is not valid YAML ({problem}). The file may be of another kind, or cut short: check that this is the right file, or export it again.</source>
+        <translation>{name} 的第 {line} 行不是有效的 YAML（{problem}）。文件可能属于其他类型或不完整：请检查文件是否正确，或重新导出。</translation>
     </message>
     <message>
         <source>Move {axis}</source>

@@ -382,7 +382,7 @@ def test_a_temperature_that_no_camera_has_is_refused(tmp_path: Path) -> None:
         ("   rows: 1\n   cols: 5", "   rows: 1\n   cols: 6", "5 numbers where its 1"),
         (", 0.33333333333333331 ]", ", 1, 2 ]", "6 numbers where its 1 rows of 5"),
         ("dt: d", "dt: !!python/object/apply:os.getcwd []", "tag .*For security"),
-        ("camera_matrix", "camera", "has no camera_matrix"),
+        ("camera_matrix", "camera", "and no camera_matrix"),
         ("distortion_coefficients", "bending", "has no distortion_coefficients"),
         ("image_height:", "image_width:", 'image_width" is given a second time'),
         ("image_height:", "imageWidth: 5\nimage_height:", "which mean the same"),

@@ -177,6 +177,23 @@ Camera1.p2: {BROWN[3]}
 Camera.width: 1280
 Camera.height: 720
 """
+PLAIN: dict[str, Any] = {
+    "width": 1280,
+    "height": 720,
+    **dict(zip(("fx", "fy", "cx", "cy"), PINHOLE, strict=True)),
+    **dict(zip(("k1", "k2", "p1", "p2"), BROWN, strict=True)),
+}
+ZIVID = f"""__version__: 1
+image_width: 1280
+image_height: 720
+CameraIntrinsics:
+  CameraMatrix: {{CX: 652.25, CY: 355.75, FX: 1320.5, FY: 1318.25}}
+  Distortion: {{K1: {BROWN[0]}, K2: {BROWN[1]}, K3: 0, P1: {BROWN[2]}, P2: {BROWN[3]}}}
+"""
+GYROFLOW: dict[str, Any] = {
+    "calib_dimension": {"w": 1280, "h": 720},
+    "fisheye_params": {"camera_matrix": MATRIX, "distortion_coeffs": [*FISHEYE]},
+}
 
 
 @pytest.mark.parametrize(
@@ -202,6 +219,8 @@ Camera.height: 720
         pytest.param(NERFSTUDIO, id="Nerfstudio"),
         pytest.param(ORB_SLAM, id="ORB-SLAM"),
         pytest.param(ORB_SLAM.replace("Camera1.", "Camera."), id="ORB-SLAM 2"),
+        pytest.param(ZIVID, id="Zivid"),
+        pytest.param(PLAIN, id="names alone"),
     ],
 )
 def test_one_camera_is_the_same_in_all_layouts(
@@ -229,8 +248,9 @@ def test_one_camera_is_the_same_in_all_layouts(
         .replace("<p1>-0.0004</p1>", "<k3>-0.006</k3>")
         .replace("<p2>0.0007</p2>", "<k4>0.001</k4>"),
         REALSENSE | {"model": "Kannala Brandt4", "coeffs": [*FISHEYE, 0]},
+        GYROFLOW,
     ],
-    ids=["caliscope", "COLMAP", "Metashape", "RealSense"],
+    ids=["caliscope", "COLMAP", "Metashape", "RealSense", "Gyroflow"],
 )
 def test_a_fisheye_is_read(tmp_path: Path, text: str | dict[str, Any]) -> None:
     found = read(tmp_path, text)
@@ -299,9 +319,28 @@ def test_a_realsense_without_distortion_is_read_whatever_its_model(
     assert "Inverse Brown Conrady" in refusal(tmp_path, inverse)
 
 
+def test_open3d_writes_its_matrix_by_columns(tmp_path: Path) -> None:
+    columns = np.transpose(MATRIX).ravel().tolist()
+
+    found = read(tmp_path, {"width": 1280, "height": 720, "intrinsic_matrix": columns})
+
+    np.testing.assert_array_equal(found.intrinsics, [*PINHOLE, 0, 0, 0, 0, 0])
+
+
 @pytest.mark.parametrize(
     ("text", "named"),
     [
+        ({"camera": {"f": 12}, "lens": 3}, "entries camera, lens, and no camera_matri"),
+        (PLAIN | {"model": "division"}, '"division"'),
+        ("cam0 (/cam0/image_raw):\n  type: <class 'aslam_cv.Distorted'>\n", "Kalibr"),
+        ("  cameraParameters with properties:\n\n  Intrinsics\n  K: [3x3]", "MATLAB"),
+        ({"sfm_data_version": "0.3", "intrinsics": []}, "OpenMVG"),
+        ({"intrinsics": [{"pxFocalLength": "4640"}]}, "Meshroom"),
+        ({"CalibrationInformation": {"Cameras": []}}, "Azure Kinect"),
+        ("# Bundle file v0.3\n1 1\n4640 -0.08 0.1\n", "Bundler"),
+        ("<calibration type='regular' qtm-version='2022.1'></calibration>", "Qualisys"),
+        ("<Cameras><Camera ACTIVE='1' DEVICEID='2'/></Cameras>", "Vicon"),
+        ("<x:xmpmeta xmlns:x='adobe:ns:meta/'></x:xmpmeta>", "RealityCapture"),
         ("ParGroup: Camera: Parameter;\n\nFocus:foc: 0.016;\n", "Halcon"),
         ({"camera": "area_scan_polynomial", "focus": 0.016}, "Halcon"),
         ({"value0": {"T_imu_cam": [], "intrinsics": []}}, "Basalt"),

@@ -64,8 +64,14 @@ def matrices() -> list[str]:
     return [line.replace("\t", ",") for line in rows(whole.reshape(N_POSES, 16))]
 
 
+def vectors() -> list[str]:
+    header = "frame\trvec_x\trvec_y\trvec_z\ttvec_x\ttvec_y\ttvec_z"
+    return [header, *rows(np.arange(N_POSES), ROTATIONS.as_rotvec(), MOVED)]
+
+
 @pytest.mark.parametrize(
-    "lines", [scalar_last, scalar_first, tum, matrices, lambda: ndi(["OK"] * N_POSES)]
+    "lines",
+    [scalar_last, scalar_first, tum, matrices, vectors, lambda: ndi(["OK"] * N_POSES)],
 )
 def test_poses_of_other_programs_are_read_in_their_conventions(
     tmp_path: Path, lines: Callable[[], list[str]]
@@ -93,9 +99,31 @@ def test_lost_frames_of_a_tracker_are_left_out_and_counted(tmp_path: Path) -> No
     assert (found.places.tolist(), found.n_lost) == ((kept + 1).tolist(), 1)
 
 
-def test_angles_are_refused_by_name(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("data", "named"),
+    [
+        (b'[{"position": [1, 2, 3], "rotation": [0, 0, 0, 1]}]', "JSON"),
+        (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'}" + bytes(80), "numpy"),
+        (b"0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", "Open3D"),
+        (b"NO_OF_FRAMES\t80\nNO_OF_BODIES\t1\n", "Qualisys"),
+        (b"header:\n  seq: 1\npose:\n  position:\n    x: 1\n", "ROS"),
+        (b"Objects\n100\n,,Pen\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n", "Vicon"),
+    ],
+)
+def test_poses_in_a_form_that_is_not_read_are_named(
+    tmp_path: Path, data: bytes, named: str
+) -> None:
+    path = tmp_path / "poses.file"
+    path.write_bytes(data)
+
+    with pytest.raises(FileError, match=f"{named}.*qw,qx,qy,qz"):
+        read_poses(path)
+
+
+@pytest.mark.parametrize("angles", ["rx,ry,rz", "roll,pitch,yaw"])
+def test_angles_are_refused_by_name(tmp_path: Path, angles: str) -> None:
     path = tmp_path / "poses.csv"
-    path.write_text("rx,ry,rz,tx_mm,ty_mm,tz_mm\n1,2,3,4,5,6\n")
+    path.write_text(f"{angles},tx_mm,ty_mm,tz_mm\n1,2,3,4,5,6\n")
 
     with pytest.raises(FileError, match=r"quaternions or matrices|columns of poses"):
         read_poses(path)
