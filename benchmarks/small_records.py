@@ -67,7 +67,6 @@ SMALL: Mapping[str, Any] = {
     },
     "assumptions": {},
     "fixed_lamps": [],
-    "second_cone": None,
     "instrument": {
         "intrinsics": [2000.0, 2000.0, 600.0, 500.0],
         "disc_diameter_mm": 10.0,
@@ -132,16 +131,6 @@ SMALL: Mapping[str, Any] = {
         }
         for n in (1, 2)
     ],
-}
-
-SECOND_CONE = {
-    "cone_cam_mm": [0.0, 0.0, 1000.0],
-    "images_used": 20,
-    "stated_distance_mm": 100.0,
-    "stated_standard_uncertainty_mm": 0.001,
-    "distance_mm": 100.0,
-    "pen_scale": 1.0,
-    "pen_scale_expanded_uncertainty": 2e-5,
 }
 
 

@@ -10,10 +10,8 @@ from tests.simulated_centers import simulate_rig_centers
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.detection.rig_observations import observe_rig_centers
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
-from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.observation_files import Centers, pair_images
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images
@@ -22,7 +20,6 @@ from lightpen.model.pen import Pen, effective_tip, grown
 from lightpen.model.rigid import from_first, rotation_from_vector
 from lightpen_extensions.simulator.scenes import row_of_cameras
 from lightpen_extensions.simulator.swings import (
-    PAPER_CONE,
     PAPER_TIP,
     Postures,
     Swing,
@@ -138,24 +135,6 @@ def larger_discs() -> Calibration:
     turns = np.diag([0.1, 0.2, 0.3]) ** 2
     pen = replace(PEN, diameter_sigma=0.002, normal_covariance=turns)
     return calibrate(camera, pen, seen)
-
-
-def by_two_cones() -> Calibration:
-    """In the second swing, an image does not fit, and LEDs are missing."""
-    pen = replace(PEN, scale_sigma=None, expansion=None)
-    cones = PAPER_CONE + np.array([[-70.0, 0.0, 0.0], [70.0, 0.0, 10.0]])
-    rng, errors = np.random.default_rng(6), 0.03 * lasting(1, 0.0, 20)
-    first = observed(
-        swing_poses(25, rng, cone_cam=cones[0]), 0.03 * lasting(0, 0.0, 25)
-    )
-    errors[4] += np.linspace(-2, 2, PEN.n_leds)[:, None]
-    errors[9, 3:] = errors[12:, 5] = np.nan
-    second = observed(swing_poses(20, rng, cone_cam=cones[1]), errors)
-    apart = float(np.linalg.norm(cones[1] - cones[0]))
-    return calibrate(
-        *(CAMERA, pen, first),
-        second=SecondSwing(second, ConeSeparation(apart + 0.02, 0.002)),
-    )
 
 
 def by_two_cameras() -> Calibration:
@@ -281,7 +260,7 @@ SWINGS: dict[str, Callable[[], Calibration]] = {
     each.__name__: each
     for each in (
         *(usual, restless, spoilt_files, followed, uneven, larger_discs, loose),
-        *(oval_seat, by_two_cones, by_two_cameras, by_a_late_camera),
+        *(oval_seat, by_two_cameras, by_a_late_camera),
     )
 }
 _MOVED = {"restless": restless_swing, "loose": loose_swing, "oval_seat": oval_swing}

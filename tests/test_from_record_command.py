@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks.small_records import SECOND_CONE
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.own_json import with_checksum
@@ -144,59 +143,6 @@ def test_a_record_that_does_not_hold_its_files_is_refused(
         outcome = lightpen("calibrate", "--from-record", record)
         assert outcome.returncode == 2
         assert "does not contain all input data of the calibration" in outcome.stderr
-
-
-def test_the_record_of_two_cones_alone_gives_the_same_figures(
-    lightpen: Run, tmp_path: Path
-) -> None:
-    scene, rng = Scene(), np.random.default_rng(1)
-    files = write_sample_files(scene, tmp_path / "files")
-    cones = scene.cone_cam + np.array([[-60.0, 0.0, 0.0], [60.0, 0.0, 20.0]])
-    tables = []
-    for name, cone in zip("ab", cones, strict=True):
-        swing = swing_poses(30, rng, pen=scene.pen, camera=scene.camera, cone_cam=cone)
-        translations = swing.translations.copy()
-        translations[7] += [0.5, 0, 0]  # the tip slips
-        pixels = simulate_centers(
-            scene.camera, scene.pen, swing.rotations, translations, 0.02, rng
-        )
-        tables.append(tmp_path / f"{name}.csv")
-        write_centers(tables[-1], pixels)
-    record, again = tmp_path / "tip.json", tmp_path / "again.json"
-    outcome = lightpen(
-        *("calibrate", "--centers", tables[0], "--second-cone", tables[1]),
-        *("--distance", np.linalg.norm(cones[1] - cones[0]), "--distance-sigma", 0.002),
-        *("--camera", files.camera, "--pen", files.pen, "--json", record),
-    )
-    assert outcome.returncode == 0, outcome.stderr
-    shutil.rmtree(tmp_path / "files")
-    for table in tables:
-        table.unlink()
-
-    repeated = lightpen("calibrate", "--from-record", record, "--json", again)
-
-    assert repeated.stdout == outcome.stdout
-    assert "Second cone  29 images used" in repeated.stdout
-    before, after = (read(each) for each in (record, again))
-    for name in ("tip_pen_mm", "expanded_uncertainty_mm"):
-        np.testing.assert_allclose(after[name], before[name], rtol=0, atol=SAME)
-    reasons = [
-        [frame["reason"] for frame in each["second_cone"]["frames"]]
-        for each in (before, after)
-    ]
-    assert reasons[0] == reasons[1]
-    assert reasons[0].count("tip slipped") == 1
-
-
-def test_a_record_without_the_images_in_its_second_cone_is_refused(
-    lightpen: Run, calibrated: tuple[Path, str]
-) -> None:
-    record, _ = calibrated
-    rewrite(record, second_cone=SECOND_CONE)
-
-    outcome = lightpen("calibrate", "--from-record", record)
-    assert outcome.returncode == 2
-    assert "has two cones, and an earlier version wrote it" in outcome.stderr
 
 
 def test_a_record_that_was_changed_is_refused(

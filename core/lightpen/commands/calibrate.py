@@ -4,17 +4,12 @@ import argparse
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.commands.calibrate_options import (
-    add_calibrate_options,
-    assumptions_of,
-    separation_of,
-)
+from lightpen.commands.calibrate_options import add_calibrate_options, assumptions_of
 from lightpen.commands.console import (
     centers_at,
     images_at,
@@ -39,7 +34,6 @@ from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.reports.report import calibration_record
 from lightpen.estimation.reports.summary import calibration_text, convergence_text
 from lightpen.estimation.reports.verdict import judge
-from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import is_simulated
 from lightpen.formats.observation_files import pair_images
@@ -133,8 +127,7 @@ def _require_none_given(
     """Reject options that duplicate the content of a record."""
     own = (
         "camera rig pen units led-diameter nominal-tip camera-sigma scale-sigma "
-        "temperature temperature-sigma humidity form-error center-bias second-cone "
-        "distance distance-sigma fps bits"
+        "temperature temperature-sigma humidity form-error center-bias fps bits"
     )
     values = vars(options)
     given = [
@@ -211,7 +204,6 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
     camera = read_camera(options.camera)
     _note_doubts(camera, options)
     pen = _read_pen(options)
-    separation = separation_of(options)
     if options.centers is not None:
         _require_one_each(options.centers, 1, RIG_NEEDED)
         given = [str(options.centers[0])]
@@ -219,18 +211,11 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         if len(options.images) > 1 and any(Path(p).is_dir() for p in options.images):
             _require_one_each(options.images, 1, RIG_NEEDED)
         given = options.images
-    observe = partial(
-        _observe, options, camera, pen, is_centers=options.centers is not None
-    )
-    observations, files = observe(given)
+    observations, files = _observe(options, camera, pen, given)
     observations = _timed(_part_of(observations, options), options)
-    second = None
-    if separation is not None:
-        others, more_files = observe([options.second_cone])
-        second, files = SecondSwing(others, separation), files + more_files
     origin = _origin(options.camera, options.pen, *files)
     return _Calibrated(
-        calibrate(camera, pen, observations, assumptions_of(options), second),
+        calibrate(camera, pen, observations, assumptions_of(options)),
         pen.nominal_tip,
         SwingLimits(),
         origin,
@@ -277,8 +262,6 @@ def _read_pen(options: argparse.Namespace) -> Pen:
 def _from_rig(options: argparse.Namespace) -> _Calibrated:
     if options.camera is not None:
         raise UsageError("cli.rig-and-camera")
-    if options.second_cone is not None:
-        raise UsageError("cli.rig-and-second-cone")
     if options.pen is None:
         raise _lacking("--pen", ())
     rig_file = read_rig(options.rig)
@@ -357,15 +340,10 @@ def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
 
 
 def _observe(
-    options: argparse.Namespace,
-    camera: Camera,
-    pen: Pen,
-    given: Sequence[str],
-    *,
-    is_centers: bool,
+    options: argparse.Namespace, camera: Camera, pen: Pen, given: Sequence[str]
 ) -> tuple[Observations, tuple[Path, ...]]:
     """Return the observations of images or of a file of centres, and their files."""
-    if is_centers:
+    if options.centers is not None:
         path = Path(given[0])
         require_other_file(options.json, path)
         centers = centers_at(path, pen)

@@ -13,8 +13,6 @@ from lightpen.commands.arguments import (
     finite,
     number_from,
 )
-from lightpen.errors import UsageError
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.model.limits import USUAL, Assumptions, with_focal_length
 from lightpen.model.names import METHODS
 
@@ -89,24 +87,6 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         help="systematic standard uncertainty of LED centres (0.003)",
     )
     parser.add_argument(
-        "--second-cone",
-        metavar="IMAGES",
-        help="images of a swing in a second cone, given like those of the first; the "
-        "camera must not have moved",
-    )
-    parser.add_argument(
-        "--distance",
-        type=number_from(0.1, 10_000.0, "distance", "mm"),
-        metavar="MM",
-        help="distance of the two cones",
-    )
-    parser.add_argument(
-        "--distance-sigma",
-        type=number_from(1e-6, 100.0, "uncertainty", "mm"),
-        metavar="MM",
-        help="standard uncertainty of the distance",
-    )
-    parser.add_argument(
         "--method",
         choices=METHODS,
         help="estimator of the reported tip (joint; of a record, its own)",
@@ -154,19 +134,3 @@ def assumptions_of(options: argparse.Namespace) -> Assumptions:
         "center_bias": options.center_bias,
     }
     return replace(assumed, **{n: x for n, x in given.items() if x is not None})
-
-
-def separation_of(
-    options: argparse.Namespace, *, is_touched: bool = False
-) -> ConeSeparation | None:
-    """Return the distance of two cones, if there are two: swung in, or touched."""
-    given = (options.second_cone, options.distance, options.distance_sigma)
-    if all(each is None for each in given) and not is_touched:
-        return None
-    if is_touched and options.second_cone is not None:
-        raise UsageError("cli.touched-and-cone")
-    if is_touched and None in given[1:]:
-        raise UsageError("cli.touched")
-    if not is_touched and None in given:
-        raise UsageError("cli.second-cone")
-    return ConeSeparation(options.distance, options.distance_sigma)

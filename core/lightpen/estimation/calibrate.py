@@ -73,13 +73,6 @@ from lightpen.estimation.uncertainty.budget import (
     compare_halves,
 )
 from lightpen.estimation.uncertainty.instrument import Instrument, adjusted_instrument
-from lightpen.estimation.uncertainty.second_cone import (
-    SecondCone,
-    SecondImages,
-    SecondSwing,
-    second_cone,
-    second_images,
-)
 from lightpen.messages import Message
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
@@ -148,7 +141,6 @@ class Calibration:
     leds: LedQuality
     coverage: Coverage
     lags: tuple[TimeLag | None, ...] = ()  # of each camera of a rig but the first
-    second: SecondCone | None = None
     step: ChangePoint | None = None  # its ``first`` counts all images
     method: Method = "joint"  # of the reported tip
 
@@ -216,10 +208,9 @@ def calibrate(
     pen: Pen,
     observations: Observations,
     assumptions: Assumptions = USUAL,
-    second: SecondSwing | None = None,
 ) -> Calibration:
     """Calibrate the tip of a pen by a single camera; see `calibrate_rig`."""
-    return calibrate_rig(rig_of(camera), pen, (observations,), assumptions, second)
+    return calibrate_rig(rig_of(camera), pen, (observations,), assumptions)
 
 
 def calibrate_rig(
@@ -227,7 +218,6 @@ def calibrate_rig(
     pen: Pen,
     observations: Sequence[Observations],
     assumptions: Assumptions = USUAL,
-    second: SecondSwing | None = None,
 ) -> Calibration:
     """Calibrate the tip of a pen that one camera or several see swing in a cone.
 
@@ -242,15 +232,12 @@ def calibrate_rig(
         Of each camera at the same N instants.
     assumptions : Assumptions
         Default uncertainties where the files state none.
-    second : SecondSwing or None
-        Of the same pen in a second cone, with the same single camera, not moved in
-        between.
     """
     inputs = _before_images(rig, pen, observations, assumptions)
     single = _fit_single_cameras(inputs, observations)
     try:
         start = _find_start(inputs, single)
-        adjusted = _adjust_jointly(inputs, single, start, second)
+        adjusted = _adjust_jointly(inputs, single, start)
     except CalibrationError as error:
         if error.message.code not in NOT_SETTLED:
             raise
@@ -335,7 +322,6 @@ class _Adjusted:
     stated: Priors
     # (M, C, L, 2), LED centres less the fields of the images, px
     pixels: FloatArray
-    second: SecondImages | None  # of a second swing; the last of the adjusted images
 
 
 def _fit_single_cameras(
@@ -392,12 +378,9 @@ def _find_start(inputs: _Inputs, single: _SingleCameraFits) -> _Start:
 
 
 def _adjust_jointly(
-    inputs: _Inputs,
-    single: _SingleCameraFits,
-    start: _Start,
-    second: SecondSwing | None,
+    inputs: _Inputs, single: _SingleCameraFits, start: _Start
 ) -> _Adjusted:
-    """Adjust tip, cone and all parameters of the files, with a second swing if any."""
+    """Adjust tip, cone and all parameters of the files."""
     rig, pen = inputs.rig, inputs.pen
     moments, fitted = start.moments, start.joint
     state = BundleState(rig, pen, fitted.tip_pen, fitted.cone_cam, fitted.rotations)
@@ -414,27 +397,19 @@ def _adjust_jointly(
     priors = replace(priors_of(rig, pen, inputs.assumptions), reading=reading)
     path, pixels = single.steady[0].path, start.pixels
     # Of several cameras each has lamps of its own, and what they leave is not fitted.
-    is_one = rig.n_cameras == 1 and second is None
-    shifts = path.shifts[moments] if is_one and path is not None else None
+    shifts = None if rig.n_cameras > 1 or path is None else path.shifts[moments]
     sigmas = np.stack([each.sigmas for each in single.observations], axis=1)[moments]
-    others = None
-    if second is not None:
-        others = second_images(rig.cameras[0], pen, second)
-        state, pixels = others.joined(state, pixels)
-        sigmas = np.concatenate([sigmas, others.sigmas[:, None]])
-        priors = replace(priors, separation=second.separation)
     adjustment = adjust(state, pixels, priors, start.extrinsics, shifts, sigmas)
     bundle, found = adjustment.bundle, adjustment.bundle.state
-    n = len(moments)
-    corrected = (pixels - bundle.field_shifts)[:n]
+    corrected = pixels - bundle.field_shifts
     joint = joint_at(
         ContactModel(found.rig, found.pen, corrected),
-        found.rotations[:n],
+        found.rotations,
         bundle.tip_pen,
         bundle.cone_rig,
-        bundle.used[:n].reshape(n, -1),
+        bundle.used.reshape(len(moments), -1),
     )
-    return _Adjusted(adjustment, joint, priors, corrected, others)
+    return _Adjusted(adjustment, joint, priors, corrected)
 
 
 def _calibration_of(
@@ -496,11 +471,6 @@ def _calibration_of(
         coverage=measure_coverage(joint.rotations),
         lags=start.lags,
         step=_step_of(adjustment.step, start, single.posed[0], refined[0]),
-        second=(
-            None
-            if adjusted.second is None
-            else second_cone(adjustment, adjusted.second)
-        ),
     )
 
 

@@ -15,7 +15,6 @@ from lightpen.detection.observations import Observations, leave_out, observe_cen
 from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses, start_poses
 from lightpen.detection.rig_observations import at_moments
 from lightpen.errors import UsageError
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.contact.single_images import MIN_IMAGES
 from lightpen.estimation.reports.calibration_record import (
@@ -24,7 +23,6 @@ from lightpen.estimation.reports.calibration_record import (
     InstrumentRecord,
 )
 from lightpen.estimation.uncertainty.budget import ContributionName
-from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.observation_files import NONE, Centers, Pairing
 from lightpen.formats.opened_files import InputFile, Inputs, RigInputs
@@ -62,12 +60,9 @@ class Recomputed:
 def recompute(path: Path) -> Recomputed:
     """Calibrate again from a record as JSON, or from an accepted result.
 
-    Raises `UsageError` if it does not hold the files, or not the images in the second
-    of two cones.
+    Raises `UsageError` if it does not hold the files.
     """
     record = read_calibration(path).calibration
-    if record.second_cone is not None and not record.second_cone.frames:
-        raise UsageError("recompute.two-cones", path=path)
     found, limits = record.inputs, record.verdict.limits
     try:
         kept_pen = _kept(found.pen)
@@ -88,11 +83,9 @@ def recompute(path: Path) -> Recomputed:
             rig = read_rig(_written(kept_rig, Path(folder, "rig")), cameras).rig
         pen = read_pen(pen_file, found.units, found.led_diameter_mm, nominal)
     seen = [_of_camera(path, record, c, rig, pen) for c in range(rig.n_cameras)]
-    second = _second_swing(path, record, rig, pen)
     return Recomputed(
         replace(
-            calibrate_rig(rig, pen, seen, record.assumptions, second),
-            method=record.method,
+            calibrate_rig(rig, pen, seen, record.assumptions), method=record.method
         ),
         Inputs(
             kept_cameras[0],
@@ -145,21 +138,6 @@ def _written(file: InputFile, place: Path) -> Path:
     path = place.with_suffix(file.path.suffix)
     path.write_bytes(file.content or b"")
     return path
-
-
-def _second_swing(
-    path: Path, record: CalibrationRecord, rig: Rig, pen: Pen
-) -> SecondSwing | None:
-    found = record.second_cone
-    if found is None:
-        return None
-    distance, sigma = found.stated_distance_mm, found.stated_standard_uncertainty_mm
-    assert distance is not None
-    assert sigma is not None
-    return SecondSwing(
-        _observations(path, record, found.frames, rig.cameras[0], pen),
-        ConeSeparation(distance, sigma),
-    )
 
 
 def _of_camera(
@@ -279,10 +257,10 @@ class ReestimatedPoses:
 def reestimate_poses(calibration: CalibrationRecord) -> ReestimatedPoses | None:
     """Estimate the poses of a calibration's images again.
 
-    None of several cameras or two cones, and where the file does not keep enough.
+    None of several cameras, and where the file does not keep enough.
     """
     fitted = calibration.instrument
-    if fitted is None or calibration.rig is not None or calibration.second_cone:
+    if fitted is None or calibration.rig is not None:
         return None
     if len(fitted.intrinsics) - 4 not in N_COEFFICIENTS:
         return None

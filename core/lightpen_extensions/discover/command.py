@@ -3,7 +3,6 @@
 import argparse
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from lightpen.commands.arguments import (
     add_json,
     finite,
 )
-from lightpen.commands.calibrate_options import separation_of
 from lightpen.commands.console import (
     are_same,
     images_at,
@@ -42,12 +40,7 @@ from lightpen_extensions.discover.report import (
     swings_record,
     swings_text,
 )
-from lightpen_extensions.discover.scale import (
-    MeasuredLength,
-    Request,
-    SecondSightings,
-    TouchedLength,
-)
+from lightpen_extensions.discover.scale import MeasuredLength, Request, TouchedLength
 from lightpen_extensions.discover.together import discover_together
 from lightpen_extensions.discover.tracks import (
     Report,
@@ -104,12 +97,6 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         help=f"standard uncertainty of each length ({CALIPER})",
     )
     parser.add_argument(
-        "--second-cone",
-        metavar="IMAGES",
-        help="a swing in a second cone, given like the first; the camera must not have "
-        "moved. With --distance it gives the scale",
-    )
-    parser.add_argument(
         "--touched",
         nargs="+",
         default=[],
@@ -119,10 +106,7 @@ def add_discover(parser: argparse.ArgumentParser) -> None:
         "--distance they give the scale",
     )
     parser.add_argument(
-        "--distance",
-        type=above_zero,
-        metavar="MM",
-        help="distance of the two cones, or of the touched ends",
+        "--distance", type=above_zero, metavar="MM", help="distance of the touched ends"
     )
     parser.add_argument(
         "--distance-sigma",
@@ -171,34 +155,24 @@ def _size(text: str) -> tuple[int, int]:
 @printing
 def _discover(options: argparse.Namespace) -> None:
     lengths = tuple(_length(words, options.length_sigma) for words in options.length)
-    separation = separation_of(options, is_touched=bool(options.touched))
-    if not lengths and separation is None and options.out_pen is not None:
+    touched = _touched(options)
+    if not lengths and touched is None and options.out_pen is not None:
         raise UsageError("discover.no-length")
     camera = None if options.camera is None else read_camera(options.camera)
     rough = options.pen_sketch or options.pen
     sketch = None if rough is None else read_unchecked_pen(rough, "mm")
     _check_outputs(options)
     places = _places(options)
-    has_cone = options.second_cone is not None
-    if has_cone and len(places) > 1:
-        raise UsageError("cli.discover-swings-and-cone")
-    n_read = len(places) + has_cone
     read = partial(_sightings, options, camera)
     with progress("Finding pen and camera") as report:
         share = 0.0 if options.centers else SEARCHING
-        each = share / n_read
+        each = share / len(places)
         swings = [
             read(place, partial(_report_part, report, each * k, each))
             for k, place in enumerate(places)
         ]
-        request = Request(lengths, _diameter(options, sketch), camera, sketch)
-        if separation is not None and options.touched:
-            touches = partial(touches_at, options.touched)
-            request = replace(request, touched=TouchedLength(touches, separation))
-        elif separation is not None:
-            last = partial(_report_part, report, each, each)
-            other = read([options.second_cone], last)
-            request = replace(request, second=SecondSightings(other, separation))
+        diameter = _diameter(options, sketch)
+        request = Request(lengths, diameter, camera, sketch, touched)
         rest = partial(_report_part, report, share, 1 - share)
         together = None
         if len(swings) > 1:
@@ -221,6 +195,16 @@ def _discover(options: argparse.Namespace) -> None:
     print(shown(discovery_text(found)))
     if together is not None:
         print(shown(swings_text(together)))
+
+
+def _touched(options: argparse.Namespace) -> TouchedLength | None:
+    given = (options.touched or None, options.distance, options.distance_sigma)
+    if given == (None, None, None):
+        return None
+    if None in given:
+        raise UsageError("cli.touched")
+    touches = partial(touches_at, options.touched)
+    return TouchedLength(touches, options.distance, options.distance_sigma)
 
 
 def _report_part(report: Report, start: float, share: float, fraction: float) -> None:

@@ -19,13 +19,10 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import EXACT_SIGMA
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.linearised import BundleState
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.uncertainty.second_cone import SecondSwing
 from lightpen.model.artefacts import Artefact, ArtefactKind
 from lightpen.model.coverage import COVERAGE_FACTOR
 from lightpen.model.ellipse import centers_from_centroids
-from lightpen.model.rigid import fit_rigid
 from lightpen_extensions.boards.distortion import Choice
 from lightpen_extensions.discover.found import (
     SECOND_PEN,
@@ -33,7 +30,6 @@ from lightpen_extensions.discover.found import (
     contradicting_distance,
     discovery_of,
     require_certain,
-    require_distance,
     require_enough,
     require_length,
     require_no_second_pen,
@@ -42,7 +38,6 @@ from lightpen_extensions.discover.found import (
 )
 from lightpen_extensions.discover.hypotheses import (
     Hypothesis,
-    number_by_sketch,
     require_one_focal_length,
     solve_seed,
 )
@@ -56,12 +51,11 @@ from lightpen_extensions.discover.scale import (
     with_lengths_known,
 )
 from lightpen_extensions.discover.scaled_start import (
-    RELATIVE,
     adjust_halves,
     numbered,
     scaled_start,
 )
-from lightpen_extensions.discover.starts import any_covariance, scaled_to
+from lightpen_extensions.discover.starts import any_covariance
 from lightpen_extensions.discover.tracks import (
     Pieces,
     Report,
@@ -80,7 +74,6 @@ NOT_SETTLED = (
     "calibrate.leds-do-not-fit",
     "calibrate.leds-do-not-fit-nor-tip",
 )
-SAME_CONE = 0.02  # of the largest distance of two LEDs, between two cones
 SLIPPED = 0.03  # of the images, that are left out after a slip
 
 
@@ -149,34 +142,19 @@ def _adjusted(
         require_one_camera(halves(None))
         raise CalibrationError("discover.other-camera") from error
     report(0.6)
-    second = None
-    if request.second is not None:
-        start, second = _with_second(start, request, report)
-        lengths = lengths if request.lengths else ()
     observations = _labelled_observations(
         sightings, start, swing.found.images, swing.numbers
     )
     start = replace(start, pen=with_lengths_known(start.pen, lengths))
     try:
-        if second is not None and lengths:
-            stated = second.separation
-            unknown = ConeSeparation(stated.distance, stated.distance)
-            free = replace(second, separation=unknown)
-            without = _calibrated(start, choice, request, observations, free)
-            require_distance(without, stated, lengths)
-        calibration = _calibrated(start, choice, request, observations, second)
+        calibration = _calibrated(start, choice, request, observations)
     except CalibrationError as error:
         if error.message.code not in NOT_SETTLED:
             raise
         if request.camera is not None:
             raise CalibrationError("discover.other-camera") from error
-        if second is None:
-            require_one_focal_length(swing.pieces, sightings.size, request.camera)
-            raise CalibrationError("discover.not-settled") from error
-        distance = second.separation.distance
-        raise CalibrationError(
-            "discover.cones-not-settled", distance=distance
-        ) from error
+        require_one_focal_length(swing.pieces, sightings.size, request.camera)
+        raise CalibrationError("discover.not-settled") from error
     fits = calibration.used[swing.found.images]
     if not is_cleared and np.mean(~fits) > SLIPPED:
         cleared = replace(swing, found=_of_images(swing.found, fits))
@@ -191,7 +169,7 @@ def _adjusted(
     require_length(calibration, request, lengths)
     report(0.95)
     discovery = discovery_of(
-        *(calibration, choice, lengths, request.rough_leds, second),
+        *(calibration, choice, lengths, request.rough_leds),
         is_relative=request.is_relative,
     )
     try:
@@ -244,50 +222,18 @@ def with_touched_length(request: Request, relative: Discovery) -> Request:
     unknown = [Artefact(ArtefactKind.LENGTH, 0.0)]
     (found,) = measure_artefacts("", unknown, runs, Conditions(instrument)).part.results
     measured = found.value.value
-    known, certified = relative.lengths[0], touched.separation
-    length = known.length * certified.distance / measured
+    known = relative.lengths[0]
+    length = known.length * touched.distance / measured
     own = found.value.uncertainty / COVERAGE_FACTOR / measured
-    sigma = length * float(np.hypot(own, certified.sigma / certified.distance))
+    sigma = length * float(np.hypot(own, touched.sigma / touched.distance))
     for each in known_lengths(request.lengths, relative.pen.leds):
         implied = measured * each.length / each.between(relative.pen.leds)
         relative_sigma = np.linalg.norm([own, each.sigma / each.length, SHAPE])
-        by_chance = np.hypot(implied * relative_sigma, certified.sigma)
-        if abs(implied - certified.distance) > CONTRADICTING * by_chance:
-            raise contradicting_distance(certified.distance, implied, each)
+        by_chance = np.hypot(implied * relative_sigma, touched.sigma)
+        if abs(implied - touched.distance) > CONTRADICTING * by_chance:
+            raise contradicting_distance(touched.distance, implied, each)
     by_touches = MeasuredLength((known.first + 1, known.second + 1), length, sigma)
     return replace(request, lengths=(*request.lengths, by_touches))
-
-
-def _with_second(
-    start: BundleState, request: Request, report: Report
-) -> tuple[BundleState, SecondSwing]:
-    """Return a start with the scale by two cones, and the second swing in its frame."""
-    assert request.second is not None
-    separation, sightings = request.second.separation, request.second.sightings
-    swing = _labelled_swing(sightings, request, lambda done: report(0.6 + 0.3 * done))
-    state = swing.found.state
-    order = number_by_sketch(state.pen.leds, start.pen.leds)
-    leds = state.pen.leds[order]
-    leds_there = start.pen.leds - start.pen.leds.mean(axis=0)
-    ratio = np.linalg.norm(leds_there) / np.linalg.norm(leds - leds.mean(axis=0))
-    R, _ = fit_rigid(ratio * leds, start.pen.leds)
-    cone = ratio * state.cone_rig
-    factor = 1.0
-    if not request.lengths:
-        apart = float(np.linalg.norm(cone - start.cone_rig))
-        if apart < SAME_CONE * RELATIVE:
-            raise CalibrationError("discover.one-cone")
-        factor = separation.distance / apart
-    start = scaled_to(start, factor)
-    start = replace(start, pen=replace(start.pen, diameter=request.diameter))
-    there = replace(start, cone_rig=factor * cone, rotations=state.rotations @ R.T)
-    swing = replace(
-        swing, found=replace(swing.found, spots=swing.found.spots[:, order])
-    )
-    observations = _labelled_observations(
-        sightings, there, swing.found.images, swing.numbers
-    )
-    return start, SecondSwing(observations, separation)
 
 
 def _labelled_observations(
@@ -336,7 +282,6 @@ def _calibrated(
     choice: Choice | None,
     request: Request,
     observations: Observations,
-    second: SecondSwing | None,
 ) -> Calibration:
     """Return the calibration.
 
@@ -345,6 +290,6 @@ def _calibrated(
     pen, camera = start.pen, start.rig.cameras[0]
     if choice is None:  # the camera is known
         camera = request.camera or camera
-        return calibrate(camera, pen, observations, second=second)
+        return calibrate(camera, pen, observations)
     of_any = replace(camera, covariance=any_covariance(camera))
-    return calibrate(of_any, pen, observations, second=second)
+    return calibrate(of_any, pen, observations)

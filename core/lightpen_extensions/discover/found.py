@@ -9,14 +9,12 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle.consistency_findings import DIAMETER
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
-from lightpen.estimation.uncertainty.second_cone import (
-    SecondSwing,
+from lightpen.estimation.uncertainty.disc_normals import (
     across_normals,
     effect_of_normals,
 )
+from lightpen.estimation.uncertainty.instrument import Parameters, instrument_mixing
 from lightpen.formats.camera_layouts import LARGEST_FOLD
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import COVERAGE_FACTOR, N_DIRECTIONS, dial_counts, inverse
@@ -38,14 +36,8 @@ from lightpen_extensions.discover.scale import (
     Request,
     nearest_pair,
     with_led_covariance,
-    with_lengths_known,
 )
-from lightpen_extensions.discover.starts import (
-    FACING,
-    KnownLength,
-    farthest_apart,
-    gradient_of,
-)
+from lightpen_extensions.discover.starts import FACING, KnownLength, gradient_of
 from lightpen_extensions.discover.tracks import Sightings
 
 
@@ -103,7 +95,6 @@ def discovery_of(
     choice: Choice | None,
     lengths: tuple[KnownLength, ...],
     sketch: FloatArray | None,
-    second: SecondSwing | None,
     *,
     is_relative: bool,
 ) -> Discovery:
@@ -124,9 +115,7 @@ def discovery_of(
     values, vectors = np.linalg.eigh(budget)
     beyond_fit = (vectors * np.maximum(values, 0.0)) @ vectors.T
     covariance[at.tip, at.tip] += beyond_fit
-    pixels = [calibration.observations.pixels[calibration.used]]
-    pixels += [] if second is None else [second.observations.pixels]
-    marks = np.concatenate([marks_of(each) for each in pixels])
+    marks = marks_of(calibration.observations.pixels[calibration.used])
     camera = replace(
         state.rig.cameras[0],
         covariance=covariance[at.cameras[0], at.cameras[0]],
@@ -143,8 +132,6 @@ def discovery_of(
         expansion=None,
         found=FoundPen(marks, before.diameter, before.led_covariance),
     )
-    if not (lengths or is_relative):
-        pen = _with_length_found(pen)
     _, R, t = framed(pen, tip, sketch)
     found = Discovery(
         pen=pen,
@@ -167,17 +154,6 @@ def _camera_before(start: Camera, marks: FloatArray) -> FoundCamera:
     if earlier is not None:
         return replace(earlier, marks=np.concatenate([earlier.marks, marks]))
     return FoundCamera(marks, start.intrinsics, start.covariance)
-
-
-def _with_length_found(pen: Pen) -> Pen:
-    """Return a pen with its scale, known by two cones, as a prior of other images."""
-    assert pen.found is not None
-    assert pen.scale_sigma is not None
-    first, second, length = farthest_apart(pen.leds)
-    longest = KnownLength(first, second, length, length * pen.scale_sigma)
-    known = with_lengths_known(pen, (longest,)).led_covariance
-    assert known is not None
-    return replace(pen, found=replace(pen.found, led_covariance=known))
 
 
 def with_frame(found: Discovery, origin: int, along: int) -> Discovery:
@@ -322,7 +298,7 @@ def require_length(
         if request.touched is not None:
             raise CalibrationError(
                 "discover.touched-length",
-                length=request.touched.separation.distance,
+                length=request.touched.distance,
                 found=each.estimated,
                 stated=each.stated,
             )
@@ -338,24 +314,6 @@ def require_length(
             other=first,
             another=second,
         )
-
-
-def require_distance(
-    without: Calibration, stated: ConeSeparation, lengths: Sequence[KnownLength]
-) -> None:
-    """Refuse a distance of two cones that known lengths contradict.
-
-    ``without`` is the calibration by both swings without the distance, scaled by the
-    lengths alone.
-    """
-    bundle, second = without.bundle, without.second
-    assert second is not None
-    along = bundle.state.between_rig / second.distance
-    at = bundle.unknowns.layout.between
-    sigma = np.sqrt(along @ bundle.covariance[at, at] @ along)
-    off = abs(second.distance - stated.distance)
-    if off > CONTRADICTING * np.hypot(sigma, stated.sigma):
-        raise contradicting_distance(stated.distance, second.distance, lengths[0])
 
 
 def contradicting_distance(

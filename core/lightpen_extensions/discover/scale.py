@@ -7,14 +7,12 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import inverse
 from lightpen.model.pen import Pen
 from lightpen.model.self_calibration import EXACT_SCALE
 from lightpen_extensions.discover.starts import KnownLength, farthest_apart, gradient_of
-from lightpen_extensions.discover.tracks import Sightings
 from lightpen_extensions.measure.tasks.probed_point import ProbedPoint
 
 WIDE = 0.02  # of the pen's size: prior of an LED coordinate
@@ -141,16 +139,13 @@ class Request:
     diameter: float  # of the LED discs, mm
     camera: Camera | None = None  # of a camera file, with its covariance
     sketch: Pen | None = None  # rough LEDs, which give numbers and frame
-    # A swing in a second cone, before the same camera, not moved. The distance of the
-    # cones gives the scale where there is no length.
-    second: "SecondSightings | None" = None
     touched: "TouchedLength | None" = None  # a certified length
     n_coefficients: int | None = None  # required by other swings; None: chosen
 
     @property
     def is_relative(self) -> bool:
         """Whether nothing gives the scale."""
-        return not (self.lengths or self.second or self.touched)
+        return not (self.lengths or self.touched)
 
     @property
     def rough_leds(self) -> FloatArray | None:
@@ -159,17 +154,10 @@ class Request:
 
 
 @dataclass(frozen=True, eq=False)
-class SecondSightings:
-    """A swing of the pen in a second cone, at a certified distance from the first."""
-
-    sightings: Sightings
-    separation: ConeSeparation
-
-
-@dataclass(frozen=True, eq=False)
 class TouchedLength:
     """Touches of both ends of a certified length, after the swing."""
 
     # Returns the touches as measured with pen, camera and tip as found.
     touches: Callable[[Instrument], Sequence[ProbedPoint]]
-    separation: ConeSeparation
+    distance: float  # of the ends, mm
+    sigma: float  # its standard uncertainty, mm

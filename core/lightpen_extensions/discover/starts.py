@@ -20,7 +20,7 @@ from lightpen.estimation.bundle.linearised import (
     eliminate,
     views_at,
 )
-from lightpen.estimation.uncertainty.second_cone import (
+from lightpen.estimation.uncertainty.disc_normals import (
     across_normals,
     turned_normals,
     with_normal,

@@ -5648,6 +5648,10 @@ needed</source>
         <translation>请输入主管的姓名。</translation>
     </message>
     <message>
+        <source>An LED file needs one known length. Measure the distance between two LEDs and state it, or touch both ends of a certified length.</source>
+        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，或触测一段有证书的长度的两端。</translation>
+    </message>
+    <message>
         <source>Brown&apos;s lens model with {n_coefficients} coefficients; cross-validated error {held_out:.4f} px.</source>
         <translation>Brown 镜头模型，{n_coefficients} 个系数；交叉验证误差 {held_out:.4f} px。</translation>
     </message>
@@ -6198,10 +6202,6 @@ needed</source>
     <message>
         <source>The disk is read-only. Choose another folder.</source>
         <translation>磁盘是只读的。请选择其他文件夹。</translation>
-    </message>
-    <message>
-        <source>The distance of the cones contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
-        <translation>锥孔间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
     </message>
     <message>
         <source>The file has {n_leds} LEDs.</source>
@@ -7540,10 +7540,6 @@ needed</source>
         <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
     </message>
     <message>
-        <source>An LED file needs one known length. Measure the distance between two LEDs and state it, touch both ends of a certified length, or swing in a second cone at a known distance.</source>
-        <translation>LED 文件需要一个已知长度。请测量并给出两个 LED 的间距，触测一段有证书的长度的两端，或在已知距离的第二个锥孔中摆动。</translation>
-    </message>
-    <message>
         <source>An internal error occurred, and the verification is paused. Results so far are kept; continue, or start over.</source>
         <translation>发生内部错误，验证已暂停。目前的结果已保留；请继续，或重新开始。</translation>
     </message>
@@ -8412,10 +8408,6 @@ needed</source>
         <translation>联合拟合在 {n_steps} 次迭代内未收敛。请检查两个文件是否属于这支光笔和这台相机。</translation>
     </message>
     <message>
-        <source>The joint fit of both cones did not converge. Check their distance of {distance:g} mm, the known length, and that the camera was not moved between the swings.</source>
-        <translation>两个锥孔的联合拟合未收敛。请检查锥孔间距 {distance:g} mm、已知长度，以及两次摆动之间相机未被移动。</translation>
-    </message>
-    <message>
         <source>The lamp at {x:.0f}, {y:.0f} px moved by {shift:.2f} px during the swing, but the pen did not. No correction is made. Fix or cover the lamp.</source>
         <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
@@ -8692,10 +8684,6 @@ needed</source>
         <translation>测头就位在各图像之间变化 {distance:.4f} mm（标准差），已计入 U。请清洁测头和锥孔，检查磨损，并压紧测头。</translation>
     </message>
     <message>
-        <source>The tip was in the same place in both swings. Give a swing in each of the two cones, before the same camera.</source>
-        <translation>两次摆动中测头位于同一位置。请在同一相机前，在两个锥孔中各提供一次摆动。</translation>
-    </message>
-    <message>
         <source>The tips from odd and even images differ by {difference:.4f} mm; usual is {usual:.4f} mm. The tip may have moved. Repeat the swing with the tip pressed in.</source>
         <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过。请压紧测头，重新摆动。</translation>
     </message>
@@ -8714,6 +8702,10 @@ needed</source>
     <message>
         <source>LED positions and images disagree: {sigma:.2f} px; usual is {usual} px or less. The tip seems to move, too. {cause} Then check that the tip was pressed into the cone.</source>
         <translation>LED 位置与图像不符：{sigma:.2f} px；通常不超过 {usual} px。测头似乎也在移动。{cause}然后检查测头是否压在锥孔中。</translation>
+    </message>
+    <message>
+        <source>The distance of the touched ends contradicts the length: it is stated as {distance:.3f} mm; by the {length:g} mm between LEDs {first} and {second} it is {implied:.3f} mm. Check both, and which LEDs were measured.</source>
+        <translation>触测的两端间距与长度矛盾：给定间距为 {distance:.3f} mm；按 LED {first} 与 {second} 之间的 {length:g} mm 计算为 {implied:.3f} mm。请检查两者，并核对测量的是哪两个 LED。</translation>
     </message>
     <message>
         <source>The image shifts by {size:.3f} px (RMS) with the tilt of the pen: the camera turns as the operator moves. The result is corrected and U includes the rest. Put the camera on a firm stand where steps do not move it.</source>
@@ -9502,10 +9494,6 @@ needed</source>
     <message>
         <source>{path} has several cameras; only calibrations of a single camera can be recomputed. Remove it.</source>
         <translation>{path} 来自多台相机；只能重新求解单台相机的标定。请将其去掉。</translation>
-    </message>
-    <message>
-        <source>{path} has two cones, and an earlier version wrote it without the LED centres in the second one. Calibrate from the images.</source>
-        <translation>{path} 含两个锥孔，由早期版本写入，缺少第二个锥孔中的 LED 中心。请由图像重新标定。</translation>
     </message>
     <message>
         <source>{path} is neither a recorded swing nor a result. Open a swing folder, a file in it, or a file in the folder results.</source>

@@ -26,7 +26,7 @@ LIMITS = SwingLimits(max_uncertainty=0.05, min_images=12)
 # Of these, files and pen are what their uncertainty says.
 AS_STATED = (
     *("usual", "restless", "followed", "loose", "oval_seat"),
-    *("by_two_cones", "by_two_cameras"),
+    "by_two_cameras",
     *(
         pytest.param(name, marks=pytest.mark.slow)
         for name in ("larger_discs", "by_a_late_camera")
@@ -99,19 +99,6 @@ def test_record_and_text_have_the_discs_that_areas_tell(calibrated: Calibrated) 
     assert estimate["value"] == reading.value
     assert estimate["standard_uncertainty"] == reading.sigma
     assert f"{reading.value:.2f} mm wide by their areas" in text_of(found)
-
-
-def test_record_and_text_have_the_second_cone(calibrated: Calibrated) -> None:
-    found = calibrated("by_two_cones")
-    second = found.second
-    assert second is not None
-    assert abs(second.distance - second.separation.distance) < 0.1
-
-    record = recorded(found)["second_cone"]
-    assert record["distance_mm"] == second.distance
-    assert record["images_used"] == second.n_used == 18
-    assert record["stated_distance_mm"] == second.separation.distance
-    assert f"18 images used, {second.distance:.4f} mm from the first" in text_of(found)
 
 
 def test_the_record_has_the_noisy_led(calibrated: Calibrated) -> None:

@@ -319,14 +319,6 @@ def _fit_consistent(
         bundle = fit(priors, begin=among)
     fit, bundle = _with_led_noise(fit, bundle, priors, of_centers)
     correlation = measure_correlation(bundle, pixels)
-    of_pen: tuple[Contradiction, ...] = ()
-    if priors.separation is not None:  # which tells the scale, and must not be blamed
-        of_pen, priors = find_pen_contradictions(
-            state.pen, bundle, priors, correlation.excess
-        )
-        if of_pen:
-            bundle = fit(priors, begin=bundle)
-            correlation = measure_correlation(bundle, pixels)
     inputs = ContradictedInputs(priors)
     for _ in range(MAX_RELEASES):
         now = find_contradicted_inputs(rig, bundle, priors, correlation.excess, inputs)
@@ -335,14 +327,12 @@ def _fit_consistent(
         inputs, bundle = now, fit(now.priors, begin=bundle)
         correlation = measure_correlation(bundle, pixels)
     of_files = contradictions_of(rig, bundle, priors, correlation.excess, inputs)
-    released = inputs.priors
-    if not of_pen:
-        of_pen, released = find_pen_contradictions(
-            state.pen, bundle, released, correlation.excess
-        )
-        if of_pen:
-            bundle = fit(released, begin=bundle)
-            correlation = measure_correlation(bundle, pixels)
+    of_pen, released = find_pen_contradictions(
+        state.pen, bundle, inputs.priors, correlation.excess
+    )
+    if of_pen:
+        bundle = fit(released, begin=bundle)
+        correlation = measure_correlation(bundle, pixels)
     return _ConsistentFit(bundle, correlation, released, of_files + of_pen)
 
 

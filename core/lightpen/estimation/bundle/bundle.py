@@ -73,7 +73,7 @@ class Bundle:
     # (p, p), N of equation (14), of the images, rotations eliminated.
     information: FloatArray
     prior_information: FloatArray  # (p, p), L of equation (14)
-    # (p, p), M of equation (14), of disc areas and the distance of two cones.
+    # (p, p), M of equation (14), of disc areas.
     measured_information: FloatArray
     # (p, p), J of equation (15): covariance of the gradient by significant seat jitter.
     jitter_information: FloatArray
@@ -140,9 +140,8 @@ class Bundle:
     def drift(self) -> float:
         """Largest distance between two positions of the drifting cone, mm."""
         at, unknowns = self.layout, self.unknowns
-        first = (at.drift.start - at.seat[0].start) // N_CONE
         by_form = self.values[at.drift].reshape(-1, N_CONE)
-        places = unknowns.forms[:, first : first + len(by_form)] @ by_form
+        places = unknowns.forms[:, -len(by_form) :] @ by_form
         apart = np.linalg.norm(places[:, None] - places, axis=2)
         return float(apart.max())
 
@@ -162,9 +161,8 @@ class Bundle:
     @property
     def cone_moves(self) -> FloatArray:
         """Fitted shift of the cone of each image by seat and drift, (N, 3), mm."""
-        at = self.layout
-        by_form = self.values[at.seat[0].start : at.drift.stop].reshape(-1, N_CONE)
-        return np.asarray(self.unknowns.forms[:, : len(by_form)] @ by_form)
+        by_form = self.values[self.layout.seat[0].start :].reshape(-1, N_CONE)
+        return np.asarray(self.unknowns.forms @ by_form)
 
     def part(self, *kinds: slice) -> FloatArray:
         """Return the covariance of (tip, cone) by errors of some priors, (6, 6), mm^2.
@@ -364,7 +362,7 @@ def _solve(
     jitter = components.jitter.covariance
     eliminated = eliminate(now.views, used, weight_sigma, jitter)
     information, gradient = unknowns.system(eliminated)
-    measured, measured_right = unknowns.measured(now.state, now.values)
+    measured, measured_right = unknowns.measured()
     right = gradient + information @ now.values + measured_right
     if with_components:
         components = find_components(

@@ -107,10 +107,10 @@ class _Images(NamedTuple):
 def find_step(bundle: Bundle, pixels: FloatArray) -> ChangePoint | None:
     """Return the step in a swing; None if there is none beyond doubt.
 
-    ``pixels`` (N, C, L, 2) as fitted, px. A second cone has no step.
+    ``pixels`` (N, C, L, 2) as fitted, px.
     """
     state = bundle.state
-    if len(pixels) < 2 * MIN_PART + 1 or state.at_second is not None:
+    if len(pixels) < 2 * MIN_PART + 1:
         return None
     solved, change = solved_at_rest(bundle, pixels)
     rows = solved.eliminated.cone_rows

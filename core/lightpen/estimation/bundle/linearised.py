@@ -5,7 +5,7 @@ extrinsics of the camera, the diameter of the discs and the LED itself. Tip and 
 the pen need no columns of their own: they are combinations of those of the LEDs.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,18 +28,6 @@ class BundleState:
     tip_pen: FloatArray  # (3,), mm
     cone_rig: FloatArray  # (3,), mm
     rotations: FloatArray  # (N, 3, 3), of rig_from_pen
-    # (N,), images in which the tip rests in a second cone; None without one.
-    at_second: BoolArray | None = None
-    # (3,), from the first cone to the second, mm
-    between_rig: FloatArray = field(default_factory=lambda: np.zeros(3))
-
-    @property
-    def cones_rig(self) -> FloatArray:
-        """Cone in which the tip of each image rests, (N, 3), mm."""
-        cones = np.tile(self.cone_rig, (len(self.rotations), 1))
-        if self.at_second is not None:
-            cones[self.at_second] += self.between_rig
-        return cones
 
     def leds_in(self, c: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return LEDs from the tip, from a camera, and normals, in its frame, mm.
@@ -49,8 +37,8 @@ class BundleState:
         R_c, t_c = self.rig.rotations[c], self.rig.translations[c]
         transposed = np.swapaxes(R_c @ self.rotations, 1, 2)
         levers = (self.pen.leds - self.tip_pen) @ transposed
-        cones = self.cones_rig @ R_c.T + t_c
-        return levers, levers + cones[:, None], self.pen.normals @ transposed
+        cone = R_c @ self.cone_rig + t_c
+        return levers, levers + cone, self.pen.normals @ transposed
 
 
 @dataclass(frozen=True, eq=False)

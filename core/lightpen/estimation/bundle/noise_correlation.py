@@ -324,7 +324,7 @@ def _noise_model(
         current[kind] = 0.0
     right = each.gradient + each.information @ current
     floor = (NOISE_FLOOR / bundle.weight_sigma) ** 2
-    measured, measured_right = unknowns.measured(bundle.state, current)
+    measured, measured_right = unknowns.measured()
     for _ in range(NOISE_PASSES):
         information = each.information / variance + measured
         both = right / variance + measured_right

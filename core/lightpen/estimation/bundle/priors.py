@@ -112,14 +112,6 @@ class Prior:
         return sqrt(float(self.covariance[0, 0]))
 
 
-@dataclass(frozen=True)
-class ConeSeparation:
-    """A certified distance of two cones, with its standard uncertainty, mm."""
-
-    distance: float
-    sigma: float
-
-
 @dataclass(frozen=True, eq=False)
 class Priors:
     """Priors of all unknowns but tip, cone and rotations."""
@@ -138,7 +130,6 @@ class Priors:
     # (3 L, 3 L), of all LED coordinates, mm^2; None: only ``led_sigma`` is known.
     led_covariance: FloatArray | None = None
     reading: DiameterReading | None = None  # disc diameter from the image areas
-    separation: ConeSeparation | None = None  # of the second cone from the first
 
     @property
     def size_covariance(self) -> FloatArray:

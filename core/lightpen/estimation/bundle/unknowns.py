@@ -77,7 +77,6 @@ class ParameterLayout(NamedTuple):
     leds: slice
     seat: tuple[slice, ...]
     drift: slice
-    between: slice
 
     @property
     def of_files(self) -> tuple[slice, ...]:
@@ -99,8 +98,7 @@ class Unknowns:
     start: BundleState
     # (K, p0), columns of `NormalEquations` by the unknowns common to all images.
     mixing: FloatArray
-    # (N, m), weights of the moves of the cone in each image: seat modes, drift modes,
-    # and 1 at the second cone.
+    # (N, m), weights of the moves of the cone in each image: seat and drift modes.
     forms: FloatArray
     oval: FloatArray  # (21, 2), moves in the seat modes by an oval seat
     basis: FloatArray  # (3 L, 3 L - 6), moves of LEDs without moves of the whole pen
@@ -143,7 +141,6 @@ class Unknowns:
             leds=following(basis.shape[1]),
             seat=tuple(following(3 * n_forms) for n_forms in MODE_COUNTS),
             drift=following(3 * given.drift.shape[1]),
-            between=following(0 if start.at_second is None else 3),
         )
         scaling = (pen.leds - start.tip_pen).ravel()
         n_fields = sum(field.number for field in fields)
@@ -165,8 +162,7 @@ class Unknowns:
         mixing[row + n_fields, layout.diameter] = 1.0
         mixing[at_leds, layout.scale.start] = scaling
         mixing[at_leds, layout.leds] = basis
-        second = () if start.at_second is None else (start.at_second.astype(float),)
-        forms = np.column_stack([given.lean, given.drift, *second])
+        forms = np.column_stack([given.lean, given.drift])
         return cls(
             *(layout, start, mixing, forms, given.oval, basis, scaling, priors),
             *(given, fields),
@@ -197,22 +193,19 @@ class Unknowns:
         """Return the effective tip and cone by the unknowns, (6, p).
 
         Moves of the ball by seat and drift move them as in `effective_tip`; rotations
-        (N, 3, 3) are rig_from_pen. Of two cones, the first counts.
+        (N, 3, 3) are rig_from_pen.
         """
-        at, second = self.layout, self.start.at_second
-        first = np.ones(len(rotations), dtype=bool) if second is None else ~second
-        forms = self.forms[first, : (at.drift.stop - at.seat[0].start) // N_CONE]
-        moves = np.einsum("nm,ij->nimj", forms, np.eye(N_CONE))
+        moves = np.einsum("nm,ij->nimj", self.forms, np.eye(N_CONE))
         effective = np.eye(6, self.number)
-        effective[:, at.seat[0].start : at.drift.stop] = effective_tip(
-            rotations[first], moves.reshape(len(forms), N_CONE, -1)
+        effective[:, self.layout.seat[0].start :] = effective_tip(
+            rotations, moves.reshape(len(rotations), N_CONE, -1)
         )
         return effective
 
     @property
     def number(self) -> int:
         """Number of unknowns, rotations apart."""
-        return int(self.layout.between.stop)
+        return int(self.layout.drift.stop)
 
     def system(self, each: NormalEquations) -> tuple[FloatArray, FloatArray]:
         """Return information (p, p) and gradient (p,) of the unknowns."""
@@ -295,13 +288,8 @@ class Unknowns:
         prior[at.scale, at.scale] = known_by(priors.size_covariance)
         return prior
 
-    def measured(
-        self, state: BundleState, values: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return information (p, p) and right side (p,) of areas and cones' distance.
-
-        ``values`` (p,) are those at the state.
-        """
+    def measured(self) -> tuple[FloatArray, FloatArray]:
+        """Return information (p, p) and right side (p,) of the areas of the discs."""
         at, priors = self.layout, self.priors
         information = np.zeros((self.number, self.number))
         right = np.zeros(self.number)
@@ -310,13 +298,6 @@ class Unknowns:
             change = priors.reading.value - self.start.pen.diameter
             information[at.diameter, at.diameter] = weight
             right[at.diameter] = weight * change
-        if priors.separation is not None:
-            weight = priors.separation.sigma**-2
-            distance = float(np.linalg.norm(state.between_rig))
-            along = state.between_rig / distance
-            change = priors.separation.distance - distance
-            information[at.between, at.between] = weight * np.outer(along, along)
-            right[at.between] = weight * along * (change + along @ values[at.between])
         return information, right
 
     def seat_variances(self, components: Components) -> FloatArray:
@@ -340,9 +321,6 @@ class Unknowns:
         places = np.concatenate([np.zeros(6), values[at.extrinsics]]).reshape(-1, 6)
         tip = now.tip_pen + values[at.tip]
         leds = start.pen.leds + (self.basis @ values[at.leds]).reshape(-1, 3)
-        between = start.between_rig
-        if now.at_second is not None:
-            between = between + values[at.between]
         return replace(
             now,
             rig=replace(
@@ -359,7 +337,6 @@ class Unknowns:
             tip_pen=tip,
             cone_rig=now.cone_rig + values[at.cone],
             rotations=rotation_from_vector(turns) @ now.rotations,
-            between_rig=between,
         )
 
 

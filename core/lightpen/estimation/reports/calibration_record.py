@@ -423,25 +423,6 @@ class FrameRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     leds: tuple[SpotRecord, ...]
 
 
-class SecondConeRecord(Struct, frozen=True, omit_defaults=True):
-    """The second cone, and U (k = 2) of the tip without and with their distance.
-
-    Attributes
-    ----------
-    frames
-        The images of the swing in it; records of earlier versions lack them.
-    """
-
-    cone_cam_mm: Triple
-    images_used: Count
-    stated_distance_mm: Number
-    stated_standard_uncertainty_mm: Number
-    distance_mm: Number
-    pen_scale: Number
-    pen_scale_expanded_uncertainty: Number
-    frames: tuple[FrameRecord, ...] = ()
-
-
 class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Calibration of the probe tip of a light pen.
 
@@ -509,7 +490,6 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
     adjusted: AdjustmentRecord
     assumptions: Assumptions
     fixed_lamps: tuple[LampRecord, ...]
-    second_cone: SecondConeRecord | None
     instrument: InstrumentRecord
     weakest_direction: DirectionRecord
     coverage: CoverageRecord
@@ -522,9 +502,7 @@ class CalibrationRecord(Struct, frozen=True, omit_defaults=True, kw_only=True):
 
     def __post_init__(self) -> None:
         n_leds = len(self.leds)
-        second = () if self.second_cone is None else self.second_cone.frames
-        frames = (*self.frames, *second)
-        if max((spot.led for f in frames for spot in f.leds), default=0) > n_leds:
+        if max((spot.led for f in self.frames for spot in f.leds), default=0) > n_leds:
             raise ValueError("An LED is seen that the pen does not have.")
         if len(self.instrument.leds_mm) != n_leds:
             raise ValueError("The instrument is of another pen.")

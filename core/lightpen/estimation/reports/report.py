@@ -32,7 +32,6 @@ from lightpen.estimation.reports.calibration_record import (
     OtherCameraRecord,
     PenScaleRecord,
     RigRecord,
-    SecondConeRecord,
     SelfCheckRecord,
     SpotRecord,
     TipFramesRecord,
@@ -50,7 +49,6 @@ from lightpen.estimation.reports.report_warnings import (
 from lightpen.estimation.reports.verdict import judge
 from lightpen.estimation.uncertainty.budget import distance_repeatability
 from lightpen.estimation.uncertainty.instrument import Instrument
-from lightpen.estimation.uncertainty.second_cone import SecondCone
 from lightpen.formats.opened_files import Inputs
 from lightpen.formats.own_json import THIS_PROGRAM, StoredMessage, file_entry, plain
 from lightpen.local_time import local_now
@@ -95,7 +93,6 @@ def calibration_record(
         adjusted=_adjusted(calibration),
         assumptions=calibration.assumptions,
         fixed_lamps=_lamps(calibration),
-        second_cone=_second_cone(calibration.second),
         instrument=_instrument(calibration.instrument),
         weakest_direction=DirectionRecord(
             vector_pen=plain(result.budget.weakest_direction),
@@ -254,21 +251,6 @@ def _lamps(calibration: Calibration) -> tuple[LampRecord, ...]:
     )
 
 
-def _second_cone(second: SecondCone | None) -> SecondConeRecord | None:
-    if second is None:
-        return None
-    return SecondConeRecord(
-        cone_cam_mm=plain(second.cone_cam),
-        images_used=int(second.n_used),
-        stated_distance_mm=plain(second.separation.distance),
-        stated_standard_uncertainty_mm=plain(second.separation.sigma),
-        distance_mm=plain(second.distance),
-        pen_scale=plain(1 + second.scale),
-        pen_scale_expanded_uncertainty=plain(second.scale_uncertainty),
-        frames=tuple(_frames_of(second)),
-    )
-
-
 def _instrument(instrument: Instrument) -> InstrumentRecord:
     rig = instrument.rig
     others = zip(rig.cameras, rig.rotations, rig.translations, strict=True)
@@ -337,7 +319,7 @@ def _frames(calibration: Calibration) -> Iterator[FrameRecord]:
                 )
 
 
-def _frames_of(images: CameraImages | SecondCone) -> Iterator[FrameRecord]:
+def _frames_of(images: CameraImages) -> Iterator[FrameRecord]:
     """Yield the images of one camera, without a tip of each."""
     observations = images.observations
     pixels, areas = plain(observations.seen_pixels), plain(observations.areas)

@@ -205,15 +205,6 @@ def _pen_lines(calibration: Calibration) -> list[str]:
             f"Discs        {calibration.bundle.state.pen.diameter:.2f} mm wide by the "
             "LED file; LED centres alone do not tell"
         )
-    second = calibration.second
-    if second is not None:
-        lines += [
-            f"Second cone  {second.n_used} images used, {second.distance:.4f} mm from "
-            f"the first; certified {second.separation.distance:.4f} mm, U = "
-            f"{COVERAGE_FACTOR * second.separation.sigma:.4f} mm",
-            f"  Scale      of the LED file by this distance {1 + second.scale:.6f}, "
-            f"U = {second.scale_uncertainty:.6f}",
-        ]
     return lines
 
 

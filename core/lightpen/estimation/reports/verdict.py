@@ -276,7 +276,7 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
 
 def _good(calibration: Calibration, uncertainty: float) -> Message:
     """Return a verdict without findings, and what the images cannot check."""
-    if len(calibration.cameras) > 1 or calibration.second is not None:
+    if len(calibration.cameras) > 1:
         return message(Code.GOOD, uncertainty=uncertainty)
     by_areas = calibration.stated.reading is not None
     what = message("unchecked.scale") if by_areas else message("unchecked.diameter")

@@ -53,7 +53,7 @@ from lightpen.estimation.bundle.linearised import N_CONE
 from lightpen.estimation.bundle.priors import Priors
 from lightpen.estimation.bundle.unknowns import whole_moves
 from lightpen.estimation.contact.joint import JointFit
-from lightpen.estimation.uncertainty.second_cone import (
+from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )

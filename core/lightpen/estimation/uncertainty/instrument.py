@@ -24,7 +24,7 @@ from lightpen.estimation.bundle.priors import (
 )
 from lightpen.estimation.bundle.unknowns import led_basis
 from lightpen.estimation.uncertainty.budget import Budget, ContributionName
-from lightpen.estimation.uncertainty.second_cone import (
+from lightpen.estimation.uncertainty.disc_normals import (
     covariance_of_turn,
     effect_of_normals,
 )

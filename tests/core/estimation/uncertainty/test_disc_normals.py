@@ -6,7 +6,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.uncertainty.second_cone import (
+from lightpen.estimation.uncertainty.disc_normals import (
     effect_of_normals,
     turned_normals,
 )

@@ -5,10 +5,7 @@ import pytest
 from tests.simulated_stations import Station, errors_of, random_station, seen_station
 
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.priors import ConeSeparation
-from lightpen_extensions.discover.discover import discover
 from lightpen_extensions.discover.report import picture_of_pen
-from lightpen_extensions.discover.scale import Request, SecondSightings
 from lightpen_extensions.discover.together import (
     Together,
     common_part,
@@ -23,14 +20,13 @@ from lightpen_extensions.simulator.swings import (
 
 N = 60  # images
 FIRST = random_station(6, n_images=N)
-APART = np.array([25.0, 2.0, 30.0])  # mm, from cone to cone
 
 
-def again(seed: int, moved: np.ndarray | float = 0.0) -> Station:
-    """Return another swing of the same pen, in the same cone or in another."""
+def again(seed: int) -> Station:
+    """Return another swing of the same pen in the same cone."""
     swing = FIRST.swing
     postures = operator_postures(np.arange(N) / FRAME_RATE, seed)
-    other = swing_from_postures(postures, swing.tip_pen, swing.cone_cam + moved)
+    other = swing_from_postures(postures, swing.tip_pen, swing.cone_cam)
     rng = np.random.default_rng(seed)
     return seen_station(FIRST.camera, FIRST.pen, other, 0.03, 0.02, rng)
 
@@ -96,42 +92,6 @@ def test_a_swing_of_another_pen_is_refused_by_its_number() -> None:
     other = random_station(7, n_images=N).sightings
     with pytest.raises(CalibrationError, match="Swing 2 does not show the LEDs"):
         discover_together((FIRST.sightings, other), FIRST.request)
-
-
-@pytest.mark.slow
-def test_a_second_cone_at_a_known_distance_gives_the_scale() -> None:
-    separation = ConeSeparation(float(np.linalg.norm(APART)), 1e-3)
-    second = SecondSightings(again(2, APART).sightings, separation)
-    request = Request((), FIRST.pen.diameter, second=second)
-
-    found = discover(FIRST.sightings, request)
-
-    assert not found.is_relative
-    errors = errors_of(found, FIRST)
-    assert (np.abs(errors.tip) < 1.75 * found.expanded_uncertainty).all()
-    assert errors.led_rms < 0.02
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.001, 1.15])
-def test_two_cones_that_contradict_the_length_are_refused(factor: float) -> None:
-    distance = float(np.linalg.norm(APART))
-    separation = ConeSeparation(factor * distance, 1e-3)
-    second = SecondSightings(again(2, APART).sightings, separation)
-
-    with pytest.raises(CalibrationError, match="cones contradicts the length") as at:
-        discover(FIRST.sightings, replace(FIRST.request, second=second))
-
-    implied = at.value.message.values["implied"]
-    assert implied == pytest.approx(distance, rel=2e-4)
-
-
-@pytest.mark.slow
-def test_two_swings_in_one_cone_are_refused_as_two_cones() -> None:
-    second = SecondSightings(FIRST.sightings, ConeSeparation(150.0, 1e-3))
-    request = Request((), FIRST.pen.diameter, second=second)
-    with pytest.raises(CalibrationError, match="same place in both swings"):
-        discover(FIRST.sightings, request)
 
 
 def test_the_picture_shows_the_pen_upright(together: Together) -> None:

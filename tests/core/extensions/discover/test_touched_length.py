@@ -7,7 +7,6 @@ from tests.simulated_stations import errors_of, leaning, random_station, seen_st
 
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle.priors import ConeSeparation
 from lightpen.estimation.uncertainty.instrument import Instrument
 from lightpen.formats.observation_files import Centers
 from lightpen_extensions.discover.discover import discover, with_touched_length
@@ -46,7 +45,7 @@ def touches(instrument: Instrument) -> tuple[ProbedPoint, ...]:
 
 def touched(factor: float = 1.0) -> TouchedLength:
     distance = factor * float(np.linalg.norm(APART))
-    return TouchedLength(touches, ConeSeparation(distance, SIGMA))
+    return TouchedLength(touches, distance, SIGMA)
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +69,7 @@ def test_a_touched_length_that_contradicts_the_known_length_is_refused(
 ) -> None:
     right = replace(STATION.request, touched=touched())
     assert len(with_touched_length(right, relative).lengths) == 2
-    with pytest.raises(CalibrationError, match="cones contradicts the length"):
+    with pytest.raises(CalibrationError, match="ends contradicts the length"):
         with_touched_length(replace(right, touched=touched(1.01)), relative)
 
 
