@@ -149,7 +149,10 @@ def from_table(table: Table, units: str | None) -> PenContent:
     unit = agreed_unit(stated.pop() if stated else "", units, table.name)
     bare = replace(table, header=tuple(name for name, _ in named))
     with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
-    wanted = [_LED_NAMES, *_COORDINATES, *(_NORMALS if with_normals else ())]
+    names = _LED_NAMES
+    if not any(name in names for name in bare.header) and bare.header[:1] != ("x",):
+        names += bare.header[:1]  # what a measuring program calls its elements
+    wanted = [names, *_COORDINATES, *(_NORMALS if with_normals else ())]
     columns = bare.columns(wanted, message("table.of-leds"))
     _check_numbering(table, columns[0])
     numbers = table.numbers(columns[1:])
@@ -266,7 +269,7 @@ def csv_text(pen: Pen) -> str:
 #
 # A list is found by its name: points as three numbers, with three more of the normal,
 # or as mappings with x y z, position and normal; in a mapping, each point has its own
-# name.
+# name. A document that has nothing but points is such a list.
 
 
 LARGEST_WORKBOOK = 50_000_000  # bytes, unpacked
@@ -289,6 +292,8 @@ _FOREIGN = (  # how files begin that cannot be read
     (rb"ply\r?\n", "PLY (point cloud)"),
     (rb"\s*Format Version,", "Motive (CSV)"),
     (rb"\s*\[\w+\]\s*\n\s*\w+\s*=", "INI (Atracsys)"),
+    (rb"solid ", "STL (surface)"),
+    (rb"# Markups fiducial|\s*{\s*\"@schema\"", "3D Slicer (markups)"),
 )
 
 
@@ -345,6 +350,9 @@ def _cell(value: object) -> str:
 
 def markers_of(tree: Tree, name: str) -> Markers | None:
     """Return the points of a document of another program; None if it lists none."""
+    own = list(tree.values()) if isinstance(tree, dict) else tree
+    if isinstance(own, list) and len(own) > 2 and all(map(_is_point, own)):
+        return _markers(own, "", name)
     if not isinstance(tree, dict):
         return None
     for path, unit in LISTS:
@@ -359,6 +367,13 @@ def markers_of(tree: Tree, name: str) -> Markers | None:
         if isinstance(found, list) and found:
             return _markers(found, unit, name)
     return None
+
+
+def _is_point(value: Tree) -> bool:
+    """Return whether a value is three numbers, or has x, y and z."""
+    if isinstance(value, dict):
+        return set(_AXES) <= {str(key).casefold() for key in value}
+    return isinstance(value, list) and len(value) == len(_AXES)
 
 
 def _markers(listed: list[Tree], unit: str, name: str) -> Markers:

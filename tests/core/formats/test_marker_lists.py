@@ -265,6 +265,8 @@ def test_a_tool_definition_of_ndi_is_named(tmp_path: Path) -> None:
         ("Format Version,1.23,Length Units,Millimeters\n\n,,Marker\n", "Motive"),
         ("[geometry]\ncount=4\nid=5\n[fiducial0]\nx=1\n", "Atracsys"),
         ("ply\nformat ascii 1.0\nelement vertex 4\n", "PLY"),
+        ("solid pen\n facet normal 0 0 1\n", "STL"),
+        ("# Markups fiducial file version = 4.11\n1,2,3,4\n", "3D Slicer"),
     ],
 )
 def test_lists_that_cannot_be_read_are_named(
@@ -275,3 +277,29 @@ def test_lists_that_cannot_be_read_are_named(
 
     with pytest.raises(FileError, match=rf"{program}.*led,x_mm,y_mm,z_mm"):
         read_pen(path)
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        LEDS.tolist(),
+        {f"P{i}": led for i, led in enumerate(LEDS.tolist())},
+        [
+            {"id": i, **dict(zip("xyz", led, strict=True))}
+            for i, led in enumerate(LEDS.tolist())
+        ],
+    ],
+)
+def test_a_document_of_points_alone_is_a_list(tree: object, tmp_path: Path) -> None:
+    path = tmp_path / "points.json"
+    path.write_text(json.dumps(tree))
+
+    np.testing.assert_array_equal(read_pen(path, units="mm").leds, LEDS)
+
+
+def test_the_first_column_names_the_points_whatever_its_title(tmp_path: Path) -> None:
+    path = tmp_path / "bericht.csv"
+    rows = [f"Kreis_{i};{x};{y};{z}\n" for i, (x, y, z) in enumerate(LEDS, 1)]
+    path.write_text("Merkmal;x_mm;y_mm;z_mm\n" + "".join(rows))
+
+    np.testing.assert_array_equal(read_pen(path).leds, LEDS)

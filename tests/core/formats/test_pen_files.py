@@ -198,7 +198,6 @@ def test_normals_in_few_digits_get_unit_length(tmp_path: Path) -> None:
         ("60.1", "", "Line 3 of leds.csv: a cell is empty"),
         (",60.1", "", "Line 3 of leds.csv has 3 cells where line 1 has 4"),
         ("x_mm", "w_mm", "leds.csv has no column x"),
-        ("led,", "what,", "leds.csv has no column led"),
         ("y_mm", "x_mm", 'duplicate column "x_mm" in the header.'),
         ("y_mm", "x [mm]", "Columns 2 and 3 of leds.csv both contain x"),
     ],
